@@ -86,15 +86,6 @@ warnings := -Wall -Wextra -Wmissing-prototypes -Wstrict-prototypes -Wvla \
 	-Werror=implicit-function-declaration
 cflags := -std=gnu11 -fPIC -fvisibility=hidden -fno-math-errno -ffp-contract=off $(warnings)
 
-# Vision is built where the headers of OpenCV are, which is in C++. Debian's opencv4.pc is in
-# the package of all of OpenCV, half a gigabyte: two small ones will do.
-opencv_cflags := $(or $(shell $(PKG_CONFIG) --cflags opencv4 2>/dev/null),-I/usr/include/opencv4)
-has_vision := $(if $(shell $(CXX) -E -x c++ $(opencv_cflags) -include opencv2/imgproc.hpp \
-	-include cstdio -include jpeglib.h /dev/null >/dev/null 2>&1 && echo yes),yes)
-# Boards are found where more of it is.
-has_board := $(if $(has_vision),$(if $(shell $(CXX) -E -x c++ $(opencv_cflags) \
-	-include opencv2/calib3d.hpp /dev/null >/dev/null 2>&1 && echo yes),yes))
-
 # One shared object per group of layers; a process maps only the ones it uses.
 # The image of a scene needs the libraries of a screen; without them that library and its
 # command are not built.
@@ -102,7 +93,7 @@ has_view := $(shell $(PKG_CONFIG) --exists sdl2 epoxy cairo egl && echo yes)
 libraries := incise incise-learn incise-record $(if $(has_view),incise-view)
 layers_incise := base fixed model surface tissue control sim device scene loop
 layers_incise-learn := learn calib
-layers_incise-record := $(addprefix record,/ /time /write /read /join /verify /prove /export /arrow /replay)
+layers_incise-record := $(addprefix record,/ /time /write /read /old /join /verify /prove /export /arrow /replay)
 layers_incise-view := view
 pc_incise := libconfig
 pc_incise-learn := libcrypto
@@ -112,10 +103,6 @@ libs_incise := -lm -ldl
 libs_incise-learn := -lm
 libs_incise-record := -lm -ldl -pthread
 libs_incise-view := -lm
-also_incise-learn := lib/base/lines.o lib/base/crc32c.o lib/base/crypto/sha256.o
-also_incise-view := lib/device/module.o
-also_incise-record := lib/base/crc32c.o lib/base/ring.o lib/device/module.o lib/device/thread.o \
-	lib/control/model_input.o lib/control/predict.o lib/tissue/predict.o lib/base/crypto/sha256.o
 about_incise := haptic cutting: fuzzy force models, virtual rig, scenes and real-time loop
 about_incise-learn := haptic cutting: learning models from data
 about_incise-record := haptic cutting: recordings and what is exported of them
@@ -124,10 +111,6 @@ needs_incise :=
 needs_incise-learn := incise
 needs_incise-record := incise
 needs_incise-view := incise
-
-# One program per command.
-commands := $(filter-out $(if $(has_view),,view bench-view),$(patsubst tools/incise-%.c,%,\
-	$(wildcard tools/incise-*.c)))
 
 # A short line for each step of the build; V=1 shows the whole commands.
 Q := $(if $(V),,@)

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: GPL-2.0-only */
 /*
  * One interface on kernels 6.1 and later. Sources are written for the newest
- * kernel; where an older one differs, its form is bridged here, by what
- * compat/NAME.c found in the headers at hand (distributions bring changes back to
- * old kernels, so that a version number says little).
+ * kernel; where an older one differs, its form is bridged here, by the results of
+ * compat/NAME.c on the headers at hand (distributions bring changes back to old kernels,
+ * so that a version number says little).
  *
  * A callback whose type changed is wrapped:
  *

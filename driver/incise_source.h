@@ -8,7 +8,7 @@
  *                          samples ─▶ incise_stepper_source_push(sink, raw, t_ns)
  *   the plan goes ─▶ close(source): no push after its return
  *
- * position = origin + direction × scale × raw, with what LOAD_PLAN says.
+ * position = origin + direction × scale × raw, with the numbers of LOAD_PLAN.
  */
 #ifndef INCISE_DRIVER_INCISE_SOURCE_H
 #define INCISE_DRIVER_INCISE_SOURCE_H
@@ -22,7 +22,7 @@ struct module;
 /**
  * struct incise_stepper_source_ops - a module that has sources
  * @owner:	stays loaded while a source is open
- * @open:	begin to push samples of the controller's channel; an ERR_PTR: there is none.
+ * @open:	begin to push samples of the controller's channel; an ERR_PTR: no such channel.
  *		The first push may come before it returns. May sleep
  * @close:	end it; may sleep. Neither may wait for a file of the controller
  */

@@ -10,7 +10,7 @@
  *     └── events ◀─────┘
  *
  * Locks, outer first: stepper.mutex (set-up, owner, unbind), motor.lock (raw; all
- * that moves), plan.lock (raw; samples of a source, stops), events.lock (raw). Those of a
+ * that moves), plan.lock (raw; samples of a source, stops), events.lock (raw). Locks of a
  * source's subsystem come after stepper.mutex. sync.lock is on its own. No memory of a user
  * is touched under any of them: mmap() comes with the user's memory locked already.
  */
@@ -70,7 +70,7 @@ enum stepper_output {
 	STEPPER_SYNC
 };
 
-/* An input's interrupt; irq is 0 where its chip has none. */
+/* An input's interrupt; irq is 0 if its chip has no interrupts. */
 struct stepper_irq {
 	struct stepper *stepper;
 	int motor; /* -1: of the controller */
@@ -105,7 +105,7 @@ struct stepper_motor {
 
 	struct incise_stepper_config config;
 	s64 interval_ns; /* of steps at config.velocity, rounded up */
-	s64 lag_ns;	 /* what is caught up, not put off */
+	s64 lag_ns;	 /* lateness caught up, not put off */
 	u32 state;
 	u32 faults;
 	u32 inputs;
@@ -117,7 +117,7 @@ struct stepper_motor {
 	u64 steps_up, steps_down, late, shifted_ns;
 
 	/* Set-point */
-	struct stepper_setpoint setpoint; /* in force; seq is what was seen */
+	struct stepper_setpoint setpoint; /* in force, with its seq */
 	s64 target;			  /* clamped */
 	bool asked;			  /* the profile does not know target yet */
 	s64 seen_ns;			  /* the last sign of life */

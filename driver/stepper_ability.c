@@ -2,8 +2,8 @@
 /*
  * The limits of this machine, measured at bind without moving anything: a hard timer
  * fires SHOTS times, and each time does what a tick and a leading edge do to the lines: it
- * reads all inputs of a motor, and writes its step line with the value that it has. A
- * config that asks for more is refused.
+ * reads all inputs of a motor, and writes its step line with the value that it has. SET_CONFIG
+ * refuses a config that asks for more.
  *
  *   due ─────── lateness ──────▶│◀─ inputs ─▶│◀─ write ─▶│
  *                              fires                     line has changed
@@ -26,8 +26,8 @@
  *
  *   tick = 4n(T + 2W)
  *
- * A machine that was not quiet in one round gets another: what else ran just then, the
- * loading of modules say, is not what it will run later.
+ * A machine that was not quiet in one round gets another: its load just then, for example the
+ * loading of modules, is not its load later.
  */
 #include <linux/device.h>
 #include <linux/gpio/consumer.h>
@@ -98,7 +98,7 @@ static enum hrtimer_restart stepper_ability_fire(struct hrtimer *timer)
 	trial->late_ns[trial->n] = min(fired - due, (s64)U32_MAX);
 	trial->edge_ns[trial->n] = min(written - fired, (s64)U32_MAX);
 	trial->tick_ns[trial->n] = min(ticked - fired, (s64)U32_MAX);
-	/* Read by the one who waits for the last. */
+	/* The side that waits for the last reads them. */
 	smp_store_release(&trial->n, trial->n + 1);
 	if (trial->n == SHOTS)
 		return HRTIMER_NORESTART;
@@ -129,7 +129,7 @@ static void stepper_ability_round(struct stepper_trial *trial)
 	sort(trial->tick_ns, SHOTS, sizeof(u32), stepper_ability_compare, NULL);
 }
 
-/* Fill in what the self-test says in info. Sleeps. */
+/* Fill in the results of the self-test in info. Sleeps. */
 int stepper_ability_measure(struct stepper *stepper)
 {
 	const struct incise_profile_limits limits = {

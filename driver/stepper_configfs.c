@@ -350,9 +350,9 @@ static void stepper_folder_unpin(struct stepper_folder *folder, int n)
 }
 
 /*
- * Motors' folders, and with them this one, cannot be removed while live. One that is
+ * Motors' folders, and with them this one, cannot be removed while live. A folder that is
  * just being made or removed cannot be pinned; su_mutex and folder->mutex are held, so that
- * it is at least linked to its parent, and what is pinned stays what it is.
+ * it is at least linked to its parent, and pinned folders stay as they are.
  */
 static int stepper_folder_pin(struct stepper_folder *folder)
 {

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-only
 /*
- * debugfs: incise_stepper/incise-stepperN/ with what the timers of its motors did.
+ * debugfs: incise_stepper/incise-stepperN/ with statistics of the timers of its motors.
  *
  *   lateness   text: how late firings were, µs in bins that double
  *   cost       text: how long they took; ns only, no counter of instructions
  *   tick_cost  text: how long ticks of the motors took, without edges
  *   plan       text: how late ticks of the plan were and how long they took, in the same
- *              bins, and what one cost when it was loaded; empty without a plan
+ *              bins, and the cost of one at the load; empty without a plan
  *   counters   text: "name=number" per motor
  *   reset      write anything: all but counters restart
  */
@@ -162,7 +162,7 @@ void stepper_debugfs_add(struct stepper *stepper)
 	stepper->debugfs = dir;
 }
 
-/* Waits for who is reading. */
+/* Waits for readers. */
 void stepper_debugfs_remove(struct stepper *stepper)
 {
 	debugfs_remove_recursive(stepper->debugfs);

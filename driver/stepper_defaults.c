@@ -2,9 +2,9 @@
 /*
  * The config that a motor has from bind on: properties of its firmware node, see
  * bindings/misc/incise,stepper-gpio.yaml, and defaults for the rest. A property that is
- * there but cannot be read fails the bind. What this machine cannot hold is brought to what
- * it can, and said so: such a motor can be set up, but moves at no other limits than the
- * ones that GET_CONFIG shows.
+ * there but cannot be read fails the bind. Values that this machine cannot hold are brought
+ * to values that it can, with a message: such a motor can be set up, but moves at no other
+ * limits than GET_CONFIG shows.
  */
 #include <linux/device.h>
 #include <linux/kernel.h>
@@ -21,7 +21,7 @@ struct stepper_defaults {
 	int error;
 };
 
-/* One that is there and cannot be read must not pass for one that is not there. */
+/* A property that cannot be read must not pass for an absent one. */
 static bool stepper_defaults_read(struct stepper_defaults *from, const char *name,
 				  int ret, const char *form)
 {

@@ -61,7 +61,7 @@ static void stepper_device_release(struct device *dev)
 
 /**
  * stepper_device_new() - memory for a controller
- * @parent:	what it is bound to
+ * @parent: device that it is bound to
  * @n_motors:	1 … INCISE_STEPPER_MOTORS_MAX
  *
  * Return: to be freed with put_device(&stepper->dev), or an ERR_PTR.

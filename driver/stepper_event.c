@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-only
 /*
  * The ring of events. Written from hard interrupts, read by each open file at its
- * own place; who is too slow finds a gap in seq, never a stop of the writer.
+ * own place; a slow reader finds a gap in seq and never stops the writer.
  *
  *      ring   │ 5 │ 6 │ 7 │ 4 │        seq of the last: 7
  *                   ▲

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-only
 /*
- * The file operations of /dev/incise-stepperN; see uapi/incise_stepper.h. Whoever
- * opens it for writing is the owner, others watch. After unbind every call gives ENODEV
- * and poll shows HUP; pages that are mapped stay memory.
+ * The file operations of /dev/incise-stepperN; see uapi/incise_stepper.h. The program
+ * that opens it for writing is the owner, others watch. After unbind every call gives
+ * ENODEV and poll shows HUP; pages that are mapped stay memory.
  *
  * A user's memory is never touched under stepper.mutex: a page fault there could wait
  * for a mapping that waits for the mutex. So a plan is copied before.
@@ -44,7 +44,7 @@ static int stepper_file_open(struct inode *inode, struct file *file)
 	} else if (opened->owner && stepper->owner) {
 		ret = -EBUSY;
 	} else if (opened->owner) {
-		/* Nobody maps it: a mapping would hold the last owner's file. */
+		/* It is not mapped: a mapping would hold the last owner's file. */
 		memset(stepper->setpoints, 0, PAGE_SIZE);
 		stepper->owner = file;
 		stepper_plan_new_owner(stepper);
@@ -69,7 +69,7 @@ static int stepper_file_release(struct inode *inode, struct file *file)
 
 	if (opened->owner) {
 		mutex_lock(&stepper->mutex);
-		/* Those get the same fault when there is no force any more. */
+		/* Motors of a plan get the same fault when there is no force any more. */
 		fade = stepper_plan_let_go(stepper, INCISE_STEPPER_PLAN_LEFT);
 		for (i = 0; !stepper->gone && i < stepper->n_motors; i++)
 			if (!(fade & BIT(i)))
@@ -84,7 +84,7 @@ static int stepper_file_release(struct inode *inode, struct file *file)
 	return 0;
 }
 
-/* All or none: every motor is asked first. One that had power before keeps it. */
+/* All motors, or no motor: every motor is asked first. A motor that had power before keeps it. */
 static int stepper_file_enable(struct stepper *stepper, u32 mask)
 {
 	unsigned long given = 0;
@@ -283,7 +283,7 @@ static int stepper_file_mmap(struct file *file, struct vm_area_struct *vma)
 	/* No mutex: see above. After unbind a new mapping would only be of no use. */
 	if (READ_ONCE(stepper->gone))
 		return -ENODEV;
-	/* Of a file open for reading only the kernel has taken VM_SHARED away already. */
+	/* If the file is open for reading only, the kernel has taken VM_SHARED away already. */
 	if (vma->vm_end - vma->vm_start != PAGE_SIZE || !(vma->vm_flags & VM_MAYSHARE))
 		return -EINVAL;
 	if (vma->vm_flags & VM_EXEC)
@@ -305,9 +305,9 @@ static int stepper_file_mmap(struct file *file, struct vm_area_struct *vma)
 	}
 	vm_flags_clear(vma, VM_MAYEXEC);
 	/*
-	 * By its frame, which nobody can pin to write on when another owner has come. The
-	 * mapping holds the file and the file holds the memory, whatever becomes of the
-	 * device.
+	 * By its frame, which the last owner cannot pin to write on when another owner
+	 * has come. The mapping holds the file and the file holds the memory, whatever
+	 * becomes of the device.
 	 */
 	return remap_pfn_range(vma, vma->vm_start, virt_to_phys(page) >> PAGE_SHIFT,
 			       PAGE_SIZE, vma->vm_page_prot);
@@ -334,7 +334,7 @@ static ssize_t stepper_file_take(struct stepper_file *opened, char __user *to,
 				       min(wanted - done, ARRAY_SIZE(events)));
 		if (!n)
 			break;
-		/* Keep what could not be handed over. */
+		/* Keep the events that could not be handed over. */
 		if (copy_to_user(to + done * sizeof(*events), events,
 				 n * sizeof(*events)))
 			return done ? done * sizeof(*events) : -EFAULT;

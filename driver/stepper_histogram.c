@@ -11,7 +11,7 @@
 void stepper_histogram_add(struct stepper_histogram *histogram, s64 ns)
 {
 	u64 value = ns > 0 ? ns : 0;
-	/* Of 32 bits, so that the division is cheap everywhere. */
+	/* 32 bits, so that the division is cheap everywhere. */
 	u32 us = (u32)min_t(u64, value, U32_MAX) / 1000;
 
 	histogram->count[min(fls(us), STEPPER_BINS - 1)]++;

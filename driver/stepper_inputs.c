@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-only
 /*
- * Limits, home, e-stop and the power stage's fault: what they do to a motor. Each is
+ * Limits, home, e-stop and the power stage's fault: their effects on a motor. Each is
  * looked at by its interrupt, if it has one, and at each tick; the limit ahead and the
  * e-stop just before each step as well, so that a lost interrupt costs one step at most.
  *
@@ -8,8 +8,8 @@
  *   limit            it halts if it moves towards it; away from there it may move
  *   home             the position at its leading edge is kept
  *
- * All under motor->lock. A line that cannot be read counts as active, but home, which
- * stays what it was.
+ * All under motor->lock. A line that cannot be read counts as active, except home, which
+ * keeps its state.
  */
 #include <linux/gpio/consumer.h>
 
@@ -71,13 +71,13 @@ static void stepper_inputs_changed(struct stepper_motor *motor, enum stepper_inp
 /**
  * stepper_inputs_one() - look at one input
  * @motor:	its motor
- * @input:	which; one that the motor does not have is never active
+ * @input: which; an input that the motor does not have is never active
  * @now:	ktime
  * @edge:	an interrupt says that it changed
  *
- * An interrupt that finds the line inactive as before came too late for a pulse, or a tick
- * was faster than it: one cannot tell. For a stop a pulse is assumed, as it is long enough to
- * be meant. A limit and home would be reported where they are not.
+ * An interrupt that finds the line inactive as before came too late for a pulse, or after a
+ * tick: the two look the same. For a stop a pulse is assumed, as it is long enough to be
+ * meant. A limit and home would be reported where they are not.
  */
 void stepper_inputs_one(struct stepper_motor *motor, enum stepper_input input, s64 now,
 			bool edge)

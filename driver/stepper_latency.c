@@ -13,7 +13,7 @@
 
 #include "stepper.h"
 
-/* stepper.mutex held, or nobody else is there. Sleeps. */
+/* stepper.mutex held, or no other user exists. Sleeps. */
 void stepper_latency_hold(struct stepper *stepper)
 {
 	if (!cpu_latency_qos_request_active(&stepper->latency))

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-only
 /*
  * The GPIO lines of a controller and their interrupts. A line is looked for at the
- * motor's firmware node (device tree, ACPI), and if there is none in the lookup table of
- * the controller, that of configfs say, where it goes by motorN-NAME:
+ * motor's firmware node (device tree, ACPI), else in the lookup table of the controller,
+ * for example by configfs, where it goes by motorN-NAME:
  *
  *   motor@0 { step-gpios = <…>; };      or      GPIO_LOOKUP(chip, 4, "motor0-step", 0)
  *
- * Edges are written in hard interrupts, so that a line whose chip may sleep (an
- * expander on I2C) is refused here, by name.
+ * Edges are written in hard interrupts, so that the driver refuses a line whose chip may
+ * sleep (an expander on I2C) here, by name.
  */
 #include <linux/device.h>
 #include <linux/gpio/consumer.h>
@@ -53,7 +53,7 @@ static int stepper_lines_fail(struct device *dev, int ret, const char *key,
 	return ret;
 }
 
-/* A line, NULL where it is optional and there is none, or an error that was reported. */
+/* A line, NULL if it is optional and absent, or an error that was reported. */
 static struct gpio_desc *stepper_lines_one(struct device *dev, struct fwnode_handle *node,
 					   int motor, const char *name,
 					   enum gpiod_flags flags, bool needed)
@@ -212,7 +212,7 @@ static int stepper_lines_request(struct stepper *stepper, struct stepper_irq *ir
 	return 0;
 }
 
-/* Interrupts from now on, and what the inputs are already. */
+/* Interrupts from now on, and the present state of the inputs. */
 int stepper_lines_listen(struct stepper *stepper)
 {
 	enum stepper_input input;

@@ -3,13 +3,13 @@
  * incise_stepper.ko: the platform driver, and every way in which a machine stops:
  *
  *   unbind    no new file, the force of a plan fades, brake, power off, no interrupts, ENODEV
- *             to who is left
+ *             to open files
  *   suspend   the force fades, brake, power off, fault SUSPEND; nothing moves after resume by
  *             itself. SYNC stops, as its chip may sleep already, and goes on in its beat
  *   reboot    the same, before anything else is taken down
- *   panic     power off, at once, without a lock that somebody may hold
+ *   panic     power off, at once, without a lock
  *
- * With a crash kernel loaded (kdump) panic() starts that one before it calls anybody: no
+ * With a crash kernel loaded (kdump) panic() starts that kernel before any notifier: no
  * step follows, but power stays on until the lines are reset. crash_kexec_post_notifiers on
  * the kernel's command line lets power go first. Binding warns of it.
  */
@@ -61,8 +61,8 @@ static int stepper_main_reboot(struct notifier_block *block, unsigned long actio
 }
 
 /*
- * The other processors have been stopped, maybe while they held a motor's lock: so there is
- * none taken here. Only a chip whose own lock was held then could stand in the way.
+ * The other processors have been stopped, maybe while they held a motor's lock: so no lock
+ * is taken here. Only a chip whose own lock was held then could stand in the way.
  */
 static int stepper_main_panic(struct notifier_block *block, unsigned long action,
 			      void *data)
@@ -230,7 +230,7 @@ static struct platform_driver stepper_main_driver = {
 	.driver.name = "incise-stepper",
 	.driver.of_match_table = stepper_main_of,
 	.driver.pm = pm_sleep_ptr(&stepper_main_pm),
-	/* configfs waits for it; and who measures shall not race another. */
+	/* configfs waits for it; and two measurements shall not race. */
 	.driver.probe_type = PROBE_FORCE_SYNCHRONOUS,
 };
 

@@ -13,10 +13,10 @@
  * Due times come from the profile's time line, never from now: lateness does not
  * add up. But high, low, set-up, hold and the interval at the largest velocity
  * count from the actual times of edges, taken after the write, when the line has
- * changed for sure. So a late edge shortens nothing. What a timer mostly is late by
- * (lag_ns) is caught up, at most 1/7 faster than the profile asks (CATCH_UP); where
- * it is more, the time line is put off. There is never a burst, and no acceleration
- * that the profile does not know of.
+ * changed for sure. So a late edge shortens nothing. The usual lateness of a timer
+ * (lag_ns) is caught up, at most 1/7 faster than the profile asks (CATCH_UP); where it is
+ * more, the time line is put off. There is never a burst, and no acceleration that the
+ * profile does not know of.
  */
 #include <linux/delay.h>
 #include <linux/hrtimer.h>
@@ -67,7 +67,7 @@ static enum stepper_next stepper_motor_move(const struct stepper_motor *motor, s
 	return STEPPER_NEXT_LEAD;
 }
 
-/* The same, with the ticks of a plan between: one that is due with a tick comes before it. */
+/* The same, with the ticks of a plan between: an edge that is due with a tick comes before it. */
 static enum stepper_next stepper_motor_next(const struct stepper_motor *motor, s64 *due,
 					    s64 *want)
 {
@@ -112,7 +112,7 @@ static void stepper_motor_lead(struct stepper_motor *motor, s64 now, s64 due, s6
 	int direction = motor->slot.dir;
 	s64 lag;
 
-	/* The last look at what forbids this step. It may halt the motor. */
+	/* The last look at the inputs that forbid this step. It may halt the motor. */
 	stepper_inputs_one(motor, direction > 0 ? STEPPER_LIMIT_MAX : STEPPER_LIMIT_MIN,
 			   now, false);
 	stepper_inputs_one(motor, STEPPER_ESTOP, now, false);
@@ -121,7 +121,7 @@ static void stepper_motor_lead(struct stepper_motor *motor, s64 now, s64 due, s6
 	if (!motor->powered)
 		return;
 
-	/* Counted first: whoever sees the edge finds it counted. */
+	/* Counted first: a reader that sees the edge finds it counted. */
 	motor->given++;
 	motor->high = true;
 	motor->position += direction;

@@ -11,7 +11,7 @@
 
 #include "stepper.h"
 
-/* A motor's node, to be put; NULL: it has none. */
+/* A motor's node, to be put; NULL: it has no node. */
 struct fwnode_handle *stepper_node_motor(struct device *dev, unsigned int motor)
 {
 	struct fwnode_handle *node = NULL;

@@ -71,7 +71,7 @@ static int stepper_nodes_bind(struct stepper_nodes *nodes,
 		.name = "incise-stepper",
 		.id = nodes->id,
 		.properties = properties,
-		/* A pointer, for stepper_nodes_label(): what it points to outlives the device. */
+		/* A pointer, for stepper_nodes_label(): its target outlives the device. */
 		.data = &nodes,
 		.size_data = sizeof(nodes),
 	};

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-only
 /*
  * Taking a set-point. The owner may write the page at any moment, on another
- * processor, and may be mad: every field is read once, into a copy, and only the
+ * processor, and may write anything: every field is read once, into a copy, and only the
  * copy is looked at.
  *
  *   owner    seq+1 ── fields ── seq+2
@@ -30,7 +30,7 @@
 
 #define SLOT_WORDS (sizeof(struct incise_stepper_setpoint) / sizeof(__u64))
 
-/* A slot as words that are read whole, and as what they mean. */
+/* A slot as words that are read whole, and as the struct. */
 union slot_copy {
 	__u64 word[SLOT_WORDS];
 	struct incise_stepper_setpoint setpoint;
@@ -55,7 +55,7 @@ static bool stepper_page_good(const struct incise_stepper_setpoint *copy)
 /**
  * stepper_page_take() - look for a new set-point
  * @slot:	in the page, aligned to 8 bytes
- * @setpoint:	the last one taken; @setpoint->seq says what is not new
+ * @setpoint:	the last one taken; a new one has another seq
  *
  * A slot whose seq is odd for ever gives nothing for ever, and the deadman acts.
  * Garbage is reported once per seq.
@@ -89,7 +89,7 @@ enum stepper_page_answer stepper_page_take(const struct incise_stepper_setpoint 
 
 /**
  * stepper_page_clamp() - the target within a motor's limits
- * @setpoint:	what was asked for
+ * @setpoint:	the request
  * @config:	a config that stepper_page_config() let pass
  */
 __s64 stepper_page_clamp(const struct stepper_setpoint *setpoint,
@@ -116,8 +116,8 @@ static bool stepper_page_within(__u64 value, __u64 min, __u64 max)
  * @config:	from a user
  * @info:	what the self-test found
  *
- * A pulse that is shorter than a timer mostly is late would make every edge late; it
- * is refused rather than held by luck.
+ * A pulse that is shorter than a timer mostly is late would make every edge late;
+ * SET_CONFIG refuses it rather than hold it by luck.
  *
  * Return: 0; -EINVAL, -ERANGE as INCISE_STEPPER_SET_CONFIG says.
  */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-only */
 /*
  * A set-point out of the page that the owner writes, and the check of a config:
- * pure functions over bytes that nobody vouches for. They build without a kernel
+ * pure functions over untrusted bytes. They build without a kernel
  * too, for unit tests and a fuzzer.
  */
 #ifndef INCISE_DRIVER_STEPPER_PAGE_H
@@ -16,7 +16,7 @@
 
 #include "uapi/incise_stepper.h"
 
-/* A set-point that was looked at: one copy, which nobody can change any more. */
+/* A checked set-point: one copy, which no other program can change any more. */
 struct stepper_setpoint {
 	__u32 seq;
 	__u16 mode;

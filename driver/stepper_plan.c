@@ -10,8 +10,8 @@
  *   ticks  ────┬─────────────────┴─┬──────────────┬──           of each motor: aim ─▶ profile
  *
  * A tick computes with the time at which it was due, never with now: its result depends on poses
- * and on nothing else, and a program that is given the same gets the same bits. One that is late by
- * a period or more is left out and counted.
+ * and on nothing else, and a program that is given the same gets the same bits. A tick that is late
+ * by a period or more is left out and counted.
  *
  * Data of the leader's timer alone are under the leader's lock; followers read single words. A
  * motor that stops leaves the run, and by a fault it ends the run for all.
@@ -180,7 +180,7 @@ void stepper_plan_fault(struct stepper_motor *motor, u32 fault)
 		stepper_plan_stop(plan, INCISE_STEPPER_FAULT_PLAN);
 }
 
-/* DISABLE took some of the motors away: a force of the others alone is none of the plan. */
+/* DISABLE took some of the motors away: the others alone do not render the plan's force. */
 void stepper_plan_disabled(struct stepper *stepper, u32 motors)
 {
 	if (stepper->plan && stepper->plan->load.motors & motors)
@@ -218,8 +218,8 @@ void stepper_plan_pose(struct stepper_motor *motor, s64 now, s64 due)
 }
 
 /*
- * Whether the motor's own ticks leave its set-point alone: the leader's is taken by the plan's
- * ticks, and that of an owner who has left by nobody.
+ * Whether the motor's own ticks leave its set-point alone: the plan's ticks take the leader's, and
+ * no tick takes the set-point of an owner who has left.
  */
 bool stepper_plan_reads(const struct stepper_motor *motor)
 {
@@ -251,7 +251,7 @@ void stepper_plan_follow(struct stepper_motor *motor, s64 now)
 
 /* --- a tick ----------------------------------------------------------------------------- */
 
-/* Hand a pose of a seq to the plan. One that is refused is no sign of life. */
+/* Hand a pose of a seq to the plan. A refused pose is no sign of life. */
 static void stepper_plan_give(struct stepper_plan *plan,
 			      const struct incise_fixed_pose *pose, u32 seq, s64 now,
 			      s64 due)
@@ -291,7 +291,7 @@ static struct incise_fixed_pose stepper_plan_pose_of(const struct stepper_setpoi
 	return pose;
 }
 
-/* The tube's pose. Its tool, and whether to fade, are what the scalpel's last set-point said. */
+/* The tube's pose. The scalpel's last set-point gives its tool, and whether to fade. */
 static void stepper_plan_take_tube(struct stepper_plan *plan, s64 now, s64 due)
 {
 	struct stepper_motor *leader = plan->leader;
@@ -515,7 +515,7 @@ void stepper_plan_wait(struct stepper *stepper, unsigned int most_ms)
 	}
 }
 
-/* For debugfs: what a tick cost, and how late it was. */
+/* For debugfs: cost and lateness of a tick. */
 void stepper_plan_show(struct stepper *stepper, struct seq_file *file)
 {
 	struct stepper_histogram lateness, cost;

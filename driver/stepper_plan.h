@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-only */
 /*
- * A plan in the module: what its load, its ticks and its source share; see stepper_plan.c.
+ * A plan in the module: the state that its load, its ticks and its source share; see
+ * stepper_plan.c.
  */
 #ifndef INCISE_DRIVER_STEPPER_PLAN_H
 #define INCISE_DRIVER_STEPPER_PLAN_H

@@ -2,7 +2,7 @@
 /*
  * LOAD_PLAN: a plan comes and goes.
  *
- *   make     the file is copied and checked, and what a tick costs is measured: no lock
+ *   make     the file is copied and checked, and the cost of a tick measured: no lock
  *   install  it takes the place of the last one; stepper.mutex, no motor of both with power
  *   sweep    the plan of a former owner goes when its motors have no power
  */
@@ -22,7 +22,7 @@
 #define TRIALS 64
 #define DEPTH (4 << 16)
 
-/* Of the processor: a quarter, as for the ticks of motors. */
+/* A quarter of the processor, as for the ticks of motors. */
 #define SHARE 4
 
 /* A place of the surface, or near it. */
@@ -119,10 +119,10 @@ static int stepper_plan_open(struct stepper_plan *plan)
 /**
  * stepper_plan_make() - copy a user's plan, and check it
  * @stepper:	the controller
- * @load:	what LOAD_PLAN said; size 0: the plan is to go, and @made is NULL
+ * @load:	argument of LOAD_PLAN; size 0: the plan goes, and @made is NULL
  * @made:	to be handed to stepper_plan_install(), then to stepper_plan_free()
  *
- * Without a lock: a user's memory is touched. Sleeps.
+ * Without a lock, because it touches a user's memory. Sleeps.
  *
  * Return: 0; a negative errno as LOAD_PLAN says.
  */
@@ -168,7 +168,7 @@ int stepper_plan_make(struct stepper *stepper, const struct incise_stepper_plan 
 	return 0;
 }
 
-/* One that is not installed; NULL is fine. */
+/* A plan that is not installed; NULL is fine. */
 void stepper_plan_free(struct stepper_plan *plan)
 {
 	if (!plan)
@@ -213,7 +213,7 @@ static int stepper_plan_fits(struct stepper *stepper, const struct stepper_plan 
 	return 0;
 }
 
-/* Tell its motors; NULL: there is no plan any more. None of them has power. */
+/* Tell its motors; NULL: there is no plan any more. No motor of them has power. */
 static void stepper_plan_tell(struct stepper *stepper, u32 motors,
 			      struct stepper_plan *plan)
 {

@@ -28,7 +28,7 @@ static struct incise_profile_limits stepper_setup_limits(
 	};
 }
 
-/* Without power there are no ticks: who has no interrupts either is looked at when asked. */
+/* Without power there are no ticks: an input without interrupts is read on request. */
 static void stepper_setup_look(struct stepper_motor *motor)
 {
 	s64 now = ktime_get_ns();
@@ -72,8 +72,8 @@ int stepper_setup_ready(struct stepper_motor *motor)
 }
 
 /*
- * Power, and the deadman from now on: 1. One that has power already goes on as it is: 0.
- * Else a negative errno.
+ * Power, and the deadman from now on: 1. A motor that has power already goes on as it is:
+ * 0. Else a negative errno.
  */
 int stepper_setup_enable(struct stepper_motor *motor)
 {
@@ -135,7 +135,7 @@ void stepper_setup_disable(struct stepper_motor *motor)
 	raw_spin_unlock_irqrestore(&motor->lock, flags);
 }
 
-/* 0; -EBUSY: it has power, or what caused the fault is still there. */
+/* 0; -EBUSY: it has power, or the cause of the fault is still there. */
 int stepper_setup_clearable(struct stepper_motor *motor)
 {
 	const u32 causes = INCISE_STEPPER_LINE_ESTOP | INCISE_STEPPER_LINE_ALARM;

@@ -12,7 +12,7 @@
 #include "../lib/fixed/vector.h"
 #include "stepper_plan.h"
 
-/* Of raw numbers, and of mm for one of them, 2^-32: their product stays below 2^63. */
+/* Limits of raw numbers, and of mm for one of them, 2^-32: their product stays below 2^63. */
 #define RAW_MAX ((s64)BIT(30))
 #define SCALE_MAX ((s64)BIT_ULL(32))
 
@@ -91,7 +91,7 @@ void stepper_source_close(struct stepper_plan *plan)
 	plan->source_ops = NULL;
 }
 
-/* Whether the fields of a load are those of a source, or zero where it has none. */
+/* Whether the fields of a load describe a source, or are zero without one. */
 bool stepper_source_good(const struct incise_stepper_plan *load)
 {
 	s32 attitude[4];
@@ -111,7 +111,7 @@ bool stepper_source_good(const struct incise_stepper_plan *load)
 	       load->tool <= INCISE_TOOL_TUBE;
 }
 
-/* A pose of the newest sample, if there is one that was not taken. leader->lock held. */
+/* A pose of the newest sample, unless it was taken. leader->lock held. */
 bool stepper_source_take(struct stepper_plan *plan, struct incise_fixed_pose *pose)
 {
 	const struct incise_stepper_plan *load = &plan->load;

@@ -3,7 +3,7 @@
  * The status page: a slot per motor, which programs map read-only. The kernel is its
  * only writer, under motor->lock.
  *
- *   seq+1 ── fields ── seq+2        a reader takes what it read between two equal,
+ *   seq+1 ── fields ── seq+2        a reader takes its copy between two equal,
  *                                   even seq
  */
 #include <asm/barrier.h>

@@ -105,7 +105,7 @@ void stepper_stop_fault(struct stepper_motor *motor, u32 fault, s64 now)
 		stepper_stop_gently(motor, fault, now);
 }
 
-/* What DISABLE does: to rest within the limits, then power off; no fault. */
+/* For DISABLE: to rest within the limits, then power off; no fault. */
 void stepper_stop_disable(struct stepper_motor *motor, s64 now)
 {
 	if (motor->powered && !motor->disabling)

@@ -20,7 +20,7 @@
 #include "stepper.h"
 #include "trace.h"
 
-/* From SET_SYNC to the first pulse, where none is named. */
+/* From SET_SYNC to the first pulse, unless the request names it. */
 #define FIRST_NS 100000
 
 static void stepper_sync_lead(struct stepper *stepper, s64 now)
@@ -89,7 +89,7 @@ void stepper_sync_init(struct stepper *stepper)
 		      HRTIMER_MODE_ABS_PINNED_HARD);
 }
 
-/* Line inactive, nothing running. Sleeps; stepper.mutex held, or nobody else is there. */
+/* Line inactive, nothing running. Sleeps; stepper.mutex held, or no other user exists. */
 void stepper_sync_off(struct stepper *stepper)
 {
 	struct stepper_sync_line *line = &stepper->sync;
@@ -149,7 +149,7 @@ int stepper_sync_set(struct stepper *stepper, const struct incise_stepper_sync *
 	raw_spin_lock_irqsave(&line->lock, flags);
 	line->sync = *sync;
 	if (sync->period_ns) {
-		/* One that is over already: the next that fits its beat. */
+		/* If that is over already: the next that fits its beat. */
 		if (!sync->first_ns)
 			line->sync.first_ns = now + FIRST_NS;
 		else if (sync->first_ns < now)

@@ -11,7 +11,7 @@ $(extremes): $(patsubst %.c,$(O)/obj/%.o,$(wildcard tests/extremes/*.c $(addpref
 	$(call step,AR)
 	$(Q)$(AR) rcs $@ $^
 
-bench_names := capture coverage extremes guards integers pose prediction rates serve settings timeline vision work
+bench_names := capture coverage extremes guards integers pose prediction rates $(filter serve,$(commands)) settings timeline vision work
 bench_programs := $(bench_names:%=$(O)/tests/bench/%)
 bench_objects := $(bench_names:%=$(O)/obj/tests/bench/%.o) $(O)/obj/tests/bench/main.o
 $(bench_objects): test_cflags = $(shell $(PKG_CONFIG) --cflags jansson)
@@ -20,6 +20,7 @@ $(O)/obj/tests/bench/capture.o: cppflags += $(if $(has_jpeg),-DHAVE_JPEG)
 
 # They also measure parts that the shared objects do not export; the linker takes those from the
 # archive.
+$(O)/tests/bench/serve: tool_more_libs += $(libs_tracker_igtl)
 $(bench_programs): $(O)/tests/bench/%: $(O)/obj/tests/bench/%.o $(O)/obj/tests/bench/main.o $(tool_parts) $(extremes) \
 		$(O)/lib/libincise-tests.a $(foreach lib,$(libraries),$(O)/lib/lib$(lib).so)
 	@mkdir -p $(@D)

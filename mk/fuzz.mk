@@ -25,7 +25,7 @@ $(O)/obj/fuzz/%.o: %.c
 $(O)/obj/fuzz/%.o: %.cc
 	@mkdir -p $(@D)
 	$(call step,CC)
-	$(Q)$(CCACHE) $(CLANG) $(cppflags) $(CPPFLAGS) $(cxxflags) $(opencv_cflags) \
+	$(Q)$(CCACHE) $(CLANG) $(cppflags) $(CPPFLAGS) $(cxxflags) $(flags_vision_opencv) \
 		$(fuzz_flags) -fsanitize=fuzzer-no-link -MMD -MP -c -o $@ $<
 
 # Further sources of a target.
@@ -39,9 +39,11 @@ fuzz_polhemus_records := lib/base/error.c lib/base/ring.c lib/device/pose_flags.
 	$(addprefix lib/device/polhemus/polhemus_,model.c records.c stream.c)
 fuzz_polhemus_status := lib/base/error.c lib/device/polhemus/polhemus_dialogue.c
 
-fuzz_igtl_stream := lib/base/igtl.c
-fuzz_igtl_poses := $(addprefix lib/base/,error.c igtl.c ring.c) \
-	$(addprefix lib/device/,pace.c tracker_feed.c igtl/igtl_poses.c)
+fuzz_igtl_stream := lib/device/igtl/igtl_message.c
+fuzz_igtl_poses := $(addprefix lib/base/,error.c ring.c) \
+	$(addprefix lib/device/,pace.c tracker_feed.c igtl/igtl_message.c igtl/igtl_poses.c)
+fuzz_libs_igtl_stream := $(libs_tracker_igtl)
+fuzz_libs_igtl_poses := $(libs_tracker_igtl)
 
 fuzz_wall_packets := $(addprefix lib/record/write/wall_,packets.c kernel.c)
 

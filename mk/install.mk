@@ -14,7 +14,7 @@ example_scripts := examples/capture_to_figure.sh examples/learn.py
 udev_rules := $(wildcard udev/*.rules)
 sysusers := $(wildcard udev/*.sysusers)
 tmpfiles := $(wildcard udev/*.tmpfiles)
-units := $(wildcard udev/*.service udev/*.service.in)
+units := $(filter-out $(left_out_commands:%=udev/incise-%.service.in),$(wildcard udev/*.service udev/*.service.in))
 
 python_files := $(wildcard python/incise/*.py) python/incise/py.typed
 # The libraries of this installation, unless they are where the system looks.
@@ -24,7 +24,7 @@ python_installed := $(if $(filter-out no,$(rpath)),_installed.py)
 installed = $(addprefix $(bindir)/,$(notdir $(programs))) \
 	$(foreach lib,$(libraries),$(addprefix $(libdir)/lib$(lib).so,.$(version) .$(soversion)) \
 		$(libdir)/lib$(lib).so) \
-	$(addprefix $(libdir)/incise/,$(addsuffix .so,$(device_modules))) \
+	$(addprefix $(libdir)/incise/,$(addsuffix .so,$(add_ons))) \
 	$(addprefix $(includedir)/incise/,$(notdir $(headers))) \
 	$(foreach lib,$(libraries),$(libdir)/pkgconfig/$(lib).pc) \
 	$(foreach page,$(notdir $(man_pages)),$(mandir)/man$(subst .,,$(suffix $(page)))/$(page)) \
@@ -67,7 +67,7 @@ install: all ## install below $(DESTDIR)$(prefix)
 		ln -sf lib$$lib.so.$(version) "$(DESTDIR)$(libdir)/lib$$lib.so.$(soversion)" && \
 		ln -sf lib$$lib.so.$(soversion) "$(DESTDIR)$(libdir)/lib$$lib.so" || exit 1; \
 	done
-	for module in $(device_modules); do \
+	for module in $(add_ons); do \
 		$(INSTALL) -m 644 $(O)/lib/incise/$$module.so "$(DESTDIR)$(libdir)/incise" || exit 1; \
 	done
 	$(INSTALL) -m 644 $(headers) "$(DESTDIR)$(includedir)/incise"

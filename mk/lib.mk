@@ -3,8 +3,7 @@
 
 # The keys of rig.conf that a device brings are read where its module is not, too.
 sources = $(sort $(filter-out %.proto.c,$(foreach layer,$(layers_$1),$(wildcard lib/$(layer)/*.c lib/$(layer)/*.cc lib/$(layer)/*/*_settings.c))))
-# also_LIB: objects of another library that does not export them; this one has its own copy.
-objects = $(addprefix $(O)/obj/,$(addsuffix .o,$(basename $(call sources,$1))) $(also_$1))
+objects = $(addprefix $(O)/obj/,$(addsuffix .o,$(basename $(call sources,$1))))
 
 $(O)/obj/%.o: %.c
 	@mkdir -p $(@D)
@@ -35,19 +34,21 @@ tick.i: ## the stages of a tick for each kind of numbers, preprocessed, in build
 	@echo $(O)/tick.double.i $(O)/tick.integers.i
 .PHONY: tick.i
 
+hidden := $(O)/obj/lib/hidden.a
+crypto_objects := $(O)/obj/lib/base/crypto/sha256.o
 define library
 pc_flags_$1 = $$(if $$(pc_$1),$$(shell $$(PKG_CONFIG) --cflags $$(pc_$1)))
 pc_libs_$1 = $$(if $$(pc_$1),$$(shell $$(PKG_CONFIG) --libs $$(pc_$1)))
 $$(call objects,$1): pc_cflags = $$(pc_flags_$1)
 
 $(O)/lib/lib$1.so.$(version): $$(call objects,$1) lib/lib$1.map \
-		$$(foreach lib,$$(needs_$1),$(O)/lib/lib$$(lib).so)
+		$$(foreach lib,$$(needs_$1),$(O)/lib/lib$$(lib).so $(hidden))
 	@mkdir -p $$(@D)
 	$$(call step,LD)
 	$$(Q)$$(CC) -shared -Wl,-soname,lib$1.so.$(soversion) -Wl,-z,defs -Wl,--as-needed \
 		-Wl,--version-script,lib/lib$1.map $$(call runpath) \
 		-L$(O)/lib $$(CFLAGS) $$(LDFLAGS) -o $$@ $$(call objects,$1) \
-		$$(addprefix -l,$$(needs_$1)) $$(pc_libs_$1) $$(libs_$1)
+		$$(addprefix -l,$$(needs_$1)) $$(filter %.a,$$^) $$(pc_libs_$1) $$(libs_$1)
 
 $(O)/lib/lib$1.so.$(soversion): $(O)/lib/lib$1.so.$(version)
 	$$(Q)ln -sf $$(<F) $$@
@@ -59,140 +60,73 @@ libs: $(O)/lib/lib$1.so
 endef
 $(foreach lib,$(libraries),$(eval $(call library,$(lib))))
 
-# Modules of devices, $(O)/lib/incise/KIND_NAME.so: loaded when rig.conf names them. They
-# bring a library into the process that others do not need. What of libincise they use and
-# it does not export, they hold themselves.
-has_libmnl := $(shell $(PKG_CONFIG) --exists libmnl && echo yes)
-has_libiio := $(shell $(PKG_CONFIG) --exists 'libiio < 1' && echo yes)
-has_comedilib := $(shell $(PKG_CONFIG) --exists comedilib && echo yes)
-device_modules := $(if $(shell $(PKG_CONFIG) --exists libgpiod && echo yes),stepper_gpio) \
-	$(if $(has_libmnl),stepper_can) stepper_slcan \
-	$(if $(has_libiio),force_iio) $(if $(has_comedilib),force_comedi)
-# A motor that is moved from a thread here.
-motor_core := $(addprefix $(O)/obj/lib/,fixed/profile.o fixed/ramp.o \
-	$(addprefix device/,motor.o motion.o page.o thread.o))
-pc_stepper_gpio := libgpiod
-objects_stepper_gpio := $(motor_core) $(addprefix $(O)/obj/lib/device/,gpio/pulser.o gpio/stepper_gpio.o \
-	$(if $(shell $(PKG_CONFIG) --atleast-version=2 libgpiod && echo yes),gpio/gpio_v2.o,gpio/gpio_v1.o))
+# What libincise has and does not export, and SHA-256, for which it would map libcrypto: its other
+# libraries and the add-ons hold what they use of it themselves.
+$(hidden): $(call objects,incise) $(crypto_objects)
+	@rm -f $@
+	$(call step,AR)
+	$(Q)$(AR) qcs $@ $^
 
-# A drive on one of two kinds of bus: each module has the files of its own transport only.
-can_core := $(motor_core) $(patsubst %.c,$(O)/obj/%.o,$(wildcard lib/device/can/canopen/*.c lib/device/can/cia402/*.c))
-can_socketcan := $(patsubst %.c,$(O)/obj/%.o,$(wildcard lib/device/can/bus/socketcan*.c))
-can_slcan := $(O)/obj/lib/device/tty.o \
-	$(patsubst %.c,$(O)/obj/%.o,$(wildcard lib/device/can/bus/slcan*.c))
-pc_stepper_can := libmnl
-objects_stepper_can := $(can_core) $(can_socketcan) $(O)/obj/lib/device/can/stepper_can.o
-pc_stepper_slcan :=
-objects_stepper_slcan := $(can_core) $(can_slcan) $(O)/obj/lib/device/can/stepper_slcan.o
+# Add-ons: modules $(O)/lib/incise/KIND_NAME.so, loaded when they are named. They bring a library into
+# the process that others do not need. module.mk in a folder says which are made of its sources:
+#
+#   modules := tracker_usb tracker_tty   each has all sources of the folder, but
+#   only_MODULE := polhemus_usb          those that only another one has
+#   not_MODULE := gpio_v1                or that it does not want
+#   pc_MODULE := libusb-1.0              it needs packages of pkg-config, or
+#   headers_MODULE := jpeglib.h          headers, which the compiler finds with flags_MODULE, and
+#   libs_MODULE := -ljpeg                their libraries
+#   commands_MODULE := serve             commands that need the same
+#
+# One that misses what it needs is left out, with a line that says so.
+left_out := $(if $(has_view),,incise-view)
+lacks_incise-view := $(pc_incise-view)
+commands_incise-view := view bench-view
 
-# Needs nothing but the kernel's headers.
-device_modules += camera_v4l2
-pc_camera_v4l2 :=
-objects_camera_v4l2 := $(addprefix $(O)/obj/lib/device/,stable_path.o thread.o) \
-	$(patsubst %.c,$(O)/obj/%.o,$(wildcard lib/device/v4l2/*.c))
-# Force samples from two kinds of converters.
-daq_core := $(addprefix $(O)/obj/lib/,base/ring.o device/thread.o device/daq/daq_feed.o)
-daq_iio := $(addprefix $(O)/obj/lib/device/daq/,iio_source.o iio_force.o)
-daq_comedi := $(O)/obj/lib/device/daq/comedi_force.o
-pc_force_iio := libiio
-objects_force_iio := $(daq_core) $(daq_iio)
-pc_force_comedi := comedilib
-objects_force_comedi := $(daq_core) $(O)/obj/lib/device/stable_path.o $(daq_comedi)
-# Streams of the Lab Streaming Layer; liblsl is opened at run time, and needs no package here.
-device_modules += force_lsl
-pc_force_lsl :=
-objects_force_lsl := $(daq_core) $(addprefix $(O)/obj/lib/device/,pace.o lsl/liblsl.o lsl/lsl_force.o)
-device_modules += outlet_lsl
-pc_outlet_lsl :=
-objects_outlet_lsl := $(addprefix $(O)/obj/lib/device/lsl/,liblsl.o lsl_outlet.o)
-# One tracker on two kinds of line.
-polhemus_lines := lib/device/polhemus/polhemus_usb.c lib/device/polhemus/polhemus_tty.c
-polhemus_core := $(addprefix $(O)/obj/lib/,base/ring.o device/thread.o device/tracker_feed.o) \
-	$(patsubst %.c,$(O)/obj/%.o,$(filter-out $(polhemus_lines),$(wildcard lib/device/polhemus/*.c)))
-has_libusb := $(shell $(PKG_CONFIG) --exists libusb-1.0 && echo yes)
-device_modules += $(if $(has_libusb),tracker_usb) tracker_tty
-pc_tracker_usb := libusb-1.0
-objects_tracker_usb := $(polhemus_core) $(O)/obj/lib/device/polhemus/polhemus_usb.o
-$(O)/obj/lib/device/polhemus/polhemus_usb.o: pc_cflags = $(shell $(PKG_CONFIG) --cflags libusb-1.0)
-pc_tracker_tty :=
-objects_tracker_tty := $(polhemus_core) $(O)/obj/lib/device/tty.o \
-	$(O)/obj/lib/device/polhemus/polhemus_tty.o
+lacks = $(strip $(if $(pc_$1),$(shell $(PKG_CONFIG) --exists '$(pc_$1)' || echo '$(pc_$1)')) \
+	$(if $(headers_$1),$(shell $(CXX) -E -x c++ $(flags_$1) $(headers_$1:%=-include %) /dev/null \
+	>/dev/null 2>&1 || echo '$(headers_$1)')))
+take_module = $(eval folder_$1 := $2)$(eval beside_$1 := $(filter-out $1,$(modules)))\
+	$(eval lacks_$1 := $(call lacks,$1))$(eval $(if $(lacks_$1),left_out,add_ons) += $1)
+take_modules = $(foreach name,$(modules),$(call take_module,$(name),$1))
+add_ons :=
+$(foreach file,$(wildcard lib/*/module.mk lib/*/*/module.mk),$(eval include $(file))$(call take_modules,$(dir $(file))))
 
-# A tracker of an OpenIGTLink server.
-device_modules += tracker_igtl
-pc_tracker_igtl :=
-objects_tracker_igtl := $(addprefix $(O)/obj/lib/,base/ring.o $(addprefix device/,\
-	pace.o thread.o tracker_feed.o igtl/igtl_poses.o igtl/igtl_tracker.o))
-
-# Detection of the scalpel in frames, in C++.
-device_modules += $(if $(has_vision),vision_opencv)
-pc_vision_opencv :=
-objects_vision_opencv := $(addprefix $(O)/obj/,$(addsuffix .o,$(basename \
-	$(wildcard lib/vision/*.c lib/vision/*.cc))))
-libs_vision_opencv := -lopencv_imgproc -lopencv_core -ljpeg -lstdc++
-$(objects_vision_opencv): pc_cflags = $(opencv_cflags)
-
-# Detection of a board; it needs more of OpenCV, which a measurement of depth need not map.
-device_modules += $(if $(has_board),board_opencv)
-pc_board_opencv :=
-objects_board_opencv := $(addprefix $(O)/obj/lib/,vision/image.o vision/jpeg.o \
-	vision/board/board_opencv.o)
-libs_board_opencv := -lopencv_calib3d $(libs_vision_opencv)
-$(O)/obj/lib/vision/board/board_opencv.o: pc_cflags = $(opencv_cflags)
-
-# Pictures in a file; lib/record loads it.
-has_frames := $(shell $(PKG_CONFIG) --exists libavformat libavcodec libavutil && echo yes)
-device_modules += $(if $(has_frames),frames_mkv)
+# Pictures in a file, and HDF5: formats of lib/record.
+modules := frames_mkv
 pc_frames_mkv := libavformat libavcodec libavutil libcrypto
-objects_frames_mkv := $(patsubst %.c,$(O)/obj/%.o,lib/base/crypto/sha256.c $(wildcard lib/record/mkv/*.c))
-$(objects_frames_mkv): pc_cflags = $(shell $(PKG_CONFIG) --cflags $(pc_frames_mkv))
-
-# Films of pictures; lib/view loads it.
-device_modules += $(if $(has_view),$(if $(has_frames),film_mkv))
-pc_film_mkv := libavformat libavcodec libavutil
-objects_film_mkv := $(O)/obj/lib/view/film/film_mkv.o
-$(objects_film_mkv): pc_cflags = $(shell $(PKG_CONFIG) --cflags $(pc_film_mkv))
-
-# Writing HDF5; libincise-record loads it.
-has_hdf5 := $(shell $(PKG_CONFIG) --exists hdf5 zlib && echo yes)
-device_modules += $(if $(has_hdf5),export_hdf5)
+$(call take_modules,lib/record/mkv/)
+modules := export_hdf5
 pc_export_hdf5 := hdf5 zlib
-objects_export_hdf5 := $(O)/obj/lib/record/export/hdf5/export_hdf5.o
-$(objects_export_hdf5): pc_cflags = $(shell $(PKG_CONFIG) --cflags $(pc_export_hdf5))
+$(call take_modules,lib/record/export/hdf5/)
 
-# Training on many computers.
-has_mpi := $(shell $(PKG_CONFIG) --exists ompi-c && echo yes)
-device_modules += $(if $(has_mpi),ranks_mpi)
-pc_ranks_mpi := ompi-c
-objects_ranks_mpi := $(O)/obj/lib/device/mpi/ranks_mpi.o
-$(objects_ranks_mpi): pc_cflags = $(patsubst -I%,-isystem %,$(shell $(PKG_CONFIG) --cflags $(pc_ranks_mpi)))
+# The keys of rig.conf that an add-on brings, %_settings.c, are libincise's.
+define add_on
+objects_$1 := $$(patsubst %,$(O)/obj/%.o,$$(filter-out %_settings $$(addprefix $$(folder_$1),$$(not_$1) \
+	$$(foreach other,$$(beside_$1),$$(only_$$(other)))),\
+	$$(basename $$(wildcard $$(addprefix $$(folder_$1),*.c *.cc */*.c */*.cc)))))
+$$(objects_$1): pc_cflags += $$(flags_$1) \
+	$$(if $$(pc_$1),$$(patsubst -I%,-isystem %,$$(shell $$(PKG_CONFIG) --cflags '$$(pc_$1)')))
 
-define device_module
-$(O)/lib/incise/$1.so: $$(objects_$1) $(O)/lib/libincise.so
+$(O)/lib/incise/$1.so: $$(objects_$1) $(hidden) $(O)/lib/libincise.so
 	@mkdir -p $$(@D)
 	$$(call step,LD)
 	$$(Q)$$(CC) -shared -Wl,-z,defs -Wl,--as-needed $$(call runpath,/..) -L$(O)/lib \
-		$$(CFLAGS) $$(LDFLAGS) -o $$@ $$(objects_$1) -lincise \
-		$$(if $$(pc_$1),$$(shell $$(PKG_CONFIG) --libs $$(pc_$1))) $$(libs_$1) -lm -pthread
+		$$(CFLAGS) $$(LDFLAGS) -o $$@ $$(objects_$1) -lincise $(hidden) \
+		$$(if $$(pc_$1),$$(shell $$(PKG_CONFIG) --libs '$$(pc_$1)')) $$(libs_$1) -lm -pthread
 
 libs: $(O)/lib/incise/$1.so
 endef
-$(foreach name,$(device_modules),$(eval $(call device_module,$(name))))
+$(foreach name,$(add_ons),$(eval $(call add_on,$(name))))
+
+libs: $(left_out:%=left-out-%)
+left-out-%:
+	@printf '  %-4s %s\n' OUT '$(strip $* $(commands_$*:%=and incise %)): not found: $(lacks_$*); make deps installs it'
 
 # For unit tests, which reach into what the shared objects hide.
-test_objects := $(patsubst %.c,$(O)/obj/%.o,$(wildcard lib/device/v4l2/*.c)) \
-	$(addprefix $(O)/obj/lib/device/gpio/,pulser.o stepper_gpio.o) \
-	$(filter $(O)/obj/lib/device/can/%,$(can_core) $(can_slcan) $(if $(has_libmnl),$(can_socketcan))) \
-	$(O)/obj/lib/device/daq/daq_feed.o $(if $(has_libiio),$(daq_iio)) \
-	$(if $(has_comedilib),$(daq_comedi)) \
-	$(filter $(O)/obj/lib/device/lsl/%,$(objects_force_lsl)) \
-	$(filter $(O)/obj/lib/device/igtl/%,$(objects_tracker_igtl)) \
-	$(filter $(O)/obj/lib/device/polhemus/%,$(objects_tracker_tty)) \
-	$(if $(has_vision),$(filter-out %/vision_opencv.o,$(objects_vision_opencv))) \
-	$(if $(has_frames),$(objects_frames_mkv) $(objects_film_mkv)) \
-	$(O)/obj/tests/vision/scalpel_picture.o
 # q, not r: device/vision.c and vision/vision.cc are both vision.o.
-$(O)/lib/libincise-tests.a: $(foreach lib,$(libraries),$(call objects,$(lib))) $(test_objects)
+$(O)/lib/libincise-tests.a: $(foreach lib,$(libraries),$(call objects,$(lib))) $(crypto_objects) \
+		$(sort $(foreach name,$(add_ons),$(objects_$(name)))) $(O)/obj/tests/vision/scalpel_picture.o
 	@mkdir -p $(@D)
 	@rm -f $@
 	$(call step,AR)

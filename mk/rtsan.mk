@@ -26,15 +26,15 @@ check-rtsan: ## ticks under RealtimeSanitizer: no allocation, no lock, no system
 
 # All of libincise, and what of its modules is in the loop's thread.
 rtsan_objects := $(filter $(O)/obj/lib/device/can/% $(O)/obj/lib/device/polhemus/% \
-	$(O)/obj/lib/device/gpio/%,$(test_objects))
+	$(O)/obj/lib/device/gpio/%,$(sort $(foreach name,$(add_ons),$(objects_$(name)))))
 $(O)/lib/libincise-rtsan.a: $(call objects,incise) $(rtsan_objects)
 	@mkdir -p $(@D)
 	@rm -f $@
 	$(call step,AR)
 	$(Q)$(AR) qcs $@ $^
 
-rtsan_units := $(filter-out $(if $(has_libmnl),,can/can_stepper),\
-	can/can_stepper device/motor device/stepper_gpio device/stepper_kernel loop/loop \
+rtsan_units := $(filter-out $(if $(filter stepper_can,$(left_out)),can/can_stepper),\
+	can/can_stepper device/motor device/stepper_kernel gpio/stepper_gpio loop/loop \
 	loop/loop_control loop/state_page \
 	scene/actuate scene/extreme scene/felt_axes scene/plan scene/procedure sim/sim_stepper)
 rtsan_programs := $(patsubst tests/rtsan/%.c,$(O)/tests/rtsan/%,$(wildcard tests/rtsan/*.c))
@@ -44,7 +44,7 @@ rtsan_cc = $(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 -ffp-contract=off $(warnings
 	-Wno-missing-prototypes -Wno-unused-parameter $(CFLAGS) -Wno-function-effects \
 	-MMD -MP -MF $@.d
 rtsan_libs = $(shell $(PKG_CONFIG) --libs $(pc_incise)) \
-	$(if $(has_libmnl),$(shell $(PKG_CONFIG) --libs libmnl)) $(libs_incise) -pthread
+	$(if $(filter stepper_can,$(add_ons)),$(shell $(PKG_CONFIG) --libs $(pc_stepper_can))) $(libs_incise) -pthread
 
 $(O)/obj/again/%.o: tests/unit/%.c
 	@mkdir -p $(@D)

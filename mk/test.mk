@@ -2,11 +2,10 @@
 # Tests. tests/unit/NAME/*.c test a layer or a module of lib/, the parts of driver/ that build without a
 # kernel, and shared parts of tools/; tests/cli runs the real programs.
 
-unit_sources := $(filter-out $(if $(has_libmnl),,tests/unit/can/socketcan%) \
-	$(if $(has_libiio),,tests/unit/daq/iio_%) $(if $(has_comedilib),,tests/unit/daq/comedi_%) \
-	$(if $(has_libusb),,%/polhemus_usb.c) \
-	$(if $(has_vision),,tests/unit/vision/%) $(if $(has_frames),,tests/unit/mkv/% tests/unit/film/%) \
-	$(if $(has_hdf5),,tests/unit/hdf5/%) $(if $(has_view),,tests/unit/view/%),\
+# Tests of add-ons that are left out are, too: of one its own files, of a whole folder tests/unit/FOLDER.
+left_out_tests = $(addprefix tests/unit/$2/,$(if $(filter $(add_ons),$(beside_$1)),$(addsuffix .c,$(notdir $(only_$1))),%))
+unit_sources := $(filter-out $(if $(has_view),,tests/unit/view/%) \
+	$(foreach name,$(left_out),$(call left_out_tests,$(name),$(notdir $(folder_$(name):/=)))),\
 	$(wildcard tests/unit/*/*.c))
 # The longest ones first: one that begins last runs alone.
 unit_programs := $(patsubst tests/%.c,$(O)/tests/%,$(filter %/extremes.c %/rest_3d.c,$(unit_sources)) \
@@ -16,16 +15,11 @@ unit_programs := $(patsubst tests/%.c,$(O)/tests/%,$(filter %/extremes.c %/rest_
 emulator := $(O)/obj/tests/polhemus/emulator.o
 
 # LAPACK is the reference of numerical tests; nothing else links it.
-test_packages := cmocka jansson lapacke lapack blas $(if $(has_libmnl),libmnl) $(if $(has_libiio),libiio) \
-	$(if $(has_comedilib),comedilib) $(if $(has_libusb),libusb-1.0) \
-	$(if $(has_frames),$(pc_frames_mkv)) $(if $(has_hdf5),$(pc_export_hdf5)) \
-	$(foreach lib,$(libraries),$(pc_$(lib)))
-test_cflags = $(eval test_cflags := $(shell $(PKG_CONFIG) --cflags $(test_packages)))$(test_cflags)
-# The reference for messages of OpenIGTLink; it has no file of pkg-config.
-has_igtl := $(wildcard /usr/include/openigtlink/igtl_header.h)
+test_packages := cmocka jansson lapacke lapack blas $(foreach part,$(add_ons) $(libraries),$(pc_$(part)))
+test_cflags = $(eval test_cflags := $(shell $(PKG_CONFIG) --cflags '$(test_packages)'))$(test_cflags)
 # A test maps only what it uses of these.
-test_libs = $(eval test_libs := -Wl,--as-needed $(shell $(PKG_CONFIG) --libs $(test_packages)) \
-	$(if $(has_vision),$(libs_vision_opencv)) $(if $(has_igtl),-lOpenIGTLink) -lm -ldl -pthread)$(test_libs)
+test_libs = $(eval test_libs := -Wl,--as-needed $(shell $(PKG_CONFIG) --libs '$(test_packages)') \
+	$(foreach name,$(add_ons),$(libs_$(name))) $(tool_more_libs) -ldl -pthread)$(test_libs)
 
 $(O)/obj/tests/%.o: tests/%.c
 	@mkdir -p $(@D)
@@ -104,7 +98,8 @@ rest: $(O)/tests/unit/scene/rest_3d ## SEEDS=1..500 [KEEP=FOLDER]: leans on rand
 	@SEEDS=$(SEEDS) KEEP=$(KEEP) $<
 
 # Fuzz targets by our own changes of the inputs that are kept; see tests/fuzz/mutate.c.
-fuzz_targets := $(patsubst tests/fuzz/%.c,%,$(filter-out tests/fuzz/mutate.c $(if $(has_vision),,%/vision_frame.c),\
+fuzz_targets := $(patsubst tests/fuzz/%.c,%,$(filter-out tests/fuzz/mutate.c $(if $(filter vision_opencv,$(left_out)),%/vision_frame.c) \
+	$(if $(filter tracker_igtl,$(left_out)),%/igtl_stream.c %/igtl_poses.c),\
 	$(wildcard tests/fuzz/*.c)))
 kept_programs := $(fuzz_targets:%=$(O)/tests/kept/%)
 kept_objects := $(fuzz_targets:%=$(O)/obj/tests/fuzz/%.o)
@@ -143,7 +138,7 @@ python-peers: ## pyarrow, polars, DuckDB, pandas 3 and scikit-learn for the test
 
 # Programs of others that send and receive streams over a network.
 receiver := $(wildcard /usr/share/doc/openigtlink-examples/examples/Receiver/ReceiveClient.cxx)
-stream-peers: $(if $(has_igtl),$(if $(receiver),$(O)/tests/streams/ReceiveClient))
+stream-peers: $(if $(filter tracker_igtl,$(add_ons)),$(if $(receiver),$(O)/tests/streams/ReceiveClient))
 stream-peers: ## pylsl, with liblsl, pyigtl, and a client of libopenigtlink for tests of streams
 	@tests/venv tests/streams $(O)/tests/streams 'tests with streams of LSL and pyigtl are skipped' lsl_send lsl_receive igtl_send
 
@@ -223,10 +218,10 @@ check-tsan: $(tsan_programs) ## what threads share without a lock, under ThreadS
 	@tests/unit/run $(tsan_programs)
 
 style_sources := $(shell find lib tools tests driver examples -name '*.[ch]' -o -path 'lib/*.cc' 2>/dev/null)
-check-style: ## the house's form: clang-format, an SPDX line in every file
+check-style: ## the house's form: clang-format, an SPDX line in every file, plain words
 	@tests/style $(style_sources)
 
-check-layers: libs ## no layer of lib/ uses a higher one
+check-layers: libs ## no layer of lib/ uses a higher one, no files of one are a circle
 	@tests/layers $(O)
 
 doc: ## reference of the public headers in build/doc/html; fails where a comment is missing
@@ -257,11 +252,11 @@ check-doc: doc
 	peers check-attack check-python check-tsan can-drive mcap-reader python-peers stream-peers
 
 # Sums of very many pairs: time and memory, next to numpy.
-$(O)/tests/corpus: tests/bench/corpus.c $(O)/lib/libincise-learn.so
+$(O)/tests/corpus: tests/bench/corpus.c $(O)/lib/libincise-tests.a
 	@mkdir -p $(@D)
 	$(call step,LD)
 	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ $< \
-		-L$(O)/lib -Wl,-rpath,'$$ORIGIN/../lib' -lincise-learn -lincise -lm
+		$(O)/lib/libincise-tests.a $(test_libs)
 
 # All 2^32 pairs of 16-bit inputs: the proof of the bound by trying everything.
 $(O)/tests/exhaustive: tests/bench/exhaustive.c $(O)/lib/libincise.so

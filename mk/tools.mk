@@ -2,6 +2,9 @@
 # The programs. They use public headers only, and find their libraries beside them, in
 # the build tree as after installation.
 
+# Commands whose libraries are missing are left out, with their pages.
+left_out_commands := $(foreach name,$(left_out),$(commands_$(name)))
+commands := $(filter-out $(left_out_commands),$(patsubst tools/incise-%.c,%,$(wildcard tools/incise-*.c)))
 programs := $(O)/bin/incise $(addprefix $(O)/bin/incise-,$(commands))
 
 $(O)/obj/tools/%.o: pc_cflags = $(shell $(PKG_CONFIG) --cflags jansson)
@@ -11,7 +14,7 @@ $(O)/obj/tools/incise.o $(O)/obj/tools/cli/features.o: cppflags += -DVIEW_LIBRAR
 	-DRECORD_LIBRARY='"libincise-record.so.$(soversion)"'
 
 # The kernel module's own interface, for incise info, which looks past the library.
-$(O)/obj/tools/stepper/%.o $(O)/obj/tools/capture/%.o: cppflags += -Idriver
+$(O)/obj/tools/stepper/%.o: cppflags += -Idriver
 
 # Printed in the head of each bench's report; without the build's own folder.
 $(O)/obj/tools/bench/machine.o: cppflags += -DBUILD_FLAGS='"$(subst ',,$(subst ",,$(filter-out \
@@ -25,11 +28,15 @@ $(O)/obj/tools/serve/pixels.o: cppflags += $(if $(has_jpeg),-DHAVE_JPEG)
 has_png := $(shell $(CC) -E -x c -include png.h /dev/null >/dev/null 2>&1 && echo yes)
 $(O)/obj/tools/cli/image.o: cppflags += $(if $(has_png),-DHAVE_PNG)
 
+tools: $(if $(has_jpeg),,left-out-JPEG) $(if $(has_png),,left-out-PNG)
+lacks_JPEG := jpeglib.h
+lacks_PNG := png.h
+
 # The parts of all programs. The linker takes of them, and of the libraries, what a program
 # uses: a new part, command or benchmark is found by its place.
 tool_parts := $(O)/obj/tools/parts.a
 tool_texts := $(wildcard tools/cli/*.gp tools/bench/plots/*.gp)
-$(tool_parts): $(patsubst %.c,$(O)/obj/%.o,$(wildcard tools/*/*.c)) $(tool_texts:%=$(O)/obj/%.o)
+$(tool_parts): $(patsubst %.c,$(O)/obj/%.o,$(filter-out $(if $(filter serve,$(commands)),,tools/serve/igtl.c),$(wildcard tools/*/*.c))) $(tool_texts:%=$(O)/obj/%.o)
 	@rm -f $@
 	$(call step,AR)
 	$(Q)$(AR) rcs $@ $^
@@ -63,6 +70,10 @@ $(O)/lib/incise/peer_%.py: tools/bench/references/%.py
 	@mkdir -p $(@D)
 	$(Q)cp $< $@
 
+# OpenIGTLink's messages, as the tracker reads them.
+$(O)/bin/incise-serve: $(O)/obj/lib/device/igtl/igtl_message.o
+$(O)/bin/incise-serve: tool_more_libs += $(libs_tracker_igtl)
+
 # The benchmarks simulate a device exactly, which the library itself has no use for.
 $(O)/bin/incise-bench: $(O)/obj/lib/control/plant.o
 tool_libs := $(patsubst %,-l%,$(libraries))
@@ -93,6 +104,7 @@ $(O)/obj/mk/settings: mk/settings.c $(call objects,incise)
 $(O)/obj/mk/settings.tables: $(O)/obj/mk/settings
 	$(Q)$< >$@
 
+$(O)/man/rig.conf.5: $(wildcard lib/*/*/rig.conf.5)
 $(O)/man/%.5: man/%.5 mk/manual-tables mk/manual-output $(wildcard schema/*.rows) $(O)/obj/mk/settings.tables
 	@mkdir -p $(@D)
 	$(call step,MAN)
@@ -101,7 +113,7 @@ $(O)/man/%.5: man/%.5 mk/manual-tables mk/manual-output $(wildcard schema/*.rows
 	@rm $@.lists
 # Manual pages, and the list of all options: the tables that --help prints are stated in the programs
 # alone. Pages of what is not built are left out.
-man_pages := $(filter-out $(if $(has_view),,man/incise-view.1 man/incise-bench-view.1),$(wildcard man/*.[1-8]))
+man_pages := $(filter-out $(left_out_commands:%=man/incise-%.1) $(left_out_commands:%=man/incise-%.service.8),$(wildcard man/*.[1-8]))
 tables := $(patsubst $(O)/bin/%,$(O)/obj/tools/%.table,$(programs))
 
 $(O)/obj/tools/%.table: $(O)/bin/%

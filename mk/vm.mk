@@ -8,8 +8,8 @@ guest_objects := $(guest_shared:%.c=$(O)/obj/%.o)
 .SECONDARY: $(guest_objects)
 guest_headers := $(wildcard tests/vm/*.h driver/sim/incise_sim.h driver/uapi/*.h)
 guest_programs := $(patsubst tests/vm/guest/%.c,$(O)/tests/vm/%,\
-	$(filter-out $(if $(has_libmnl),,%/can_bus.c %/can_netlink.c) \
-		$(if $(has_libiio),,%/force_iio.c) $(if $(has_comedilib),,%/force_comedi.c),$(wildcard tests/vm/guest/*.c)))
+	$(filter-out $(if $(filter stepper_can,$(left_out)),%/can_bus.c %/can_netlink.c) $(left_out:%=tests/vm/guest/%.c),\
+		$(wildcard tests/vm/guest/*.c)))
 
 $(O)/tests/vm/%: tests/vm/guest/%.c $(guest_objects) $(guest_headers) \
 		$(O)/lib/libincise-tests.a

@@ -167,7 +167,7 @@ static void rows_load(sqlite3 *db, sqlite3_stmt *insert,
 	struct incise_ledger_block block;
 	sqlite3_stmt *stmt = NULL;
 
-	incise_ledger_select(db, 5, form->stream, INT64_MIN, false, &stmt);
+	incise_ledger_select(db, form->stream, INT64_MIN, false, &stmt);
 	while (sqlite3_step(stmt) == SQLITE_ROW) {
 		incise_ledger_block_read(&block, stmt);
 		if (block.count &&
@@ -258,7 +258,7 @@ static void rows_store(sqlite3 *db, const struct incise_ledger_form *form)
 	snprintf(sql, sizeof(sql), "SELECT %s FROM temp.%s ORDER BY seq", form->columns,
 		 form->table);
 	sqlite3_prepare_v2(db, sql, -1, &rows, NULL);
-	incise_ledger_select(db, 5, form->stream, INT64_MIN, false, &blocks);
+	incise_ledger_select(db, form->stream, INT64_MIN, false, &blocks);
 	if (sqlite3_step(rows) != SQLITE_ROW) {
 		sqlite3_finalize(rows);
 		rows = NULL;

@@ -12,10 +12,10 @@
 #include <incise/view.h>
 #include "cli/cli.h"
 #include "cli/file.h"
-#include "cli/procedure.h"
 #include "cli/scene_argument.h"
 #include "cli/stopwatch.h"
 #include "bench/bench.h"
+#include "session/procedure.h"
 
 /*
  * --- ticks of the scripted procedure that are kept in memory, and views without a screen that get

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <incise/recording.h>
+#include "../lib/record/export/formats.h"
 #include "cli/calibration.h"
 #include "cli/cli.h"
 #include "cli/file_kind.h"
@@ -56,9 +57,10 @@ static const char *const uncertainties[] = {"none", "total", "parts", NULL};
 
 static const struct cli_option options[] = {
 	{'o', "output", "FILE",
-	 "dataset to write: FILE.csv, FILE.h5 (HDF5) or FILE.mcap; - is CSV on "
-	 "standard output (default)",
-	 CLI_OUTPUT(struct job, output), .extensions = ".csv .h5 .mcap"},
+	 "dataset to write, in the format of its extension:" INCISE_ROW_EXTENSIONS
+		 INCISE_MESSAGE_EXTENSIONS "; - is CSV on standard output (default)",
+	 CLI_OUTPUT(struct job, output),
+	 .extensions = INCISE_ROW_EXTENSIONS INCISE_MESSAGE_EXTENSIONS},
 	{0, "rate", "HZ",
 	 "rows per second, each the mean of its samples (default: all samples)",
 	 CLI_NUMBER(struct job, how.rate_hz, 1e-3, 1e9)},
@@ -197,6 +199,11 @@ static void export(char **paths, int n, const struct job *job,
 	free(recordings);
 }
 
+static bool has_messages(const struct job *job)
+{
+	return cli_extension_in(job->output, INCISE_MESSAGE_EXTENSIONS);
+}
+
 static void parse(struct job *job, int argc, char **argv)
 {
 	struct incise_export_options *how = &job->how;
@@ -211,19 +218,20 @@ static void parse(struct job *job, int argc, char **argv)
 			  "--average");
 	if (how->to_s > 0 && how->to_s <= how->from_s)
 		cli_usage("--to %g s is not behind --from %g s", how->to_s, how->from_s);
-	if (how->cut && (how->resample || cli_ends_with(job->output, ".mcap")))
-		cli_usage("--cut is of cuts; give --from and --to with --resample and "
-			  "MCAP");
+	if (how->cut && (how->resample || has_messages(job)))
+		cli_usage("--cut is of cuts; give --from and --to with --resample "
+			  "and" INCISE_MESSAGE_EXTENSIONS);
 	if (how->rate_hz > 0 && how->depth_bins)
 		cli_usage("--rate and --average exclude each other; give one of them");
 	if (!how->depth_bins && (how->by_cut || job->min_count || how->depth_max_mm > 0 ||
 				 how->velocity_max_mm_s > 0))
 		cli_usage("--by-cut, --depth-max, --velocity-max and --min-count go with "
 			  "--average");
-	if (how->tai && (how->depth_bins || cli_ends_with(job->output, ".mcap")))
-		cli_usage("--tai goes with rows of .csv and .h5, without --average");
-	if (job->profile && !cli_ends_with(job->output, ".mcap"))
-		cli_usage("--profile needs -o FILE.mcap");
+	if (how->tai && (how->depth_bins || has_messages(job)))
+		cli_usage("--tai goes with rows of" INCISE_ROW_EXTENSIONS
+			  ", without --average");
+	if (job->profile && !has_messages(job))
+		cli_usage("--profile needs -o FILE with" INCISE_MESSAGE_EXTENSIONS);
 	if (job->profile == ROS2 && job->uncertainty)
 		cli_usage("--uncertainty does not go with --profile ros2, whose messages "
 			  "have no place for it");

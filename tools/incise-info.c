@@ -24,18 +24,16 @@
 #include "cli/json.h"
 #include "cli/keys.h"
 #include "cli/plan_report.h"
-#include "cli/plot.h"
 #include "cli/proof_report.h"
 #include "cli/recording.h"
 #include "cli/stream_report.h"
 #include "cli/wall_report.h"
-#include "plot/figure.h"
 #include "stepper/module.h"
 #include "train/sources.h"
 
 struct job {
 	bool json, all, damaged, dataset, all_rows;
-	const char *plot, *group, *target;
+	const char *group, *target;
 	char *inputs[INCISE_MODEL_INPUTS_MAX];
 	int n_inputs;
 };
@@ -67,10 +65,6 @@ static const struct cli_option options[] = {
 	 CLI_TEXT(struct job, target)},
 	{0, "all-rows", NULL, "dataset: also rows in which the blade did not advance",
 	 CLI_FLAG(struct job, all_rows)},
-	{0, "plot", "NAME",
-	 "model: draw the membership functions and the force surface as NAME.png "
-	 "and NAME.svg",
-	 CLI_OUTPUTS(struct job, plot)},
 	{0},
 };
 
@@ -249,17 +243,14 @@ static void model_text(const struct incise_model *model, const struct incise_fix
 	}
 }
 
-static void show_model(const char *path, bool json, const char *plot)
+static void show_model(const char *path, bool json)
 {
 	struct incise_error err = {0}, refused = {0};
-	const char *folder, *name;
 	struct incise_model *model;
 	struct incise_fixed *fixed;
 	struct stat st;
 	char *notes;
 
-	if (plot)
-		plot_place("plot", plot, &folder, &name);
 	model = cli_require(incise_model_load(path, &err), &err);
 	/* A pipe has been read. */
 	notes = !stat(path, &st) && S_ISREG(st.st_mode)
@@ -270,15 +261,6 @@ static void show_model(const char *path, bool json, const char *plot)
 		model_json(model, fixed, refused.text, notes);
 	else
 		model_text(model, fixed, refused.text, notes);
-	cli_finish();
-	if (plot)
-		plot_draw_or_fail(figure_of_model(&(struct figure){
-					  .path = path, .folder = folder, .name = name}),
-				  folder, name);
-	if (plot && !json) {
-		cli_written();
-		cli_finish();
-	}
 	free(notes);
 	incise_fixed_free(fixed);
 	incise_model_free(model);
@@ -838,43 +820,70 @@ static void show_factor(const char *path, bool json)
 	incise_factor_free(factor);
 }
 
+/* The rig that is used here, and what comes before it and was not: printed, or as an array. */
+static json_t *passed_over(const char *rig, bool json)
+{
+	json_t *list = json_array();
+	const char *reason;
+
+	if (!json)
+		printf("rig          %s\n", rig);
+	for (int i = 0; (reason = cli_rig_passed_over(i)); i++) {
+		if (!json)
+			printf("passed over  %s\n", reason);
+		json_array_append_new(list, json_text(reason));
+	}
+	if (!json)
+		putchar('\n');
+	return list;
+}
+
 /* The keys of a scene, or of a rig: "rig" is the one that is used here. */
 static void show_keys(const char *path, bool scene, const struct job *job)
 {
+	const bool here = !strcmp(path, "rig");
+	const char *rig = here ? cli_rig(NULL) : path;
 	struct incise_error err = {0};
 	struct keys keys = {0};
-	const char *rig = !strcmp(path, "rig") ? cli_rig(NULL) : path;
-	int rc = scene ? incise_scene_keys(path, keys_add, &keys, &err)
-		       : incise_rig_keys(rig, keys_add, &keys, &err);
+	json_t *passed = NULL;
 
-	if (rc)
+	if (scene ? incise_scene_keys(path, keys_add, &keys, &err)
+		  : incise_rig_keys(rig, keys_add, &keys, &err))
 		cli_fail_with(&err);
+	if (here)
+		passed = passed_over(rig, job->json);
 	if (job->json)
-		json_print(json_pack("{ss so so}", "kind", scene ? "scene" : "rig",
-				     "file", json_text(rig), "keys",
-				     keys_json(&keys, rig, job->all)));
+		json_print(json_pack("{ss so so* so}", "kind", scene ? "scene" : "rig",
+				     "file", json_text(rig), "passed_over", passed,
+				     "keys", keys_json(&keys, rig, job->all)));
 	else
 		keys_print(&keys, rig, job->all);
+	if (!job->json)
+		json_decref(passed);
 	free(keys.key);
 }
 
 static void show_dataset(struct job *job, char **paths, int n)
 {
 	const char *columns[INCISE_MODEL_INPUTS_MAX + 1];
-	struct source_options how = {
+	struct recording_rows rows = {.damaged = job->damaged};
+	struct incise_sources_options how = {
 		.columns = columns,
-		.n_columns = job->n_inputs + 1,
+		.n_inputs = job->n_inputs,
 		.group = job->group,
 		.all_rows = job->all_rows,
-		.damaged = job->damaged,
 	};
+	struct incise_train_source *sources;
 
 	if (!n)
 		cli_usage("missing DATA.csv or NAME.rec (training data)");
 	for (int i = 0; i < job->n_inputs; i++)
 		columns[i] = job->inputs[i];
 	columns[job->n_inputs] = job->target;
-	dataset_show(paths, n, &how, job->json);
+	incise_train_options_init(&how.train);
+	sources = sources_new(paths, n, &rows);
+	dataset_show(sources, n, &how, job->json);
+	sources_free(sources, n);
 }
 
 int main(int argc, char **argv)
@@ -905,11 +914,6 @@ int main(int argc, char **argv)
 	plan = kind ? kind == FILE_PLAN : cli_ends_with(path, ".plan");
 	if (job.all && !rig && kind != FILE_SCENE)
 		cli_usage("--all goes with a rig or a scene");
-	if (job.plot &&
-	    (rig || kind == FILE_SCENE || is_recording(path) || compiled || plan ||
-	     kind == FILE_FACTOR || stepper_module_is(path) || is_bus(path)))
-		cli_usage("--plot goes with a model (MODEL.fis); 'incise plot' draws "
-			  "other files");
 	if (stepper_module_is(path)) {
 		stepper_module_show(path, job.json);
 	} else if (!strcmp(path, "devices")) {
@@ -929,7 +933,7 @@ int main(int argc, char **argv)
 		else if (plan)
 			show_plan(path, job.json);
 		else
-			show_model(path, job.json, job.plot);
+			show_model(path, job.json);
 	}
 	cli_finish();
 	return 0;

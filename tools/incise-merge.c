@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <incise/factor.h>
+#include <incise/corpus.h>
 #include "cli/cli.h"
 #include "cli/file_kind.h"
 #include "cli/json.h"
@@ -60,54 +60,19 @@ static void parse(struct options *options, int argc, char **argv)
 	free(sd);
 }
 
-static struct incise_factor *load(const char *path)
+/* The same files as those of a training from the sources themselves. */
+static void save_model(const struct options *options,
+		       const struct incise_trained *trained)
 {
 	struct incise_error err = {0};
+	char *sd = cli_text("%s.sd", options->output);
 
-	file_expect(path, FILE_FACTOR);
-	return cli_require(incise_factor_load(path, &err), &err);
-}
-
-static struct incise_factor *merge_all(const struct options *options)
-{
-	struct incise_error err = {0};
-	struct incise_factor *all = load(options->paths[0]);
-
-	for (int i = 1; i < options->n; i++) {
-		struct incise_factor *other = load(options->paths[i]);
-
-		if (incise_factor_merge(all, other, options->paths[i], &err))
-			cli_fail_with(&err);
-		incise_factor_free(other);
-	}
-	return all;
-}
-
-/* The same notes as those of a training from the sources themselves. */
-static void save_model(const struct options *options, struct incise_factor *factor,
-		       struct incise_train_report *report)
-{
-	struct incise_factor_ridge ridge = {options->ridge, 1, NAN};
-	struct incise_uncertainty *uncertainty;
-	struct incise_error err = {0};
-	struct incise_model *model = cli_require(
-		incise_factor_solve(factor, &ridge, report, &uncertainty, &err), &err);
-	char *notes = incise_factor_notes(factor);
-
-	if (!notes)
-		cli_fail("no memory");
-	if (incise_model_save_notes(model, options->output, notes, &err))
+	if (incise_model_save_notes(trained->model, options->output, trained->notes,
+				    &err) ||
+	    (cli_ends_with(options->output, ".fis") &&
+	     incise_uncertainty_save(trained->uncertainty, sd, &err)))
 		cli_fail_with(&err);
-	if (cli_ends_with(options->output, ".fis")) {
-		char *sd = cli_text("%s.sd", options->output);
-
-		if (incise_uncertainty_save(uncertainty, sd, &err))
-			cli_fail_with(&err);
-		free(sd);
-	}
-	free(notes);
-	incise_uncertainty_free(uncertainty);
-	incise_model_free(model);
+	free(sd);
 }
 
 static void print_report(const struct options *options,
@@ -143,23 +108,30 @@ static void print_report(const struct options *options,
 
 int main(int argc, char **argv)
 {
-	struct incise_train_report report = {
+	const struct incise_train_report none = {
 		.train_rmse = NAN, .train_r2 = NAN, .crossval_rmse = NAN, .ridge = NAN};
+	enum incise_train_end end;
 	struct incise_factor_info info;
+	struct incise_trained trained;
 	struct incise_error err = {0};
-	struct incise_factor *factor;
 	struct options options;
 
 	parse(&options, argc, argv);
-	factor = merge_all(&options);
-	if (!cli_ends_with(options.output, ".fac"))
-		save_model(&options, factor, &report);
-	else if (incise_factor_save(factor, options.output, &err))
+	for (int i = 0; i < options.n; i++)
+		file_expect(options.paths[i], FILE_FACTOR);
+	end = cli_ends_with(options.output, ".fac") ? INCISE_TRAIN_TO_FACTOR
+						    : INCISE_TRAIN_TO_MODEL;
+	if (incise_train_factors((const char *const *)options.paths, options.n,
+				 options.ridge, end, &trained, &err))
 		cli_fail_with(&err);
-	incise_factor_info(factor, &info);
+	if (trained.model)
+		save_model(&options, &trained);
+	else if (incise_factor_save(trained.factor, options.output, &err))
+		cli_fail_with(&err);
+	incise_factor_info(trained.factor, &info);
 	if (strcmp(options.output, "-"))
-		print_report(&options, &info, &report);
-	incise_factor_free(factor);
+		print_report(&options, &info, trained.model ? &trained.report : &none);
+	incise_trained_free(&trained);
 	cli_finish();
 	return 0;
 }

@@ -9,6 +9,7 @@
 #include <stdio.h>
 #include <string.h>
 #include <incise/plan.h>
+#include "bench/tick_cost.h"
 #include "cli/cli.h"
 #include "cli/json.h"
 #include "cli/loop_report.h"
@@ -16,7 +17,6 @@
 #include "cli/model_force.h"
 #include "cli/scene_argument.h"
 #include "cli/stopwatch.h"
-#include "cli/tick_cost.h"
 
 /* Seconds of the stroke in which ticks are timed. */
 #define MEASURED_S 20
@@ -299,9 +299,8 @@ static void print_rest(const struct incise_plan_stability *s)
 {
 	const double *at = s->worst.place_mm;
 
-	printf("            comes to rest: %d leans up to the limit, %" PRId64
-	       " ticks; the slowest takes "
-	       "%.2g s, of %.2f N",
+	printf("            settling: all %d simulated pushes came to rest, in %" PRId64
+	       " ticks; slowest %.2g s, of %.2f N",
 	       s->runs, s->ticks, s->worst.settle_s, s->worst.lean_N);
 	if (s->worst.guided)
 		printf(" at %.1f mm", s->worst.depth_mm);

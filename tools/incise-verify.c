@@ -199,8 +199,6 @@ static void print_table(const struct incise_verify_report *report, const char *p
 	if (report->sealed)
 		printf("%-8s %s, chained\n", "seal",
 		       cli_count(report->commits, "commit"));
-	else if (!report->commits)
-		printf("%-8s none: made by an older incise\n", "seal");
 	if (recalibrated(path, &active))
 		printf("%s: read by another calibration than that of the capture: %s\n",
 		       path, active.file);

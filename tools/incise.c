@@ -23,42 +23,62 @@
 #define LETTERS "abcdefghijklmnopqrstuvwxyz"
 
 static const struct {
-	const char *name, *does;
+	const char *name, *does, *group; /* NULL: of the command before */
 } commands[] = {
-	{"calibrate", "measure the scale factors, delays and offsets of a rig"},
+	{"demo", "run the whole path on the simulated rig", "Start"},
+	{"doctor", "check this machine and its rig, and print a remedy for each finding"},
+	{"calibrate", "measure the scale factors, delays and offsets of a rig", "Record"},
 	{"capture", "record the streams of a rig in sync"},
 	{"verify", "check that a recording is complete and unaltered"},
-	{"sign", "sign and time-stamp a recording"},
-	{"recover", "make a whole recording of an interrupted or an older one"},
-	{"join", "put recordings of several machines on one timeline"},
-	{"recalibrate", "give a recording another calibration after the fact"},
-	{"export", "make a dataset from recordings, raw or averaged"},
-	{"train", "learn a fuzzy force model from recordings or datasets"},
-	{"merge", "make one model of the factors of several laboratories or machines"},
-	{"compile", "convert a model or a scene to fixed point with a certified error"},
+	{"train", "learn a fuzzy force model from recordings or datasets", "Learn"},
 	{"eval", "print the force of a model at given depth and velocity"},
-	{"info",
-	 "describe a recording, model, plan, stepper module, CAN bus or attached device"},
-	{"plot", "draw a recording, dataset, model, session or calibration"},
-	{"provenance", "print the way from a figure or model back to its recordings"},
+	{"export", "make a dataset from recordings, raw or averaged"},
+	{"haptic", "run the real-time loop of a scene", "Render"},
 	{"plan",
 	 "show the stages that a scene runs, their cost, and the stability of the scene"},
-	{"haptic", "run the real-time loop of a scene"},
-	{"feed", "load a scene into the kernel and send it the poses"},
-	{"serve", "send poses, forces and frames live to other programs"},
-	{"status", "report the state of the loops on this machine"},
-	{"tool", "set or print the tool in the hand of a running loop"},
-	{"view", "show a scene: tissue, wound, blood, instrument"},
-	{"assess", "evaluate sessions against the criteria of their scene"},
 	{"replay", "run the loop on a recording and compare it with the measured force"},
-	{"stepper", "show the state of the actuator and move it by hand"},
-	{"bench", "measure error, run time and stability"},
-	{"doctor", "check this machine and its rig, and print a remedy for each finding"},
-	{"rig", "print which rig.conf is used here, and what it resolves to"},
-	{"demo", "run the whole path on the simulated rig"},
+	{"status", "report the state of the loops on this machine"},
+	{"info",
+	 "describe a recording, model, scene, rig, stepper module, CAN bus or attached device",
+	 "Look"},
+	{"plot", "draw a recording, dataset, model, session or calibration"},
+	{"view", "show a scene: tissue, wound, blood, instrument"},
+	{"assess", "evaluate sessions against the criteria of their scene", "Share"},
+	{"provenance", "print the way from a figure or model back to its recordings"},
+	{"serve", "send poses, forces and frames live to other programs"},
+	{"sign", "sign and time-stamp a recording"},
+	{"stepper", "show the state of the actuator and move it by hand", "Administer"},
+	{"bench", "measure error, run time and stability", "Advanced"},
+	{"compile", "convert a model or a scene to fixed point with a certified error"},
+	{"feed", "load a scene into the kernel and send it the poses"},
+	{"join", "put recordings of several machines on one timeline"},
+	{"merge", "make one model of the factors of several laboratories or machines"},
+	{"recalibrate", "give a recording another calibration after the fact"},
+	{"recover", "make a whole recording of an interrupted or an older one"},
+	{"tool", "set or print the tool in the hand of a running loop"},
 };
 
 #define COMMANDS (sizeof(commands) / sizeof(*commands))
+#define ADVANCED "Advanced"
+
+/* The commands in groups: all but the advanced ones, or these. */
+static void list_commands(bool advanced)
+{
+	const char *group = NULL;
+
+	for (size_t i = 0; i < COMMANDS; i++) {
+		char *line;
+
+		group = commands[i].group ? commands[i].group : group;
+		if (advanced != !strcmp(group, ADVANCED))
+			continue;
+		if (commands[i].group)
+			printf("%s%s:\n", advanced ? "" : "\n", group);
+		line = cli_text("  %-11s  %s", commands[i].name, commands[i].does);
+		help_print_text(line, 0, 0);
+		free(line);
+	}
+}
 
 static void help(void)
 {
@@ -68,17 +88,13 @@ static void help(void)
 		"A toolkit for haptic cutting: record, model and render how tissue "
 		"resists a scalpel.",
 		0, 0);
-	printf("\nCommands:\n");
-	for (size_t i = 0; i < COMMANDS; i++) {
-		char *line = cli_text("  %-11s  %s", commands[i].name, commands[i].does);
-
-		help_print_text(line, 0, 0);
-		free(line);
-	}
+	list_commands(false);
 	putchar('\n');
 	help_print_text(
 		"'incise COMMAND --help' lists the options of a command, 'incise "
-		"help COMMAND' opens its manual. New here? Start with 'incise demo'.",
+		"help COMMAND' opens its manual, 'incise help advanced' lists what few "
+		"need: several machines, old recordings, benchmarks. New here? Start with "
+		"'incise demo'.",
 		0, 0);
 }
 
@@ -112,13 +128,21 @@ static int unknown_command(const char *word)
 {
 	const char *names[COMMANDS + 2] = {"help"}, *nearest;
 
+	if (!strcmp(word, "rig")) {
+		cli_error("'rig': is now 'incise info rig'");
+		return 2;
+	}
 	for (size_t i = 0; i < COMMANDS; i++)
 		names[i + 1] = commands[i].name;
 	nearest = incise_nearest_name(word, names);
 	for (size_t i = 0; i < sizeof(synonyms) / sizeof(*synonyms); i++)
 		if (!strcmp(word, synonyms[i][0]))
 			nearest = synonyms[i][1];
-	if (nearest)
+	if (nearest && !strcmp(nearest, word))
+		cli_error("'%s': this incise was built without it; 'make' prints what it "
+			  "needs",
+			  word);
+	else if (nearest)
 		cli_error("'%.64s': no such command; did you mean 'incise %s'?", word,
 			  nearest);
 	else
@@ -304,6 +328,10 @@ int main(int argc, char **argv)
 		return finish();
 	}
 	if (!strcmp(command, "help")) {
+		if (argc == 3 && !strcmp(argv[2], "advanced")) {
+			list_commands(true);
+			return finish();
+		}
 		if (argc > 2)
 			return manual(argv[2], argv[3]);
 		help();

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-only
 /*
  * The integer force model, as the kernel's compiler makes it: the same bits as in a
- * program. Random inputs of trial.h go in, a CRC-32C of all results comes out; a
- * program (tests/vm/guest/fixed_bits.c) computes the same and hands over what it has found:
+ * program. Random inputs of trial.h go in, a CRC-32C of all results comes out; a program
+ * (tests/vm/guest/fixed_bits.c) computes the same and hands over its result:
  *
  *   insmod incise_kunit.ko blob=MODEL.fx count=N seed=S digest=CRC
  *
- * Of each input: the evaluator's output, the force of reaction and plane; 4 s32.
+ * For each input: the evaluator's output, the force of reaction and plane; 4 s32.
  */
 #include <linux/crc32c.h>
 #include <linux/kernel_read_file.h>
@@ -49,7 +49,7 @@ static u32 fixed_digest(const struct incise_fixed *fx, u32 n, u64 state)
 	return ~crc;
 }
 
-/* Its bytes, to be vfree()d; NULL: none were given, or a failure that was reported. */
+/* Its bytes, to be vfree()d; NULL: not given, or a failure that was reported. */
 static u8 *fixed_blob(struct kunit *test, u32 *size)
 {
 	void *bytes = NULL;

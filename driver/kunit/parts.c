@@ -153,7 +153,7 @@ static int parts_read(struct kunit *test, struct property_entry entry,
 	return ret;
 }
 
-/* Of one cell where two are asked for, or the other way round: no default instead. */
+/* A property of one cell in place of two, or the other way round, gets no default. */
 static void parts_properties(struct kunit *test)
 {
 	static const u32 two[] = {0, 5};

@@ -28,7 +28,7 @@
 #include "../compat.h"
 #include "adc.h"
 
-/* What IIO stores of a sample. */
+/* A sample as IIO stores it. */
 struct sim_scan {
 	u16 value;
 	u16 filler[3];
@@ -226,7 +226,7 @@ static int sim_trigger_add(struct sim_adc *adc, struct device *parent)
 
 	/*
 	 * No owner: as the default trigger of a device in the same module it
-	 * would hold the module for ever. Nobody else may use it.
+	 * would hold the module for ever. No other driver may use it.
 	 */
 	trigger = __iio_trigger_alloc(parent, NULL, "%s", INCISE_SIM_TRIGGER);
 	if (!trigger)
@@ -252,7 +252,7 @@ static void sim_trigger_remove(struct sim_adc *adc)
 	iio_trigger_free(adc->trigger);
 }
 
-/* The controller whose plans may have the channel as their source; "": none. */
+/* The controller whose plans may have the channel as their source; "": no controller. */
 static int sim_adc_map(struct sim_adc *adc, const char *controller)
 {
 	adc->map[0] = (struct iio_map)IIO_MAP("voltage0", controller, "position");

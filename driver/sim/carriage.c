@@ -24,7 +24,7 @@ static bool sim_carriage_inverts(const struct sim_carriage *carriage,
 	return carriage->inverted & BIT(which);
 }
 
-/* Is the line active? One that is not there is (nothing disables the motor). */
+/* Is the line active? An absent line is (nothing disables the motor). */
 static bool sim_carriage_active(const struct sim *sim,
 				const struct sim_carriage *carriage,
 				enum sim_carriage_line which)
@@ -161,7 +161,7 @@ static bool sim_carriage_valid(const struct sim_carriage *carriage)
 	return true;
 }
 
-/* Swaps in a carriage (or none), and sets the inputs as its position asks. */
+/* Swaps in a carriage (or removes it), and sets the inputs as its position asks. */
 static void sim_carriage_place(struct sim *sim, unsigned int number,
 			       const struct sim_carriage *carriage)
 {

@@ -27,7 +27,7 @@ static u16 *sim_waveform_at(struct sim_waveform *waveform, u32 index)
 	return &waveform->sample[index & (INCISE_SIM_ADC_WAVEFORM - 1)];
 }
 
-/* The next sample, or false when there is none. */
+/* The next sample, or false without one. */
 static bool sim_waveform_next(struct sim_waveform *waveform, u16 *value)
 {
 	/* acquire: pairs with the release in sim_waveform_write() */

@@ -7,8 +7,8 @@
  *	        tail            head
  *	 .......|###############|.......     what is held: head - tail
  *
- * A full ring loses the newest edges, so that what is read is whole up to the
- * loss; the gap shows in the sequence and is counted.
+ * A full ring loses the newest edges, so that a reading is whole up to the loss; the gap
+ * shows in the sequence and is counted.
  */
 #include <linux/fs.h>
 #include <linux/ktime.h>

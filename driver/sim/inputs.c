@@ -110,7 +110,7 @@ static int sim_script_word(const struct sim *sim, char *word, struct sim_script 
 	}
 }
 
-/* Takes a free place, else the place of one that has fired; EBUSY if none. */
+/* Takes a free place, else the place of a script that has fired; EBUSY without one. */
 static int sim_script_place_locked(struct sim *sim, const struct sim_script *script)
 {
 	int i, place = -1;

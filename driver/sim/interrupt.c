@@ -43,7 +43,7 @@ static void sim_interrupt_deliver(struct irq_work *work)
 		generic_handle_domain_irq(sim->chip.irq.domain, line);
 }
 
-/* Keep all interrupts pending, or deliver what was kept; has come when it returns. */
+/* Keep all interrupts pending, or deliver the kept ones before it returns. */
 void sim_interrupt_hold(struct sim *sim, bool hold)
 {
 	unsigned long flags;
@@ -101,7 +101,7 @@ static int sim_interrupt_type(struct irq_data *data, unsigned int type)
 	raw_spin_lock_irqsave(&sim->lock, flags);
 	__assign_bit(line, sim->rising, type & IRQ_TYPE_EDGE_RISING);
 	__assign_bit(line, sim->falling, type & IRQ_TYPE_EDGE_FALLING);
-	/* An edge from before the new owner asked is none of its business. */
+	/* An edge from before the new owner's request does not concern it. */
 	__clear_bit(line, sim->pending);
 	raw_spin_unlock_irqrestore(&sim->lock, flags);
 	return 0;

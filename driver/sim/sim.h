@@ -169,7 +169,7 @@ struct sim {
 	struct dentry *dir;
 };
 
-/* Those that end in _locked want sim->lock; _files make the files in debugfs. */
+/* Functions that end in _locked want sim->lock; _files make the files in debugfs. */
 /* chip.c */
 int sim_chip_add(struct sim *sim, struct device *parent);
 void sim_chip_remove(struct sim *sim);
@@ -201,7 +201,7 @@ void sim_drive_locked(struct sim *sim, unsigned int line, bool value);
 void sim_settle_locked(struct sim *sim);
 void sim_inputs_files(struct sim *sim);
 
-/* text.c: what people write into debugfs */
+/* text.c: text that people write into debugfs */
 ssize_t sim_text_write(const char __user *from, size_t size,
 		       int (*parse)(void *of, char *text), void *of);
 char *sim_text_word(char **text);

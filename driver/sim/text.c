@@ -62,7 +62,7 @@ char *sim_text_word(char **text)
 	return word;
 }
 
-/* Is it "key=..."? Then @value is what follows. */
+/* Is it "key=..."? Then @value is the rest. */
 bool sim_text_key(char *word, const char *key, char **value)
 {
 	size_t size = strlen(key);

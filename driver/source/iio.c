@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-only
 /*
  * incise_source.ko: positions for a plan from a channel of the IIO subsystem, an encoder's count
- * say. The channel is the one that belongs to the controller: `io-channels` of its firmware node,
+ * say. The channel belongs to the controller: `io-channels` of its firmware node,
  * or an iio_map of the board; exactly one, of a device with a buffer. incise_stepper.ko does
  * without IIO.
  *
@@ -9,8 +9,8 @@
  *                                            └▶ what else reads it
  *
  * The kernel's own callback buffer (CONFIG_IIO_BUFFER_CB) does the same, but distributions leave it
- * out, and it hands on no timestamps. Those are the device's where its clock is CLOCK_MONOTONIC
- * (current_timestamp_clock), else the time at which the sample got here.
+ * out, and it hands on no timestamps. Timestamps are the device's where its clock is
+ * CLOCK_MONOTONIC (current_timestamp_clock), else the time at which the sample got here.
  *
  * The trigger and its rate are set up as for any other use of the device, before LOAD_PLAN.
  */
@@ -116,7 +116,7 @@ static int source_check(struct source *source)
 		       : -EINVAL;
 }
 
-/* The channel, and the timestamp where the device has one of our clock. */
+/* The channel, and the device's timestamp if it is of our clock. */
 static int source_mask(struct source *source)
 {
 	struct iio_dev *iio = source->channels->indio_dev;

@@ -53,11 +53,11 @@
 #define INCISE_STEPPER_MODE_VELOCITY 1 /* target in steps/s */
 #define INCISE_STEPPER_MODE_POSE 2     /* target by the plan; 0 here */
 
-/* Of page 0: the slot of the tube's poses, behind those of the motors. */
+/* In page 0: the slot of the tube's poses, behind the slots of the motors. */
 #define INCISE_STEPPER_SLOT_TUBE INCISE_STEPPER_MOTORS_MAX
 
 /* incise_stepper_pose.tool */
-#define INCISE_STEPPER_POSE_TOOL 0xffU	   /* enum incise_tool: what the hand holds */
+#define INCISE_STEPPER_POSE_TOOL 0xffU	   /* enum incise_tool: the tool in the hand */
 #define INCISE_STEPPER_POSE_FADE (1U << 9) /* let go of the force, while it is set */
 
 /**
@@ -68,9 +68,9 @@
  * @tool: INCISE_STEPPER_POSE_… bits; others are the fault SETPOINT. 0 in the tube's slot
  * @reserved: zero
  *
- * Its time is t_ns of the set-point, of CLOCK_MONOTONIC. One from the future counts as of the tick
- * that takes it; one that is not newer than the last, or beyond 10000 mm, is left out and counted.
- * One that is taken is a sign of life, and so is one that is no pose.
+ * Its time is t_ns of the set-point, of CLOCK_MONOTONIC. A pose from the future counts as of the
+ * tick that takes it; a pose that is not newer than the last, or beyond 10000 mm, is left out and
+ * counted. A pose that is taken is a sign of life, and so is one that is no pose.
  */
 struct incise_stepper_pose {
 	__s32 position[3];
@@ -121,7 +121,7 @@ struct incise_stepper_setpoint {
 };
 
 /* incise_stepper_motor_status.flags */
-/* Position is that of the machine; a stop at once while moving takes it away. */
+/* Position is the machine's; a stop at once while moving takes it away. */
 #define INCISE_STEPPER_FLAG_HOMED (1U << 0)
 #define INCISE_STEPPER_FLAG_HELD (1U << 1)	/* the last set-point was clamped */
 #define INCISE_STEPPER_FLAG_HOME_SEEN (1U << 2) /* home_position is of this enable */
@@ -168,7 +168,7 @@ struct incise_stepper_motor_status {
 	__u64 reserved[3];
 };
 
-/* Of page 1: the slot of the plan's status, in 128 bytes; it is longer. */
+/* In page 1: the slot of the plan's status, in 128 bytes; it is longer. */
 #define INCISE_STEPPER_SLOT_PLAN INCISE_STEPPER_MOTORS_MAX
 
 /* incise_stepper_plan_status.state and .reasons: enum incise_stepper_plan_state and
@@ -372,7 +372,7 @@ struct incise_stepper_config {
 /**
  * struct incise_stepper_origin - names the position at which a motor stands
  * @motor: 0 …
- * @homed: 1: from now on it is that of the machine; 0: it is just a number
+ * @homed: 1: from now on it is the machine's; 0: it is just a number
  * @position: steps, within the motor's position_min … position_max
  *
  * EBUSY while the motor moves. A powered motor at rest takes it as its new target too.
@@ -396,7 +396,7 @@ struct incise_stepper_origin {
  *
  * It has no deadman, as nothing moves by it: it goes on when its owner closes the file, until
  * period_ns is set to 0, the machine reboots or the device is unbound. While the machine
- * sleeps there are no pulses; it goes on in its beat then, and those of meanwhile are missed.
+ * sleeps there are no pulses; it goes on in its beat then, without the pulses of meanwhile.
  */
 struct incise_stepper_sync {
 	__u64 period_ns;
@@ -430,9 +430,9 @@ struct incise_stepper_sync {
  * A controller has one plan. The file is checked in full; after that, a tick takes a bounded time,
  * and no pose makes it overflow. With a source, of an encoder in the IIO subsystem
  * (incise_source.ko, which is to be loaded), poses are made in the kernel: the page's slot of the
- * first motor is set to mode POSE once, and its deadman is kept off by the source. Of the pose in
- * the page only INCISE_STEPPER_POSE_FADE counts then. A tick takes the newest sample; position =
- * origin + direction × scale × sample, samples held to ±2^30, scale within ±1 mm.
+ * first motor is set to mode POSE once, and its deadman is kept off by the source. Only
+ * INCISE_STEPPER_POSE_FADE of the pose in the page counts then. A tick takes the newest sample;
+ * position = origin + direction × scale × sample, samples held to ±2^30, scale within ±1 mm.
  *
  * EBUSY: a motor of the plan, or of the one before, has power, or still comes to rest. EINVAL: the
  * file or a field is not good; EOPNOTSUPP: its version is not known here, or there is no source.
@@ -467,8 +467,8 @@ struct incise_stepper_plan {
 #define INCISE_STEPPER_SET_CONFIG \
 	_IOW(INCISE_STEPPER_IOC, 2, struct incise_stepper_config)
 /*
- * A mask of motors, not 0: all get power or none does, and those that had it keep it. EPERM:
- * a fault is latched; EBUSY: an input forbids it, e-stop say, or it is still coming to rest;
+ * A mask of motors, not 0: all get power or no motor does, and motors that had power keep it.
+ * EPERM: a fault is latched; EBUSY: an input forbids it, e-stop say, or it is still coming to rest;
  * ERANGE: it stands outside of its position limits; ESHUTDOWN: the machine goes down.
  */
 #define INCISE_STEPPER_ENABLE _IOW(INCISE_STEPPER_IOC, 3, __u32)

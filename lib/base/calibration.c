@@ -158,7 +158,7 @@ static void make_printable(char *text)
 }
 
 /*
- * The fault of a record, as words behind the name of its key; NULL: none. For records of a
+ * The fault of a record, as words behind the name of its key; NULL: no fault. For records of a
  * file and for one to be appended.
  */
 static const char *fault(const struct incise_calibration_record *record)
@@ -178,7 +178,7 @@ static const char *fault(const struct incise_calibration_record *record)
 
 		if (!row)
 			return "values: key: expected a key of calibration.conf";
-		/* A failed calibration may be far out, and is kept to be read. */
+		/* A failed calibration may be far out; the file keeps it for readers. */
 		if (!isfinite(value->left) ||
 		    (record->pass &&
 		     !(value->left >= row->min && value->left <= row->max)))
@@ -442,6 +442,20 @@ int incise_calibration_history(const char *path,
 	return rc ? rc : file.n;
 }
 
+const struct incise_calibration_value *incise_calibration_last(
+	const struct incise_calibration_record *records, int n, const char *key,
+	const struct incise_calibration_record **record)
+{
+	while (n--)
+		for (int i = 0; records[n].pass && i < records[n].n; i++)
+			if (!strcmp(records[n].values[i].key, key)) {
+				if (record)
+					*record = &records[n];
+				return &records[n].values[i];
+			}
+	return NULL;
+}
+
 /* --- writing --- */
 
 /* The shortest number that reads back the same; libconfig recognizes floats by their point. */
@@ -471,24 +485,6 @@ static void put_text(const char *key, const char *text, FILE *out)
 	fputc('\n', out);
 }
 
-/* The last calibration that put a key's value in force; NULL: a person did. */
-static const struct incise_calibration_record *origin(const struct file_content *file,
-						      const char *key, double value,
-						      double *u)
-{
-	for (int i = file->n - 1; i >= 0; i--)
-		for (int j = 0; j < file->records[i].n && file->records[i].pass; j++) {
-			const struct incise_calibration_value *v =
-				&file->records[i].values[j];
-
-			if (strcmp(v->key, key))
-				continue;
-			*u = v->u;
-			return v->left == value ? &file->records[i] : NULL;
-		}
-	return NULL;
-}
-
 /*
  * "force_mV_N = 1238.6; ## mV/N, U = 2.4 (k = 2), 2026-11-21": a key with its unit and where it is
  * from. Two signs: it is rewritten.
@@ -497,9 +493,9 @@ static void put_key(const struct file_content *file, const struct incise_setting
 		    const double *value, FILE *out)
 {
 	const int n = (int)(row->size / sizeof(double));
-	double u = 0;
-	const struct incise_calibration_record *from =
-		origin(file, n > 1 ? "tip_x_mm" : row->key, *value, &u);
+	const struct incise_calibration_record *from;
+	const struct incise_calibration_value *last = incise_calibration_last(
+		file->records, file->n, n > 1 ? "tip_x_mm" : row->key, &from);
 
 	fprintf(out, "%s = ", row->key);
 	for (int i = 0; i < n; i++) {
@@ -507,8 +503,9 @@ static void put_key(const struct file_content *file, const struct incise_setting
 		put_number(value[i], out);
 	}
 	fprintf(out, "%s; ## %s", n > 1 ? "]" : "", row->unit);
-	if (from)
-		fprintf(out, ", U = %.2g (k = 2), %s, %.10s", 2 * u, from->kind,
+	/* Else a person wrote it. */
+	if (last && last->left == *value)
+		fprintf(out, ", U = %.2g (k = 2), %s, %.10s", 2 * last->u, from->kind,
 			from->date);
 	fputc('\n', out);
 }
@@ -644,7 +641,7 @@ int incise_calibration_raw(struct incise_calibration_record *record, const char 
 
 /*
  * The lines of comment that a person wrote above the history; ours begin with "##". NULL:
- * no memory. A file that vanishes meanwhile has none.
+ * no memory. A file that vanishes meanwhile has no lines.
  */
 static char *read_notes(const char *path)
 {

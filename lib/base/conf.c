@@ -14,7 +14,7 @@
 
 #define UNIT_LETTERS 3 /* of each part, as in mPa_s */
 
-/* "sim.seed": the setting's name with those of the groups around it. */
+/* "sim.seed": the setting's name behind the names of its groups. */
 static void setting_name(const config_setting_t *setting, const char *key, char *name,
 			 size_t size)
 {
@@ -125,8 +125,8 @@ int incise_conf_error(const config_setting_t *group, const char *key, const char
 }
 
 /*
- * The line of an @include, or 0. They are refused: a configuration is one file, and
- * libconfig's parser ends the process on one that names a folder.
+ * The line of an @include, or 0. The reader refuses includes: a configuration is one
+ * file, and libconfig's parser ends the process on an include of a folder.
  */
 static int include_line(FILE *stream)
 {

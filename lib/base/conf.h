@@ -32,7 +32,7 @@ int incise_conf_error(const config_setting_t *group, const char *key, const char
 int incise_conf_missing(const config_setting_t *group, const char *path, const char *key,
 			struct incise_error *err);
 
-/* The line of a setting, that of its first key for a group in a list. */
+/* The line of a setting; for a group in a list, the line of its first key. */
 int incise_conf_line(const config_setting_t *setting);
 
 #endif

@@ -5,7 +5,7 @@
 #ifndef INCISE_BASE_HEX_H
 #define INCISE_BASE_HEX_H
 
-/* 0 to 15; -1: it is none. */
+/* 0 to 15; -1: no digit. */
 static inline int incise_hex_digit(int c)
 {
 	if (c >= '0' && c <= '9')

@@ -64,7 +64,7 @@ static int check_type(const struct incise_infile *file, const struct stat *st,
 					: "not a regular file or a pipe");
 }
 
-/* Read what there is at once into the buffer: 1, 0 at the end, or a negative errno. */
+/* Read the available bytes into the buffer: 1, 0 at the end, or a negative errno. */
 static int read_some(struct incise_infile *file)
 {
 	ssize_t n = read(file->fd, file->data + file->end, file->capacity - file->end);

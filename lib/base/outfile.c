@@ -97,8 +97,8 @@ struct incise_outfile *incise_outfile_open(const char *path, struct incise_error
 		goto fail;
 	file->path = strdup(path);
 	/*
-	 * A link is written through, not replaced; one that leads nowhere is refused. That of
-	 * /dev/stdout to a pipe has no path, but is there.
+	 * A link is written through, not replaced; a link that leads nowhere is an error.
+	 * /dev/stdout may lead to a pipe, which has no path, but is there.
 	 */
 	exists = !stat(path, &st);
 	file->target = realpath(path, NULL);

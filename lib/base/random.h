@@ -67,7 +67,7 @@ static inline uint64_t incise_random_step(uint64_t *state)
 	return *state = *state * 6364136223846793005ULL + 1442695040888963407ULL;
 }
 
-/* One of 0 … n-1 from such a state. */
+/* A number of 0 … n-1 from such a state. */
 static inline uint32_t incise_random_draw(uint64_t *state, uint32_t n)
 {
 	return (uint32_t)(incise_random_step(state) >> 33) % n;

@@ -209,7 +209,7 @@ static int word_index(const struct incise_setting *row, const char *word)
 	return -1;
 }
 
-/* Whether an index, of a member, is one of a word. */
+/* Whether the index of a member is an index of a word. */
 static bool has_word(const struct incise_setting *row, double index)
 {
 	for (int i = 0; row->words[i]; i++)
@@ -494,7 +494,7 @@ int incise_settings_check(const struct incise_setting *rows, const char *group,
 
 /* --- printing ------------------------------------------------------------------------------ */
 
-/* libconfig wants the numbers of an array all whole, or none. */
+/* In libconfig either all numbers of an array are whole, or no number is. */
 static void numbers_text(const struct incise_setting *row, const void *of, char *text,
 			 size_t size)
 {
@@ -534,7 +534,7 @@ void incise_setting_quoted(const char *from, char *text, size_t size)
 	text[length] = '\0';
 }
 
-/* A value that no file can set is none, where the default is none. */
+/* A value that no file can set is no value, if the key has no default. */
 static bool is_none(const struct incise_setting *row, const void *of)
 {
 	struct value value;

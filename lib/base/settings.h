@@ -47,8 +47,8 @@ struct incise_setting {
 	const char *unit; /* or "" */
 	double min, max;  /* of each number */
 	/*
-	 * As a file has it. In parentheses: it is none, in words for the page, or what the owner
-	 * makes of 0; SETTING_REQUIRED: the key must be there.
+	 * As a file has it. In parentheses: no value: in words for the page, or the owner's meaning of
+	 * 0; SETTING_REQUIRED: the key must be there.
 	 */
 	const char *initial;
 	const char *help; /* for the page: one sentence, plain text in UTF-8 */
@@ -116,12 +116,12 @@ struct incise_setting {
 #key, SETTING_IS_OWN, unit, 0, 0, initial, help, __VA_ARGS__ \
 	}
 
-/* Set the members of all rows that have a default, those of groups too. */
+/* Set the members of all rows that have a default, also in groups. */
 void incise_settings_init(const struct incise_setting *rows, void *to);
 
 /*
  * Read a group of a file, strictly: every key has a row, and every value its kind and range. NULL:
- * nothing. Returns 0; -EINVAL, -ENOMEM or what a .read returns; then some members are set.
+ * nothing. Returns 0; -EINVAL, -ENOMEM or the errno of a .read; then some members are set.
  */
 int incise_settings_read(const struct incise_setting *rows, const config_setting_t *group,
 			 const char *path, void *to, struct incise_error *err);
@@ -135,7 +135,7 @@ int incise_settings_set(const struct incise_setting *rows, const char *group,
 			const char *key, const char *text, void *to,
 			struct incise_error *err);
 
-/* Whether all members are within what a file may set. Returns 0 or -EINVAL. */
+/* Whether all members are values that a file may set. Returns 0 or -EINVAL. */
 int incise_settings_check(const struct incise_setting *rows, const char *group,
 			  const void *of, struct incise_error *err);
 
@@ -152,7 +152,7 @@ struct incise_settings_list {
 
 /*
  * List a table: for each row but groups, the key as PREFIX.KEY, and its value in @of, or of a row of the
- * owner as @group has it; the key is given where @group, NULL for none, has it.
+ * owner as @group has it; the key is given if @group (or NULL) has it.
  */
 void incise_settings_list(struct incise_settings_list *list,
 			  const struct incise_setting *rows, const void *of,
@@ -164,7 +164,7 @@ void incise_settings_put(struct incise_settings_list *list,
 			 const config_setting_t *setting, const char *prefix,
 			 const char *name, const char *text);
 
-/* The value as a file has it; "" where it is none. */
+/* The value as a file has it; "" without a value. */
 void incise_setting_text(const struct incise_setting *row, const void *of, char *text,
 			 size_t size);
 

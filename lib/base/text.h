@@ -36,7 +36,7 @@ bool text_next_line(struct text *text);
 /* The whole word is a finite decimal number, read correctly rounded. */
 bool text_number(const char *word, size_t length, double *value);
 
-/* The word's begin is a whole number of at most ten digits; returns what follows or NULL. */
+/* Whether a word begins with a whole number of at most ten digits: its rest, or NULL. */
 const char *text_integer(const char *word, const char *end, long long *value);
 
 /* An error at the present line: "path:line: …". Returns -EINVAL. */

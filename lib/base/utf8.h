@@ -42,4 +42,23 @@ static inline int utf8_printable(const char *text)
 	return (unsigned char)*text < ' ' || *text == 0x7f ? 0 : utf8_length(text);
 }
 
+/*
+ * Copy a text without its NUL: '?' for a byte of what may not be shown, and a backslash before each byte that
+ * is @quoted. Returns behind the last byte.
+ */
+static inline char *utf8_copy_printable(char *to, const char *text, const char *quoted)
+{
+	while (*text) {
+		int length = utf8_printable(text);
+
+		if (strchr(quoted, *text))
+			*to++ = '\\';
+		*to++ = length ? *text : '?';
+		text++;
+		for (int i = 1; i < length; i++)
+			*to++ = *text++;
+	}
+	return to;
+}
+
 #endif

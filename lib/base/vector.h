@@ -51,8 +51,8 @@ static inline bool v3_finite(const double a[3])
 }
 
 /*
- * Make a unit vector of one that is longer than @least; else leave @to as it is, and
- * return false.
+ * Make a unit vector of a vector longer than @least; else leave @to as it is, and return
+ * false.
  */
 static inline bool v3_unit(double to[3], const double a[3], double least)
 {

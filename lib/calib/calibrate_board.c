@@ -370,18 +370,24 @@ static void find_scale(const struct incise_board_views *views, const struct solu
 	board_rotation(state.pose, r);
 	fit->distance_mm = r[6] * middle[0] + r[7] * middle[1] + state.pose[5];
 	gradient(views, s, &state, -1, g);
-	fit->part[0] =
-		(struct incise_depth_part){"corners, through lens and pose", 'A',
-					   sqrt(fmax(0, variance(s, g, g))), "mm/px", 1};
-	fit->part[1] = (struct incise_depth_part){"squares of the board", 'B',
-						  views->u_square_mm, "mm",
-						  fit->mm_px / views->square_mm};
-	fit->part[2] = (struct incise_depth_part){"board off the cutting plane", 'B',
-						  views->u_plane_mm, "mm",
-						  fit->mm_px / fit->distance_mm};
-	fit->n_parts = 3;
-	for (int i = 0; i < 3; i++)
-		sum += pow(fit->part[i].u * fit->part[i].sensitivity, 2);
+	fit->budget = (struct incise_calibration_budget){
+		.n = 3,
+		.part =
+			{
+				{"corners, through lens and pose", 'A',
+				 sqrt(fmax(0, variance(s, g, g))), "mm/px", 1},
+				{"squares of the board", 'B', views->u_square_mm, "mm",
+				 fit->mm_px / views->square_mm},
+				{"board off the cutting plane", 'B', views->u_plane_mm,
+				 "mm", fit->mm_px / fit->distance_mm},
+			},
+	};
+	for (int i = 0; i < 3; i++) {
+		struct incise_calibration_part *part = &fit->budget.part[i];
+
+		part->contribution = part->u * part->sensitivity;
+		sum += part->contribution * part->contribution;
+	}
 	fit->u_mm_px = sqrt(sum);
 	find_tilt(views, s, &state, fit);
 	find_change(views, &state, fit);

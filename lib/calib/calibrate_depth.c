@@ -100,19 +100,22 @@ static double repeats_u(const double *residual, int n, int fitted, int *effectiv
 #define MEDIANS_MAX 2000 /* pairs in the repeated median; its time is their square */
 #define ROUNDS 20
 
-static void add_part(struct incise_depth_fit *fit, const char *name, char type, double u,
-		     const char *unit, double sensitivity)
+static void add_part(struct incise_depth_fit *fit, const char *source, char type,
+		     double u, const char *unit, double sensitivity)
 {
-	fit->part[fit->n_parts++] =
-		(struct incise_depth_part){name, type, u, unit, sensitivity};
+	fit->budget.part[fit->budget.n++] = (struct incise_calibration_part){
+		source, type, u, unit, sensitivity, u * sensitivity};
 }
 
-static double budget(const struct incise_depth_part *part, int n)
+static double sum_parts(const struct incise_calibration_budget *budget)
 {
 	double sum = 0;
 
-	for (int i = 0; i < n; i++)
-		sum += part[i].u * part[i].sensitivity * part[i].u * part[i].sensitivity;
+	for (int i = 0; i < budget->n; i++) {
+		const struct incise_calibration_part *part = &budget->part[i];
+
+		sum += part->u * part->sensitivity * part->u * part->sensitivity;
+	}
 	return sqrt(sum);
 }
 
@@ -215,7 +218,7 @@ int incise_calibrate_depth_points(const struct incise_depth_points *points, bool
 	add_part(fit, "ends of the length, in all repeats", 'B', points->u_px, "px",
 		 -fit->mm_px / mean);
 	add_part(fit, "repeatability", 'A', u_mean, "px", -fit->mm_px / mean);
-	fit->u_mm_px = budget(fit->part, fit->n_parts);
+	fit->u_mm_px = sum_parts(&fit->budget);
 	fit->u_full_px = hypot(points->u_px, u_mean);
 	fit->covariance = -fit->mm_px / mean * fit->u_full_px * fit->u_full_px;
 	rc = check_scale(fit->mm_px, err);
@@ -444,7 +447,7 @@ static int fit_pairs(const struct incise_depth_lengths *p, bool *near, double *r
 	fit->full_px = mean_px + line.middle_mm / fit->mm_px;
 	add_part(fit, "scatter about the line", 'A', u_slope, "mm/px", 1);
 	add_part(fit, "scale of the gauge", 'B', p->u_scale, "1", fit->mm_px);
-	fit->u_mm_px = budget(fit->part, fit->n_parts);
+	fit->u_mm_px = sum_parts(&fit->budget);
 	/* full = middle + depth there / slope; a gauge's scale cancels but for the depth of
 	 * the middle, where its zero is. */
 	zero = hypot(u_middle, p->u_depth_mm) / fit->mm_px;

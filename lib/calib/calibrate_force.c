@@ -16,6 +16,8 @@ struct load {
 	double F_N;
 	double mean_mV; /* of the readings used */
 	int n;
+	/* Of the line: variance of the mean by scatter, common error, and weight. */
+	double own2, common_mV, weight;
 };
 
 struct work {
@@ -141,24 +143,27 @@ static void measure_scatter(const struct work *w, struct incise_calibrate_force 
 	result->scatter_sd_mV = sqrt(squares / result->freedom);
 }
 
-/* Error common to all readings of a load, mV: its weight, and a code without noise. */
-static double common_mV(const struct work *w, const struct load *load, double slope,
-			double code_u_mV)
+/* A load's readings share the error of its weight, and a code without noise. */
+static void weigh_loads(struct work *w, double slope, double code_u_mV,
+			double scatter_sd_mV)
 {
-	return hypot(load->F_N > 0 ? slope * w->load_u_N : 0, code_u_mV);
+	for (int k = 0; k < w->n_loads; k++) {
+		struct load *load = &w->loads[k];
+
+		load->own2 = scatter_sd_mV * scatter_sd_mV / load->n;
+		load->common_mV =
+			hypot(load->F_N > 0 ? slope * w->load_u_N : 0, code_u_mV);
+		/* data without any scatter weigh alike */
+		load->weight =
+			1 / (load->own2 + load->common_mV * load->common_mV + 1e-12);
+	}
 }
 
 static void add_part(struct incise_calibrate_force *result, const char *source, char type,
 		     double u, const char *unit, double u_mV_N)
 {
-	struct incise_calibrate_force_part *part = &result->part[result->parts++];
-
-	snprintf(part->source, sizeof(part->source), "%s", source);
-	snprintf(part->unit, sizeof(part->unit), "%s", unit);
-	part->type = type;
-	part->u = u;
-	part->u_mV_N = u_mV_N;
-	part->sensitivity = u > 0 ? u_mV_N / u : 0;
+	result->budget.part[result->budget.n++] = (struct incise_calibration_part){
+		source, type, u, unit, u > 0 ? u_mV_N / u : 0, u_mV_N};
 }
 
 /* Sources that turn all loads alike. */
@@ -196,45 +201,34 @@ static void fit_line(struct work *w, struct incise_calibrate_force *result)
 		double sxy = 0;
 
 		sw = mx = my = sxx = 0;
-		for (int pass = 0; pass < 2; pass++)
-			for (int k = 0; k < w->n_loads; k++) {
-				const struct load *load = &w->loads[k];
-				double own2 = result->scatter_sd_mV *
-					      result->scatter_sd_mV / load->n;
-				double common = common_mV(w, load, slope, code_u_mV);
-				/* data without any scatter weigh alike */
-				double weight = 1 / (own2 + common * common + 1e-12);
+		weigh_loads(w, slope, code_u_mV, result->scatter_sd_mV);
+		for (int k = 0; k < w->n_loads; k++) {
+			sw += w->loads[k].weight;
+			mx += w->loads[k].weight * w->loads[k].F_N;
+			my += w->loads[k].weight * w->loads[k].mean_mV;
+		}
+		mx /= sw;
+		my /= sw;
+		for (int k = 0; k < w->n_loads; k++) {
+			const struct load *load = &w->loads[k];
 
-				if (!pass) {
-					sw += weight;
-					mx += weight * load->F_N;
-					my += weight * load->mean_mV;
-				} else {
-					sxx += weight * (load->F_N - mx) *
-					       (load->F_N - mx);
-					sxy += weight * (load->F_N - mx) *
-					       (load->mean_mV - my);
-				}
-				if (!pass && k == w->n_loads - 1) {
-					mx /= sw;
-					my /= sw;
-				}
-			}
+			sxx += load->weight * (load->F_N - mx) * (load->F_N - mx);
+			sxy += load->weight * (load->F_N - mx) * (load->mean_mV - my);
+		}
 		slope = sxy / sxx;
 		zero = my - slope * mx;
 	}
+	weigh_loads(w, slope, code_u_mV, result->scatter_sd_mV);
 	for (int k = 0; k < w->n_loads; k++) {
 		const struct load *load = &w->loads[k];
-		double own2 = result->scatter_sd_mV * result->scatter_sd_mV / load->n;
-		double common = common_mV(w, load, slope, code_u_mV);
-		double weight = 1 / (own2 + common * common + 1e-12);
-		double c = weight * (load->F_N - mx) / sxx;
+		double c = load->weight * (load->F_N - mx) / sxx;
 		double r = load->mean_mV - zero - slope * load->F_N;
 
-		chi2 += weight * r * r;
-		scatter2 += c * c * own2;
+		chi2 += load->weight * r * r;
+		scatter2 += c * c * load->own2;
 		code2 += c * c * code_u_mV * code_u_mV;
-		scale2 += c * c * (common * common - code_u_mV * code_u_mV);
+		scale2 += c * c *
+			  (load->common_mV * load->common_mV - code_u_mV * code_u_mV);
 	}
 	result->loads = w->n_loads;
 	result->sensitivity_mV_N = slope;
@@ -251,8 +245,9 @@ static void fit_line(struct work *w, struct incise_calibrate_force *result)
 		add_part(result, "resolution of the converter", 'B', code_u_mV, "mV",
 			 sqrt(code2));
 	add_common(w, result);
-	for (int i = 0; i < result->parts; i++)
-		u2 += result->part[i].u_mV_N * result->part[i].u_mV_N;
+	for (int i = 0; i < result->budget.n; i++)
+		u2 += result->budget.part[i].contribution *
+		      result->budget.part[i].contribution;
 	result->sensitivity_u_mV_N = sqrt(u2);
 	/* The line alone counts: an error common to all loads does not move the zero. */
 	double line2 = scatter2 + scale2 + code2;

@@ -780,13 +780,8 @@ static void measure_bends(const struct work *w, struct incise_calibrate_stepper 
 static void add_part(struct incise_calibrate_stepper *result, const char *source,
 		     char type, double u, const char *unit, double u_N_step)
 {
-	struct incise_calibrate_stepper_part *part = &result->part[result->parts++];
-
-	snprintf(part->source, sizeof(part->source), "%s", source);
-	snprintf(part->unit, sizeof(part->unit), "%s", unit);
-	part->type = type;
-	part->u = u;
-	part->u_N_step = u_N_step;
+	result->budget.part[result->budget.n++] = (struct incise_calibration_part){
+		source, type, u, unit, u > 0 ? u_N_step / u : 0, u_N_step};
 	result->N_step_u = hypot(result->N_step_u, u_N_step);
 }
 

@@ -12,14 +12,18 @@
 #include "../base/vector.h"
 #include "dense.h"
 
-/* The poses as the fit has them. */
+/* A pose as the fit has it. */
+struct pose {
+	double p[3];	    /* mm */
+	double r[9];	    /* rotation, row by row */
+	double residual[3]; /* mm, of the last tip_residuals() */
+	double square;	    /* its length squared */
+	bool in;
+};
+
 struct tip_poses {
 	int n;
-	double (*p)[3];	       /* mm */
-	double (*r)[9];	       /* rotation, row by row */
-	double (*residual)[3]; /* mm, of the last tip_residuals() */
-	double *square;	       /* its length squared */
-	bool *in;
+	struct pose *pose;
 	int *list;	/* scratch: n indices */
 	double *sorted; /* scratch: n */
 };
@@ -69,17 +73,17 @@ static bool tip_solve(const struct tip_poses *poses, const int *list, int n,
 		int at = list ? list[i] : i;
 
 		for (int k = 0; k < 3; k++)
-			mean_p[k] += poses->p[at][k] / n;
+			mean_p[k] += poses->pose[at].p[k] / n;
 		for (int k = 0; k < 9; k++)
-			s->mean_r[k] += poses->r[at][k] / n;
+			s->mean_r[k] += poses->pose[at].r[k] / n;
 	}
 	for (int i = 0; i < n; i++) {
 		int at = list ? list[i] : i;
 		double d[9], dp[3], part[3];
 
 		for (int k = 0; k < 9; k++)
-			d[k] = poses->r[at][k] - s->mean_r[k];
-		v3_sub(dp, poses->p[at], mean_p);
+			d[k] = poses->pose[at].r[k] - s->mean_r[k];
+		v3_sub(dp, poses->pose[at].p, mean_p);
 		turn_back(part, d, dp);
 		v3_add(right, right, -1.0 / n, part);
 		/* not I - R̄ᵀR̄, which would cancel where they turn little */
@@ -106,12 +110,12 @@ static bool tip_solve(const struct tip_poses *poses, const int *list, int n,
 static void tip_residuals(struct tip_poses *poses, const struct tip_solution *s)
 {
 	for (int i = 0; i < poses->n; i++) {
-		double *r = poses->residual[i];
+		double *r = poses->pose[i].residual;
 
-		tip_turn(r, poses->r[i], s->t);
-		v3_add(r, r, 1, poses->p[i]);
+		tip_turn(r, poses->pose[i].r, s->t);
+		v3_add(r, r, 1, poses->pose[i].p);
 		v3_sub(r, r, s->c);
-		poses->square[i] = v3_dot(r, r);
+		poses->pose[i].square = v3_dot(r, r);
 	}
 }
 
@@ -138,7 +142,8 @@ static void tip_residuals(struct tip_poses *poses, const struct tip_solution *s)
 
 static double quantile(struct tip_poses *sample, int at)
 {
-	memcpy(sample->sorted, sample->square, (size_t)sample->n * sizeof(double));
+	for (int i = 0; i < sample->n; i++)
+		sample->sorted[i] = sample->pose[i].square;
 	qsort(sample->sorted, (size_t)sample->n, sizeof(double), ascending);
 	return sample->sorted[at];
 }
@@ -156,9 +161,9 @@ static double concentrate(struct tip_poses *sample, struct tip_solution *s, int 
 		limit = quantile(sample, h - 1);
 		sum = 0;
 		for (int i = 0; i < sample->n; i++)
-			if (sample->square[i] <= limit) {
+			if (sample->pose[i].square <= limit) {
 				sample->list[n++] = i;
-				sum += sample->square[i];
+				sum += sample->pose[i].square;
 			}
 		if (!tip_solve(sample, sample->list, n, s))
 			return HUGE_VAL;
@@ -211,7 +216,7 @@ static int tip_listed(const struct tip_poses *poses)
 	int n = 0;
 
 	for (int i = 0; i < poses->n; i++)
-		if (poses->in[i])
+		if (poses->pose[i].in)
 			poses->list[n++] = i;
 	return n;
 }
@@ -221,29 +226,20 @@ static bool tip_robust(struct tip_poses *poses, struct tip_solution *solution)
 {
 	int m = poses->n < SAMPLE_MAX ? poses->n : SAMPLE_MAX;
 	struct tip_poses sample = *poses; /* shares the scratch of the whole */
-	double(*p)[3] = poses->p, (*r)[9] = poses->r;
 	bool whole = m == poses->n, changed = true;
 	int n;
 
 	if (!tip_solve(poses, NULL, poses->n, solution))
 		return false;
-	if (!whole) {
-		sample.p = malloc((size_t)m * sizeof(*p));
-		sample.r = malloc((size_t)m * sizeof(*r));
-	}
+	if (!whole)
+		sample.pose = malloc((size_t)m * sizeof(*sample.pose));
 	sample.n = m;
-	for (int i = 0; !whole && sample.p && sample.r && i < m; i++) {
-		int from = (int)((int64_t)i * poses->n / m);
-
-		memcpy(sample.p[i], p[from], sizeof(*p));
-		memcpy(sample.r[i], r[from], sizeof(*r));
-	}
-	if (sample.p && sample.r)
+	for (int i = 0; !whole && sample.pose && i < m; i++)
+		sample.pose[i] = poses->pose[(int64_t)i * poses->n / m];
+	if (sample.pose)
 		search(&sample, solution);
-	if (!whole) {
-		free(sample.p);
-		free(sample.r);
-	}
+	if (!whole)
+		free(sample.pose);
 	for (int step = 0; step < STEPS && changed; step++) {
 		double scale, limit;
 
@@ -253,10 +249,10 @@ static bool tip_robust(struct tip_poses *poses, struct tip_solution *solution)
 		limit = FAR * scale + 1e-9;
 		changed = !step;
 		for (int i = 0; i < poses->n; i++) {
-			bool in = poses->square[i] <= limit * limit;
+			bool in = poses->pose[i].square <= limit * limit;
 
-			changed |= in != poses->in[i];
-			poses->in[i] = in;
+			changed |= in != poses->pose[i].in;
+			poses->pose[i].in = in;
 		}
 		n = tip_listed(poses);
 		if (!tip_solve(poses, poses->list, n, solution))
@@ -283,7 +279,7 @@ static double swept_deg(const struct tip_poses *poses, int n, const double axis[
 	if (!to)
 		return 0;
 	for (int i = 0; i < n; i += stride)
-		tip_turn(to[m++], poses->r[poses->list[i]], axis);
+		tip_turn(to[m++], poses->pose[poses->list[i]].r, axis);
 	for (int i = 0; i < m; i++)
 		for (int j = 0; j < i; j++)
 			least = fmin(least, v3_dot(to[i], to[j]));
@@ -322,15 +318,15 @@ static double time_of(const struct tip_poses *poses, int n)
 	double zero = 0, time = 1, noise = 3 / sqrt(3.0 * n);
 
 	for (int i = 0; i < n; i++)
-		zero += poses->square[poses->list[i]];
+		zero += poses->pose[poses->list[i]].square;
 	if (zero < n * ROUNDING_MM * ROUNDING_MM)
 		return 1;
 	for (int lag = 1; lag <= n / 10; lag++) {
 		double sum = 0;
 
 		for (int i = lag; i < n; i++)
-			sum += v3_dot(poses->residual[poses->list[i]],
-				      poses->residual[poses->list[i - lag]]);
+			sum += v3_dot(poses->pose[poses->list[i]].residual,
+				      poses->pose[poses->list[i - lag]].residual);
 		if (sum / zero < noise)
 			break;
 		time += 2 * sum / zero;
@@ -374,7 +370,7 @@ static void score_rows(double rows[3][6], const struct tip_poses *poses, int at,
 {
 	for (int e = 0; e < 3; e++)
 		for (int k = 0; k < 3; k++) {
-			rows[e][k] = poses->r[at][3 * e + k] - s->mean_r[3 * e + k];
+			rows[e][k] = poses->pose[at].r[3 * e + k] - s->mean_r[3 * e + k];
 			rows[e][3 + k] = e == k ? -u : 0;
 		}
 }
@@ -386,7 +382,7 @@ static bool correct(struct tip_poses *poses, int n, const double *u,
 	int m = w->m;
 
 	for (int i = 0; i < n; i++) {
-		const double *r = poses->residual[poses->list[i]];
+		const double *r = poses->pose[poses->list[i]].residual;
 		double rows[3][6];
 
 		score_rows(rows, poses, poses->list[i], s, u[i]);
@@ -401,13 +397,13 @@ static bool correct(struct tip_poses *poses, int n, const double *u,
 		return false;
 	incise_cholesky_solve(w->left, m, w->x);
 	for (int i = 0; i < n; i++) {
-		double *r = poses->residual[poses->list[i]], rows[3][6];
+		double *r = poses->pose[poses->list[i]].residual, rows[3][6];
 
 		score_rows(rows, poses, poses->list[i], s, u[i]);
 		for (int e = 0; e < 3; e++)
 			for (int a = 0; a < m; a++)
 				r[e] += rows[e][a] * w->x[a];
-		poses->square[poses->list[i]] = v3_dot(r, r);
+		poses->pose[poses->list[i]].square = v3_dot(r, r);
 	}
 	return true;
 }
@@ -420,7 +416,7 @@ static void sandwich(const struct tip_poses *poses, int n, const double *u,
 	double sum[6] = {0};
 
 	for (int i = 0; i < n; i++) {
-		const double *r = poses->residual[poses->list[i]];
+		const double *r = poses->pose[poses->list[i]].residual;
 		double rows[3][6];
 
 		score_rows(rows, poses, poses->list[i], s, u[i]);
@@ -510,7 +506,7 @@ static bool outliers_at_end(const struct tip_poses *poses)
 	int outliers = 0, late = 0;
 
 	for (int i = 0; i < poses->n; i++)
-		if (!poses->in[i]) {
+		if (!poses->pose[i].in) {
 			outliers++;
 			late += i >= poses->n / 2;
 		}
@@ -613,39 +609,10 @@ static int take(struct tip_poses *to, const struct incise_tip_pose *from,
 						"%.3g, not 1; check the order of the "
 						"columns",
 						i + 1, length);
-		v3_copy(to->p[i], from[i].position_mm);
-		rotation(to->r[i], q);
+		v3_copy(to->pose[i].p, from[i].position_mm);
+		rotation(to->pose[i].r, q);
 	}
 	return 0;
-}
-
-static void release(struct tip_poses *poses)
-{
-	free(poses->p);
-	free(poses->r);
-	free(poses->residual);
-	free(poses->square);
-	free(poses->in);
-	free(poses->list);
-	free(poses->sorted);
-}
-
-static bool allocate(struct tip_poses *poses, int n)
-{
-	size_t size = (size_t)n;
-
-	*poses = (struct tip_poses){
-		.n = n,
-		.p = malloc(size * sizeof(*poses->p)),
-		.r = malloc(size * sizeof(*poses->r)),
-		.residual = malloc(size * sizeof(*poses->residual)),
-		.square = malloc(size * sizeof(*poses->square)),
-		.in = calloc(size, sizeof(*poses->in)),
-		.list = malloc(size * sizeof(*poses->list)),
-		.sorted = malloc(size * sizeof(*poses->sorted)),
-	};
-	return poses->p && poses->r && poses->residual && poses->square && poses->in &&
-	       poses->list && poses->sorted;
 }
 
 /* Each half's residuals under the fit of the other; blocks of 1/20 take turns. */
@@ -670,7 +637,7 @@ static double held_out(struct tip_poses *poses, int n)
 		tip_residuals(poses, &s);
 		for (int i = 0; i < n; i++)
 			if (i / length % 2 != side)
-				sum += poses->square[poses->list[i]];
+				sum += poses->pose[poses->list[i]].square;
 	}
 	free(half);
 	return sqrt(sum / n);
@@ -692,9 +659,9 @@ static int fit_poses(struct tip_poses *poses, const struct incise_tip_pose *give
 	v3_copy(fit->tip_mm, s.t);
 	v3_copy(fit->pivot_mm, s.c);
 	for (int i = 0; i < n; i++) {
-		sum += poses->square[poses->list[i]];
+		sum += poses->pose[poses->list[i]].square;
 		fit->largest_mm =
-			fmax(fit->largest_mm, sqrt(poses->square[poses->list[i]]));
+			fmax(fit->largest_mm, sqrt(poses->pose[poses->list[i]].square));
 	}
 	fit->rms_mm = sqrt(sum / n);
 	tip_motion(poses, n, &s, fit);
@@ -726,7 +693,7 @@ static int fit_poses(struct tip_poses *poses, const struct incise_tip_pose *give
 int incise_calibrate_tip(const struct incise_tip_pose *poses, int n, bool *inlier,
 			 struct incise_tip_fit *fit, struct incise_error *err)
 {
-	struct tip_poses own;
+	struct tip_poses own = {.n = n};
 	int rc;
 
 	*fit = (struct incise_tip_fit){.n = n};
@@ -737,12 +704,18 @@ int incise_calibrate_tip(const struct incise_tip_pose *poses, int n, bool *inlie
 					"%d poses are too few, at least %d are "
 					"required; rotate the tool longer",
 					n, INCISE_TIP_POSES_MIN);
-	rc = allocate(&own, n) ? take(&own, poses, err)
-			       : incise_error_set(err, ENOMEM, "out of memory");
+	own.pose = calloc((size_t)n, sizeof(*own.pose));
+	own.list = malloc((size_t)n * sizeof(*own.list));
+	own.sorted = malloc((size_t)n * sizeof(*own.sorted));
+	rc = own.pose && own.list && own.sorted
+		     ? take(&own, poses, err)
+		     : incise_error_set(err, ENOMEM, "out of memory");
 	if (!rc)
 		rc = fit_poses(&own, poses, fit, err);
-	if (inlier && own.in)
-		memcpy(inlier, own.in, (size_t)n * sizeof(*inlier));
-	release(&own);
+	for (int i = 0; inlier && own.pose && i < n; i++)
+		inlier[i] = own.pose[i].in;
+	free(own.pose);
+	free(own.list);
+	free(own.sorted);
 	return rc;
 }

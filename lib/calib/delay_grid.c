@@ -201,35 +201,29 @@ static void make_speed(struct delay_grid *grid)
 
 static bool allocate(struct delay_grid *grid)
 {
-	size_t size = (size_t)grid->n * sizeof(double);
-	bool all = true;
+	const size_t n = (size_t)grid->n;
+	double *values = malloc((5 + DELAY_COLUMNS) * n * sizeof(*values));
 
-	grid->motion = malloc(size);
-	grid->speed = malloc(size);
-	grid->other = malloc(size);
-	grid->target = malloc(size);
-	grid->scratch = malloc(size);
-	grid->good = malloc((size_t)grid->n * sizeof(*grid->good));
-	for (int k = 0; k < DELAY_COLUMNS; k++) {
-		grid->column[k] = malloc(size);
-		all &= grid->column[k] != NULL;
-	}
+	grid->values = values;
+	grid->good = malloc(n * sizeof(*grid->good));
 	grid->weight = malloc((size_t)(2 * grid->reach + 1) * sizeof(double));
-	return all && grid->motion && grid->speed && grid->other && grid->target &&
-	       grid->scratch && grid->good && grid->weight;
+	if (!values || !grid->good || !grid->weight)
+		return false;
+	grid->motion = values;
+	grid->speed = values + n;
+	grid->other = values + 2 * n;
+	grid->target = values + 3 * n;
+	grid->scratch = values + 4 * n;
+	for (int k = 0; k < DELAY_COLUMNS; k++)
+		grid->column[k] = values + (5 + k) * n;
+	return true;
 }
 
 void delay_grid_free(struct delay_grid *grid)
 {
-	free(grid->motion);
-	free(grid->speed);
-	free(grid->other);
-	free(grid->target);
-	free(grid->scratch);
+	free(grid->values);
 	free(grid->good);
 	free(grid->weight);
-	for (int k = 0; k < DELAY_COLUMNS; k++)
-		free(grid->column[k]);
 }
 
 int delay_grid_make(struct delay_grid *grid, const struct incise_delay_point *motion,

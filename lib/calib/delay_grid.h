@@ -16,6 +16,7 @@
 struct delay_grid {
 	int n;
 	int64_t start_ns;
+	double *values; /* the block that holds all of them */
 	double *motion, *speed, *other;
 	double *target; /* the other's derivative, filtered */
 	bool *good;	/* rows of the target that rest on known values alone */

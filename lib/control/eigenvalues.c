@@ -83,8 +83,8 @@ static void reflect(double *a, int n, int lo, int hi, int k, const double v[3])
 }
 
 /*
- * Two shifts at once: @middle ± √@root2. What is near a shift is taken from it first, so that blocks whose eigenvalues
- * are all one go on, too.
+ * Two shifts at once: @middle ± √@root2. Numbers near a shift are subtracted from it first, so that blocks of equal
+ * eigenvalues go on, too.
  */
 struct shifts {
 	double middle, root2;
@@ -110,8 +110,10 @@ static void step(double *a, int n, int lo, int hi, struct shifts by)
 	}
 }
 
-/* The row where the block that ends in @hi begins: below the diagonal nothing counts that is small beside it, or beside
- * @least, as of poses on their way, whose diagonal is none. */
+/*
+ * The row where the block that ends in @hi begins. A number below the diagonal counts as 0 if it is small beside
+ * that, or @least: that of poses on their way is 0.
+ */
 static int begin_of(double *a, int n, int hi, double least)
 {
 	for (int lo = hi; lo > 0; lo--) {
@@ -126,8 +128,8 @@ static int begin_of(double *a, int n, int hi, double least)
 }
 
 /*
- * Rows and columns of a block of one size: one whose eigenvalues are near 0, but not what is above them, takes no end of
- * steps else. After Parlett and Reinsch, Balancing a matrix for calculation of eigenvalues and eigenvectors, 1969.
+ * Rows and columns of a block of one size: else a block with eigenvalues near 0 under large elements takes no end of
+ * steps. After Parlett and Reinsch, Balancing a matrix for calculation of eigenvalues and eigenvectors, 1969.
  */
 static void balance(double *a, int n, int lo, int hi)
 {
@@ -159,7 +161,7 @@ static struct shifts last_two(const double *a, int n, int hi)
 
 bool incise_eigenvalues(double *a, int n, double complex eigenvalue[])
 {
-	double most = 0; /* more of it, for what takes long */
+	double most = 0; /* more of it, for slow blocks */
 	int steps = 0;
 
 	for (int i = 0; i < n * n; i++) {
@@ -189,7 +191,7 @@ bool incise_eigenvalues(double *a, int n, double complex eigenvalue[])
 		}
 		if (++steps > STEPS_MOST)
 			return false;
-		/* Of two that are real the nearer one twice, as LAPACK does: both may go round in a circle. */
+		/* If two are real, the nearer one twice, as LAPACK does: both may go round in a circle. */
 		if (by.root2 >= 0)
 			by = (struct shifts){by.middle + copysign(creal(root),
 								  AT(hi, hi) - by.middle),
@@ -206,7 +208,7 @@ bool incise_eigenvalues(double *a, int n, double complex eigenvalue[])
 	return true;
 }
 
-/* Solve a x = x, with the largest pivot of each column; one of 0 is as small as rounding. */
+/* Solve a x = x, with the largest pivot of each column; a pivot of 0 becomes as small as rounding. */
 static void solve(double *a, int n, double x[])
 {
 	for (int m = 0; m < n; m++) {

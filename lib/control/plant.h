@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * A mass with friction in front of a wall, without a time step of its own: what a haptic
- * device does under a force that is held, to rounding. For simulators and benches.
+ * A mass with friction in front of a wall, without a time step of its own: the motion of a haptic device
+ * under a held force, to rounding. For simulators and benches.
  *
  *            held force ──▶ ┌──────┐
  *   wall ▒┤├─/\/\/──        │ mass │  viscous damping, Coulomb friction
@@ -26,7 +26,7 @@
 #include <stdbool.h>
 #include <incise/export.h>
 
-/* Zero it, then set what is there; all of it may be changed between two steps. */
+/* Zero it, then set its members; all of them may be changed between two steps. */
 struct incise_plant {
 	double mass_kg;	       /* > 0 */
 	double damping_N_s_mm; /* viscous, ≥ 0 */

@@ -22,18 +22,18 @@
 #define TICKS_MOST 64 /* in a P */
 #define POSES_MOST 16 /* in a tick */
 #define LATE_MOST 32  /* P in the latency */
-/* On their way are those of the latency, and those that wait for their tick. */
+/* Poses on their way are late by the latency, or wait for their tick. */
 #define WAITING_MOST (LATE_MOST + POSES_MOST)
 #define OWN_STATES 8 /* of device and predictor; the last one counts with A only */
-/* Of a mean over more ticks than one and these, each holds several. */
+/* For a mean over more ticks than one and these, each holds several. */
 #define CELLS_MOST 31
 
 /* Part of a tick that a pose waits before it is taken in: the mean. */
 #define LEAD 0.5
 
 /*
- * Size of a state that is tried, mm: so small that the predictor's limits of what it
- * believes are not met. All is linear below them.
+ * Size of a state that is tried, mm: so small that it stays within the predictor's
+ * limits. All is linear below them.
  */
 #define SIZE_MM 1e-6
 
@@ -125,7 +125,7 @@ static void take_pose(struct run *run, double arrival_s)
 		(size_t)--run->n * sizeof(run->pose_mm[0]));
 }
 
-/* The mean of the last places, with this one. A cell with several ticks follows the next one by a part in each. */
+/* The mean of the last places, with this one. A cell of several ticks follows the next in parts. */
 static void set_mean(const struct loop *loop, struct run *run, const double x[3],
 		     double mean[3])
 {
@@ -213,10 +213,10 @@ static void measure_period(const struct loop *loop, double *matrix)
 	}
 }
 
-/* In a period; none: a predictor with a gain of 0 has a state that stays. */
+/* In a period; less is no growth: a predictor with a gain of 0 has a state that stays. */
 #define GROWS 1e-7
 
-/* Of the matrix, the eigenvalue of the swing that grows the fastest, and 0 without one. */
+/* The eigenvalue of the matrix's fastest growing swing, and 0 without a swing. */
 static double complex fastest(double *matrix, int n)
 {
 	double complex *all = malloc((size_t)n * sizeof(*all)), most = 0;
@@ -234,7 +234,7 @@ static double complex fastest(double *matrix, int n)
 	return most;
 }
 
-/* Times that are multiples of each other, none shorter than it is. */
+/* Times that are multiples of each other, each at least as long as it is. */
 static void set_times(struct loop *loop, double tick_s)
 {
 	double pose_s = loop->predict.period_s;
@@ -299,7 +299,7 @@ struct incise_plant incise_pose_loop_plant(double mass_kg, double damping_N_s_mm
 	return plant;
 }
 
-/* Direction of the fastest swing: that of its places, or of their speeds. */
+/* Direction of the fastest swing: of its places, or of their speeds. */
 static void set_along(const struct loop *loop, const double *matrix,
 		      double complex eigenvalue, double *work, double along[3])
 {
@@ -356,7 +356,7 @@ double incise_pose_loop_swing(const struct incise_pose_loop *of,
 	return cabs(eigenvalue) > 1 + GROWS ? log(cabs(eigenvalue)) / period_s : 0;
 }
 
-#define MARGIN_LEAST (1.0 / 1024) /* of the most; below it there is none */
+#define MARGIN_LEAST (1.0 / 1024) /* of the most; less counts as no margin */
 #define MARGIN_HALVINGS 11	  /* of its logarithm: within 3 thousandths */
 
 double incise_pose_loop_margin(const struct incise_pose_loop *of,

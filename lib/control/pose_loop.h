@@ -9,7 +9,7 @@
  *
  * This is not the loop with a delay of latency + P and no predictor, nor is that on the
  * safe side. The predictor leads, which helps where the motion is slow, as a hand's is;
- * and it shows faster motion larger than it is, as that of a wall that hums. On a device
+ * and it shows faster motion larger than it is, for example a humming wall's. On a device
  * of 50 g and 0.01 N s/mm, with 120 Hz and 4.2 ms, the loop holds a wall of 0.40 N/mm where
  * the delay would hold 0.94. With a twentieth of the damping the loop holds three times more
  * than the delay. Damping by the predictor's velocity makes it less, not more.
@@ -18,14 +18,14 @@
  * of the state over one P is therefore a matrix, and the loop is stable when that has no
  * eigenvalue of modulus above 1. The matrix is not derived but measured: the columns are
  * what device (incise/plant.h) and predictor (predict.h) make of each unit state in one P.
- * So it is that of the real predictor, whatever that becomes.
+ * So it follows the real predictor, also after changes of that.
  *
  *   state, of each axis: device x v | predictor x v a, shown x v (and a, with A) | poses on their way | forces on
  *   theirs
  *
- * Times that are no multiples of each other are made so by the longer tick, or by the
- * slower tracker when that is the faster of the two. Beyond 64 ticks in a P, or 16 P in a
- * tick or 32 in the latency, tick or P are made longer too.
+ * Times that are no multiples of each other are made so by a longer tick, or by a slower tracker if the tracker is
+ * faster than the loop. Beyond 64 ticks in a P, or 16 P in a tick or 32 in the latency, tick or P are made longer
+ * too.
  *
  * N, mm, s.
  */
@@ -50,12 +50,12 @@ struct incise_pose_loop {
 	int late_ticks; /* until a force acts, 0 … INCISE_POSE_LOOP_LATE_MAX */
 };
 
-/* A mass in a hand, or in none (NULL). */
+/* A mass in a hand, or free (NULL). */
 struct incise_plant incise_pose_loop_plant(double mass_kg, double damping_N_s_mm,
 					   const struct incise_hand_impedance *hand);
 
 /*
- * Forces in three dimensions about a state of rest: linear, but each with all axes. Of a wall all are multiples of
+ * Forces in three dimensions about a state of rest: linear, but each with all axes. For a wall all are multiples of
  * the unit matrix.
  *
  *   f = - now x - mean (mean of the last x) - damping v - mass a
@@ -74,9 +74,9 @@ struct incise_swing {
 };
 
 /*
- * Growth of that swing, 1/s; 0: none grows. A motion that grows by e before it turns by a radian is no swing: it goes
- * away, as a tool does that stands on a ball. The states are those of the loop above for each axis, and the places
- * of the mean: exact up to 32 ticks, within some hundredths up to 64.
+ * Growth of that swing, 1/s; 0: no swing grows. A motion that grows by e before it turns by a radian is no swing: it
+ * goes away, as a tool does that stands on a ball. The states are the loop's above for each axis, and the places of
+ * the mean: exact up to 32 ticks, within some hundredths up to 64.
  *
  * @param share  of all forces of the map
  * @param axis   of the device, from where it is at rest

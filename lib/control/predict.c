@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
  * Where the tip is now; see incise/predict.h. Gains after Kalata's tracking index
- * Λ = σa T²/σx, where σa is what acceleration changes in one period T and σx what the
- * tracker sees: Kalata, The tracking index, IEEE Trans. AES-20(2), 1984; the closed form
- * is Gray and Murray's, IEEE Trans. AES-29(3), 1993.
+ * Λ = σa T²/σx, where σa is the change of acceleration in one period T and σx the noise
+ * of the tracker: Kalata, The tracking index, IEEE Trans. AES-20(2), 1984; the closed
+ * form is Gray and Murray's, IEEE Trans. AES-29(3), 1993.
  */
 #include <math.h>
 #include <incise/clock.h>

@@ -3,8 +3,8 @@
  * From a tracker's 60–240 poses a second, milliseconds old, to where the tip is now.
  *
  * A steady-state constant-acceleration Kalman filter (alpha-beta-gamma) per axis,
- * extrapolated. What is shown never jumps: the difference between what was shown and what
- * a new pose says is blended out, linearly, over one tracker period.
+ * extrapolated. The shown values never jump: their difference from a new pose is blended out,
+ * linearly, over one tracker period.
  *
  *   shown   ·····.                 the old prediction
  *                 '·.  difference × (1 - (t - arrival) / period)
@@ -14,8 +14,8 @@
  *
  * The blend starts when a pose arrives at the host (sample->t_ns), not when it is taken
  * in. So it does not matter how many poses are taken in at one tick. A pose must be taken
- * in before the first tick after its arrival is asked for; when it is late by d, what is
- * shown steps by d / period of the difference.
+ * in before the first tick after its arrival is asked for; when it is late by d, the shown values
+ * step by d / period of the difference.
  *
  * mm, s; times of the host's clock in ns. All numbers given are finite, whatever the poses
  * are. tests/bench/pose measures how far off it is. Gains after Kalata, The tracking
@@ -36,7 +36,7 @@
 
 /*
  * A quick tracker may be late by more than five periods. A hand's force, and so its acceleration,
- * stays what it is for some hundredths of a second.
+ * stays the same for some hundredths of a second.
  */
 #define INCISE_PREDICT_AHEAD_NS 40000000
 
@@ -54,20 +54,20 @@ void incise_predict_filter(const struct incise_predict *p,
 
 /*
  * Start without a pose. A rate of @tracker outside 1 … 10000 Hz and a latency outside 0 … 1 s
- * count as the nearest inside. @noise_mm of its positions, sd per axis; 0: 0.02, that of a
- * magnetic tracker near its source.
+ * count as the nearest inside. @noise_mm of its positions, sd per axis; 0: 0.02, for a magnetic
+ * tracker near its source.
  */
 void incise_predict_init(struct incise_predict *p,
 			 const struct incise_tracker_info *tracker, double noise_mm);
 
 /*
- * Take a pose in. One whose position is not finite or metres away, or that is not newer
- * than the last, is passed over. A quaternion that is none leaves the attitude as it was.
+ * Take a pose in. A pose whose position is not finite or metres away, or that is not newer than
+ * the last, is passed over. An invalid quaternion leaves the attitude as it was.
  *
- * After a gap of more than five periods velocity starts from 0. So it does when a pose is
- * more than INCISE_PREDICT_JUMP_MM from where it should be: no hand did that, and it must
- * not be dragged through the tissue, so there is then no blend either; the force's limits
- * do the rest. Real-time safe.
+ * After a gap of more than five periods velocity starts from 0. The filter also starts again when
+ * a pose is more than INCISE_PREDICT_JUMP_MM from its expected place: no hand did that, and the
+ * tool must not be dragged through the tissue, so there is no blend, either; the force's limits do
+ * the rest. Real-time safe.
  */
 void incise_predict_add(struct incise_predict *p,
 			const struct incise_tracker_sample *sample) INCISE_REALTIME;
@@ -78,9 +78,9 @@ void incise_predict_add(struct incise_predict *p,
  *
  * Position and velocity are blended each by itself: velocity is the filter's, and not the
  * derivative of the position shown, which holds the speed of the correction too. Further
- * than five periods, or 40 ms of a tracker of more than 125 Hz, after the last pose was
- * acquired they stay as they were then, so that a latency above that is made up for in part
- * only. The attitude is not extrapolated. Real-time safe.
+ * than five periods, or 40 ms of a tracker of more than 125 Hz, after the last pose was acquired
+ * they stay as they were then, so that a longer latency is made up for in part only. The attitude
+ * is not extrapolated. Real-time safe.
  */
 void incise_predict_at(const struct incise_predict *p, int64_t t_ns,
 		       double position_mm[3], double velocity_mm_s[3],

@@ -23,7 +23,7 @@ int incise_actuator_read(struct incise_actuator *actuator, const config_setting_
 double incise_actuator_can_gain_1_s(double cycle_s);
 
 /*
- * Check the keys of lines, in @group, and those of @can against each other and the others. 0 or -EINVAL;
+ * Check the keys of lines, in @group, and of @can against each other and the others. 0 or -EINVAL;
  * @err names file, line, key and what to do.
  */
 int incise_actuator_lines_check(const struct incise_actuator *actuator,

@@ -27,7 +27,7 @@ void incise_axes_dual(int n, const double direction[][3], double dual[][3])
 
 	for (int i = 0; i < n; i++) {
 		apart(out, n, direction, i);
-		/* One direction stays as it is, to the bit. */
+		/* A single direction stays as it is, to the bit. */
 		for (int k = 0; k < 3; k++)
 			dual[i][k] = n > 1 ? out[k] / v3_dot(out, direction[i]) : out[k];
 	}

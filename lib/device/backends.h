@@ -12,13 +12,11 @@
 
 #include <incise/backend.h>
 
-/* By their own names, for tests, which may link several. */
-extern const struct incise_backend incise_camera_v4l2, incise_force_comedi,
-	incise_force_iio, incise_force_lsl, incise_stepper_gpio, incise_stepper_kernel,
-	incise_tracker_igtl, incise_tracker_tty, incise_tracker_usb;
+extern const struct incise_backend incise_stepper_kernel; /* built in */
 
 /*
- * Export a backend from its module as `incise_backend`; weak, as tests may link several.
+ * Export a backend from its module as `incise_backend`; weak, as tests may link several, by
+ * their own names.
  */
 #define INCISE_MODULE(backend)                                       \
 	INCISE_API extern const struct incise_backend incise_backend \

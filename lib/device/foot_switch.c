@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * A foot switch; see incise/foot_switch.h. By the kernel's own interface, <linux/input.h>: of
- * libevdev it would take one call to know the key, one to grab the device and one to read, which
- * are an ioctl and a read here, and would be another library in a process locked in memory. It
- * keeps the state of many keys and slots over a buffer that ran over, and a count of presses has no
- * such state:
+ * A foot switch; see incise/foot_switch.h. By the kernel's own interface, <linux/input.h>: with
+ * libevdev the key, the grab and each read would take a call each, which are an ioctl and a read
+ * here, and it would be another library in a process locked in memory. It keeps the state of many
+ * keys and slots over a buffer that ran over, and a count of presses has no such state:
  *
  *   EV_KEY key 1    pressed          counts
  *   EV_KEY key 2    repeated         does not
@@ -109,7 +108,7 @@ static int refuse(const struct incise_foot_switch_setup *setup, int code,
 				what);
 }
 
-/* Whether it has the key, and that is not pressed: grabbed now, nobody would see it released. */
+/* Whether it has the key, unpressed: after a grab no program would see a pressed key released. */
 static int check(const struct incise_foot_switch *foot,
 		 const struct incise_foot_switch_setup *setup, struct incise_error *err)
 {

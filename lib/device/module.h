@@ -3,8 +3,9 @@
  * Modules: shared objects that bring a library into the process, loaded at first use.
  *
  *     INCISE_MODULE_PATH, or the folder incise/ next to the library that loads it
- *       ├── stepper_gpio.so, vision_opencv.so, export_hdf5.so …   `incise_backend`
- *       └── frames_mkv.so                                         `incise_frames`
+ *       ├── stepper_gpio.so, vision_opencv.so …   `incise_backend`
+ *       ├── export_hdf5.so                        `incise_table_hdf5`
+ *       └── frames_mkv.so                         `incise_frames`
  *
  * libincise, libincise-record and libincise-view each contain this.
  */

@@ -29,7 +29,7 @@ struct incise_motion {
 	const struct incise_stepper_setpoint *setpoint; /* written by another thread */
 	struct incise_stepper_motor_status *slot;	/* read by another thread */
 
-	/* Read by the owner, who writes status.position and .inputs. */
+	/* The owner reads them, and writes status.position and .inputs. */
 	struct incise_stepper_config config;
 	struct incise_stepper_motor_status status; /* copied into the slot */
 	struct incise_profile profile;
@@ -69,7 +69,7 @@ void incise_motion_halt(struct incise_motion *motion, bool moved);
 void incise_motion_brake(struct incise_motion *motion, uint32_t fault);
 
 /*
- * Latch a fault (0: none) of a powered motor, and brake. True: it is of
+ * Latch a fault (0: no fault) of a powered motor, and brake. True: it is of
  * INCISE_MOTION_AT_ONCE, and the owner switches power off now.
  */
 bool incise_motion_fault(struct incise_motion *motion, uint32_t fault);

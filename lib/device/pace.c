@@ -45,7 +45,7 @@ static void measure_period(struct incise_pace *pace, int64_t t_ns)
 		fmax(fmin(mean_ns, pace->nominal_ns * 1.25), pace->nominal_ns * 0.8);
 }
 
-/* The window is full: what of its lateness is a loss, and what moves the line. */
+/* The window is full: divide its lateness into losses and a move of the line. */
 static uint64_t end_window(struct incise_pace *pace, int64_t t_ns)
 {
 	double T = pace->period_ns, span_ns = (double)(t_ns - pace->window_ns);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Losses of a source that does not count its samples, found by the times of those that come.
+ * Losses of a source that does not count its samples, found by the times of the others.
  *
  *   lateness |            o  one held up               two lost   o--o--o--o
  *            |                                                    |
@@ -10,9 +10,9 @@
  *
  * Sample k is due at the first one's time and k periods T. Lateness that stays for a window of
  * half a second is a loss, rounded to whole periods, if it exceeds the scatter of the windows
- * before it: a loss that is shorter than the scatter cannot be seen. What is less moves the
- * line, as the clock of the source, and its period, drift. A hole of a quarter of a second, and
- * four periods, counts at once; in the first second, nothing else does.
+ * before it: a loss that is shorter than the scatter cannot be seen. A smaller lateness moves
+ * the line, as the clock of the source, and its period, drift. A hole of a quarter of a second,
+ * and four periods, counts at once; in the first second, nothing else does.
  */
 #ifndef INCISE_DEVICE_PACE_H
 #define INCISE_DEVICE_PACE_H
@@ -31,7 +31,7 @@ struct incise_pace {
 	int64_t window_ns;
 	uint64_t in_window;
 	double least_ns, most_ns;
-	/* Scatter of the last two windows; negative: there was none. */
+	/* Scatter of the last two windows; negative: no window yet. */
 	double scatter_ns[2];
 };
 
@@ -47,7 +47,7 @@ uint64_t incise_pace_add(struct incise_pace *pace, int64_t t_ns);
 /* The link was gone: the gap before the next sample counts at once. */
 void incise_pace_broken(struct incise_pace *pace);
 
-/* A sample that came without a time, and is counted by others. Real-time safe. */
+/* A sample without a time, which the others count. Real-time safe. */
 void incise_pace_skip(struct incise_pace *pace);
 
 #endif

@@ -27,8 +27,8 @@ void incise_page_put_pose(struct incise_stepper_setpoint *slot,
 			  int64_t t_ns) INCISE_REALTIME;
 
 /*
- * Read a set-point newer than @seq. 1: @copy and @seq are set; 0: none; -EINVAL: an
- * invalid one.
+ * Read a set-point newer than @seq. 1: @copy and @seq are set; 0: no set-point; -EINVAL:
+ * an invalid one.
  */
 int incise_page_get_setpoint(const struct incise_stepper_setpoint *slot, uint32_t *seq,
 			     struct incise_stepper_setpoint *copy);
@@ -44,7 +44,7 @@ void incise_page_put_status(struct incise_stepper_motor_status *slot,
 int incise_page_get_status(const struct incise_stepper_motor_status *slot,
 			   struct incise_stepper_motor_status *copy) INCISE_REALTIME;
 
-/* The same of what a plan renders. */
+/* The same for the status of a plan. */
 int incise_page_get_plan(const struct incise_stepper_plan_status *slot,
 			 struct incise_stepper_plan_status *copy) INCISE_REALTIME;
 

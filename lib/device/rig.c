@@ -49,7 +49,7 @@ static void *rig_open_sim(struct incise_rig *rig, int slot)
 	}
 }
 
-/* Those opened before by the same backend; how many. */
+/* Find the steppers that the same backend opened before; returns their number. */
 static int siblings(const struct incise_rig *rig, int slot, struct incise_stepper **to)
 {
 	int n = 0;

@@ -149,7 +149,7 @@ static bool in_shorthand(const char *spec, const char *key)
 	return false;
 }
 
-/* Of a shorthand, of which there is no file: what is given is in its words, and all devices are. */
+/* A shorthand has no file: its words give the keys, and it has all devices. */
 static int found_in_shorthand(void *context, const struct incise_key *key)
 {
 	const struct rig_list *rig = context;

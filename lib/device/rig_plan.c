@@ -393,7 +393,7 @@ static int check_directions(const struct incise_rig_plan *plan, const char *wher
 				return -EINVAL;
 	incise_axes_dual(plan->n_axes, plan->direction, dual);
 	for (int i = 0; i < plan->n_axes; i++) {
-		/* Not a number: in the plane of the others. By rounding 1 may be passed. */
+		/* NaN: in the plane of the others. By rounding 1 may be passed. */
 		apart_deg = 1 / v3_length(dual[i]);
 		apart_deg = apart_deg >= 1 ? 90 : asin(apart_deg) / DEG;
 		if (!(apart_deg >= APART_DEG - ROUNDING))
@@ -553,7 +553,7 @@ static int plan_file(struct incise_rig_plan *plan, const char *path,
 	return rc;
 }
 
-/* One KEY=VALUE of the shorthand; @word is overwritten. */
+/* A KEY=VALUE of the shorthand; @word is overwritten. */
 static int plan_word(struct incise_rig_plan *plan, char *word, struct incise_error *err)
 {
 	static const char *const own[] = {"clock", "mouse", NULL};

@@ -20,8 +20,8 @@
 /* The kinds of devices; their order is that of the incise_rig_device bits. */
 enum { KIND_TRACKER, KIND_FORCE, KIND_CAMERA, KIND_STEPPER, N_KINDS };
 
-/* The keys of rig.conf and of its groups, in a struct incise_rig_plan; those of sim and actuator are
- * in ../sim/sim.h and actuator.h. */
+/* The keys of rig.conf and of its groups, in a struct incise_rig_plan; the keys of sim
+ * and actuator are in ../sim/sim.h and actuator.h. */
 extern const struct incise_setting incise_rig_settings[];
 
 /* A slot for each device: the actuators' are the last ones. */
@@ -41,7 +41,7 @@ static inline unsigned int kind_bit(int kind)
 
 /* A device that does not stand on the virtual rig. */
 struct rig_real {
-	char *name; /* of its backend; NULL: none is wanted */
+	char *name; /* of its backend; NULL: not wanted */
 	char *arguments;
 	char where[240];
 };
@@ -50,7 +50,7 @@ struct incise_rig_plan {
 	bool simulated;
 	bool sim;	      /* one of the devices stands on the virtual rig */
 	bool watch;	      /* the stepper */
-	unsigned int devices; /* incise_rig_device bits of what is to be opened */
+	unsigned int devices; /* incise_rig_device bits of the devices to open */
 	struct rig_real real[N_SLOTS];
 	int n_axes; /* actuators to be opened */
 	double direction[INCISE_RIG_AXES_MAX][3];
@@ -63,7 +63,7 @@ struct incise_rig_plan {
 	bool has_vision; /* rig.conf has it, or the camera is the virtual one */
 	struct incise_foot_switch_setup foot_switch;
 	bool has_foot_switch;
-	char sign_key[INCISE_RIG_KEY_PATH_MAX]; /* "": none */
+	char sign_key[INCISE_RIG_KEY_PATH_MAX]; /* "": no key */
 	struct incise_sim_config config;
 	double point_mm[3], normal[3];
 };

@@ -9,7 +9,7 @@
 #include <incise/scan.h>
 #include "backends.h"
 
-/* Adds the kind to what a backend finds. */
+/* Adds the kind to each device that a backend finds. */
 struct kind_found {
 	const char *kind;
 	incise_scan_found *found;

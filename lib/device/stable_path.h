@@ -11,7 +11,7 @@
 
 /*
  * The first link to @path, by name, that matches @pattern as of glob(3). False, and @link
- * is unchanged, where there is none that fits into @size.
+ * is unchanged, if no path fits into @size.
  */
 bool incise_stable_path(const char *pattern, const char *path, char *link, size_t size);
 

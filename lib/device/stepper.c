@@ -53,7 +53,7 @@ static bool at_home(const struct home *h)
 	return h->status.inputs & h->homing.home_at;
 }
 
-/* Without a home input, the limit switch at 0 is what homing looks for. */
+/* Without a home input, homing looks for the limit switch at 0. */
 static bool hit_limit(const struct home *h)
 {
 	return h->homing.home_at == INCISE_STEPPER_LINE_LIMIT_MIN &&
@@ -305,7 +305,7 @@ static int find(struct home *h)
 	return rc;
 }
 
-/* After an error nothing may move; the message stays that of the first error. */
+/* After an error nothing may move; the message of the first error stays. */
 static void halt(struct home *h)
 {
 	h->err = NULL;

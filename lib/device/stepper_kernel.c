@@ -27,12 +27,12 @@
 
 struct kernel_stepper {
 	struct incise_motor motor;
-	struct incise_stepper_ops ops; /* those of motors, and plans */
+	struct incise_stepper_ops ops; /* of motors, and of plans */
 	char path[PATH_MAX];
 	unsigned int index; /* of the motor */
 	int fd;
 	size_t page;
-	void *setpoints, *status; /* pages; NULL or MAP_FAILED: none */
+	void *setpoints, *status; /* pages; NULL or MAP_FAILED: not mapped */
 };
 
 static struct kernel_stepper *of(struct incise_motor *motor)
@@ -218,7 +218,7 @@ static INCISE_REALTIME int plan_follow(struct incise_stepper *stepper)
 	return rc;
 }
 
-/* To the nearest integer that fits; 0 for what is no number. */
+/* To the nearest integer that fits; 0 for NaN. */
 static INCISE_REALTIME __s32 to_integer(double value, double one)
 {
 	double scaled = value * one;
@@ -245,7 +245,7 @@ static INCISE_REALTIME int plan_pose(struct incise_stepper *first,
 	}
 	for (int i = 0; sample && i < 4; i++)
 		pose.quaternion[i] = to_integer(sample->quaternion[i], 1073741824);
-	/* None leaves the attitude as it was; 0 is no pose. */
+	/* An invalid quaternion leaves the attitude as it was; 0 is no pose. */
 	pose.quaternion[0] += sample && !pose.quaternion[0];
 	if (!given->tube)
 		pose.tool =
@@ -524,8 +524,8 @@ static int map_pages(struct kernel_stepper *k, bool watch)
 }
 
 /*
- * The module's count goes on from one owner to the next. One outside of this travel is
- * restarted at 0, and is not homed.
+ * The module's count goes on from one owner to the next. A position outside of this travel
+ * restarts at 0, and is not homed.
  */
 static int take_count(struct kernel_stepper *k)
 {

@@ -29,7 +29,7 @@ void incise_thread_hurry(bool hurry)
 	struct sched_param priority = {.sched_priority =
 					       hurry ? INCISE_THREAD_PRIORITY : 0};
 
-	/* An error at the start as well: without real time there is none to restore. */
+	/* An error at the start as well: without real time there is no policy to restore. */
 	pthread_setschedparam(pthread_self(), hurry ? SCHED_FIFO : SCHED_OTHER,
 			      &priority);
 }

@@ -12,7 +12,7 @@
 /* Above a haptic loop at 80, which must not delay the motor. */
 #define INCISE_THREAD_PRIORITY 85
 
-/* 0 or a negative errno. @real_time: whether it got SCHED_FIFO; NULL: it needs none. */
+/* 0 or a negative errno. @real_time: whether it got SCHED_FIFO; NULL: it needs no real time. */
 int incise_thread_start(pthread_t *thread, void *(*run)(void *), void *argument,
 			bool *real_time);
 

@@ -35,7 +35,7 @@ void tracker_feed_end(struct tracker_feed *feed, const char *fmt, ...)
 
 #define TRACKER_REPEAT_MAX 12
 
-/* A pose as a device sent it, and since when it sends the same. Zeros: none yet. */
+/* A pose as a device sent it, and since when it sends the same. Zeros: no samples yet. */
 struct tracker_repeat {
 	double pose[TRACKER_REPEAT_MAX];
 	int64_t since_ns;

@@ -12,7 +12,7 @@
 #include "backends.h"
 #include "module.h"
 
-/* Open what the module @kind provides, as its backend does: NULL with errno. */
+/* Open the module @kind through its backend: NULL with errno. */
 static void *open_module(const char *kind, const char *packages,
 			 const struct incise_vision_setup *setup,
 			 struct incise_error *err)

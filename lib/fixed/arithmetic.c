@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later OR GPL-2.0-only
 /*
  * The square root; see arithmetic.h. A table gives the first 8 bits, each of two steps of Heron's doubles
- * them and is one above the root at most: the last one is put right by a product.
+ * them and is one above the root at most: a product puts the last bit right.
  */
 #include "arithmetic.h"
 

@@ -159,7 +159,7 @@ static int check_weights(const struct incise_fixed *fx)
 	return 0;
 }
 
-/* 32 bits, less what weights may add up to above 1 (2^-24), and a rounding to Q16. */
+/* 32 bits, less the excess of the weights' sum over 1 (2^-24), and a rounding to Q16. */
 #define FOLD_MAX (INT32_MAX - (1 << 14))
 
 /*

@@ -26,7 +26,7 @@ static bool is_frame(const struct incise_fixed_grid_frame *frame)
 			return false;
 	incise_fx_cross(up, frame->axis[0], frame->axis[1]);
 	for (int i = 0; i < 3; i++) {
-		/* Of opposite signs they are 2^31 apart. */
+		/* With opposite signs they are 2^31 apart. */
 		int64_t off = (int64_t)up[i] - frame->axis[2][i];
 
 		if (off > 64 || off < -64)
@@ -40,7 +40,7 @@ static bool is_frame(const struct incise_fixed_grid_frame *frame)
 	       frame->columns <= INCISE_FIXED_GRID_KNOTS_MAX && frame->rows >= 2 &&
 	       frame->rows <= INCISE_FIXED_GRID_KNOTS_MAX && frame->reach >= 0 &&
 	       frame->reach <= HEIGHT_MAX &&
-	       /* The whole grid lies within what a place can be. */
+	       /* The whole grid lies within the range of places. */
 	       (int64_t)(frame->columns - 1) << frame->cell_shift <= INCISE_FX_AWAY_MAX &&
 	       (int64_t)(frame->rows - 1) << frame->cell_shift <= INCISE_FX_AWAY_MAX;
 }
@@ -117,7 +117,7 @@ static bool look(const struct incise_fixed_grid *grid, int32_t at[3], int32_t no
 	const int32_t *h = grid->height + j * frame->columns + i;
 	int64_t height = 0, u = 0, v = 0, up[3];
 
-	/* A cell with a knot that has no height is none, and is left before anything is added. */
+	/* A cell with a knot without height is a hole: the search ends before it adds. */
 	for (int k = 0; k < 4; k++)
 		if (incise_fx_int32(h[(k >> 1) * frame->columns + (k & 1)]) ==
 		    INCISE_FIXED_GRID_NONE)
@@ -132,7 +132,7 @@ static bool look(const struct incise_fixed_grid *grid, int32_t at[3], int32_t no
 		u += weight * rise(knot, i + (k & 1), frame->columns, 1);
 		v += weight * rise(knot, j + (k >> 1), frame->rows, frame->columns);
 	}
-	/* Of two cells, to Q24. */
+	/* Slopes over two cells, to Q24. */
 	up[0] = -incise_fx_rounded(u, 3 * shift + 1 - SLOPE_BITS);
 	up[1] = -incise_fx_rounded(v, 3 * shift + 1 - SLOPE_BITS);
 	up[2] = (int64_t)1 << SLOPE_BITS;
@@ -205,7 +205,7 @@ bool incise_fixed_grid_nearest(const struct incise_fixed_grid *grid, const int32
 	incise_fx_add(off, tool, depth, normal);
 	if (depth < -frame->reach || !is_within(frame, off))
 		return false;
-	/* Too deep for the heights: no force that ends there, but none that grows. */
+	/* Too deep for the heights: the force does not end there, but does not grow. */
 	spot->depth = depth < frame->reach ? depth : frame->reach;
 	turn(frame, normal, spot->normal);
 	turn(frame, at, spot->point);

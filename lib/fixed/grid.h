@@ -11,7 +11,7 @@
  * The normal is bilinear too, between the slopes over two cells around each knot, so that it has no
  * leap between cells. From the place below or above the tool the nearest point is found by going from
  * the tool along the normal there, and again from where that leads: as long as the depth is less than
- * the radius of curvature each step leaves a part of the last one only. lib/scene/heights.h makes
+ * the radius of curvature each step leaves a part of the last step only. lib/scene/heights.h makes
  * grids with a certified bound.
  *
  *        ╲  x₀         tool + depth(xₖ) × normal(xₖ) = xₖ₊₁
@@ -66,8 +66,8 @@ int incise_fixed_grid_open(struct incise_fixed_grid *grid,
 			   const int32_t *height, uint32_t size);
 
 /*
- * Find the nearest point. Returns whether there is one: not beyond the edge, where heights are none,
- * or beyond the reach.
+ * Find the nearest point. Returns whether there is a point: not beyond the edge, in a hole, or beyond
+ * the reach.
  */
 bool incise_fixed_grid_nearest(const struct incise_fixed_grid *grid, const int32_t p[3],
 			       struct incise_fixed_spot *spot) INCISE_REALTIME;

@@ -43,7 +43,7 @@ static int32_t turn_of(int64_t x, int64_t y)
 {
 	int64_t angle = 0;
 
-	/* Q38, so that what is shifted out does not count. */
+	/* Q38, so that the bits shifted out do not count. */
 	x *= 256;
 	y *= 256;
 	for (int k = 0; k < (int)(sizeof(turn) / sizeof(*turn)); k++) {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later OR GPL-2.0-only */
 /*
- * Inputs of a model in integers: what lib/tissue/predict.c does in double, see there.
+ * Inputs of a model in integers; lib/tissue/predict.c does the same in double, see there.
  *
  *   velocities Q16.16 mm/s     accelerations Q16 mm/s², in 64 bits     directions Q2.30
  *   inputs Q16.16 of their units, held to 32 bits
@@ -23,8 +23,9 @@ enum incise_fixed_input_kind {
 };
 
 /*
- * Rounding of incise_fixed_input_acceleration(), _tilt() and _time() (tick.proto.h), of exact operands: 2^-11 mm/s² and a share of 2^-19, that of the
- * speed; 10^-5 degrees; 2^-16 s. A unit vector that is off by 2^-27 turns the angle by as many radians.
+ * Rounding of incise_fixed_input_acceleration(), _tilt() and _time() (tick.proto.h), of exact operands: 2^-11 mm/s²
+ * and 2^-19 of it, by the speed; 10^-5 degrees; 2^-16 s. A unit vector off by 2^-27 turns the angle by as many
+ * radians.
  */
 #define INCISE_FIXED_INPUT_ACCELERATION_BITS 11
 #define INCISE_FIXED_INPUT_ACCELERATION_SHARE_BITS 19

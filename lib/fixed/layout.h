@@ -3,8 +3,8 @@
  * The bytes of a blob, all little-endian:
  *
  *   0    struct incise_fx_header
- *   288  data, by arithmetic; at 416 in version 2, which has room for four inputs in its header and
- *        is that of models of three and four
+ *   288  data, by arithmetic; at 416 in version 2, which has room for four inputs in its
+ *        header, for models of three and four
  *
  *   direct  per input, at its offset: n_mfs × struct incise_fx_mf
  *           at data: n_rules × (n_inputs + 1) consequents, int64 in Q(shift_a), the
@@ -84,7 +84,7 @@ struct incise_fx_mf {
 	int32_t centre; /* Q16.16 */
 	int32_t slope;	/* mantissa, 0 … 2^30 */
 	int32_t shift;	/* right shift that brings the product to Q24, 0 … 62 */
-	int32_t offset; /* what centre lost by rounding, as z, Q24 */
+	int32_t offset; /* rounding of centre, as z, Q24 */
 };
 
 /* Little-endian to host, and back: the same. */

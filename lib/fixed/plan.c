@@ -162,7 +162,7 @@ int64_t incise_fixed_plan_fade_ns(const struct incise_fixed_numbers *numbers)
 	return numbers->pose_age_ns + numbers->fade_ns + slews * numbers->tick_ns;
 }
 
-/* True where n bytes at an offset lie in the plan, behind its header, aligned; or are none. */
+/* True if n bytes at an offset lie in the plan, behind its header, aligned; or if n is 0. */
 static bool within(uint32_t at, uint32_t n, uint32_t size)
 {
 	if (!n)

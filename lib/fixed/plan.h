@@ -14,8 +14,8 @@
  *   lengths  Q16.16 mm       directions, quaternions  Q2.30      forces  Q16.16 N
  *   springs  Q16.16 N/mm     times  ns of CLOCK_MONOTONIC        speeds  Q16.16 mm/s
  *
- * A tick takes a bounded time, whatever the plan and the poses are: no loop depends on data but those
- * over the cuts, INCISE_FIXED_CUTS_MAX at most.
+ * A tick takes a bounded time, whatever the plan and the poses are: only the loops over the cuts
+ * depend on data, INCISE_FIXED_CUTS_MAX at most.
  */
 #ifndef INCISE_FIXED_PLAN_H
 #define INCISE_FIXED_PLAN_H
@@ -32,7 +32,7 @@
 #define INCISE_FIXED_PLAN_MAGIC "INCISEPL"
 #define INCISE_FIXED_PLAN_VERSION 1
 #define INCISE_FIXED_PLAN_VERSION_INPUTS 2 /* of a plan with @inputs */
-#define INCISE_FIXED_PLAN_VERSION_MORE 3   /* of one with forces that came later */
+#define INCISE_FIXED_PLAN_VERSION_MORE 3   /* of a plan with forces that came later */
 #define INCISE_FIXED_PLAN_SIZE_MAX (32 << 20)
 
 #define INCISE_FIXED_FORCE_MAX (1 << 28) /* of a plan's limit: 4096 N */
@@ -52,7 +52,7 @@ struct incise_fixed_cut {
 	} place[INCISE_FIXED_CUT_PLACES];
 };
 
-/* Where a handle or tube is in an incision; all 0 where it is in none. */
+/* Place of a handle or tube in an incision; all 0 outside. */
 struct incise_fixed_opening {
 	int32_t in;
 	int32_t cut;
@@ -62,7 +62,7 @@ struct incise_fixed_opening {
 	int32_t along[3];
 };
 
-#define INCISE_FIXED_POSE_TOOL 0xffu  /* bits: enum incise_tool, what the hand holds */
+#define INCISE_FIXED_POSE_TOOL 0xffu  /* bits: enum incise_tool, the tool in the hand */
 #define INCISE_FIXED_POSE_TUBE 0x100u /* the pose is of the tube's station */
 #define INCISE_FIXED_POSE_FADE \
 	0x200u /* let go of the force, for as long as this is set */
@@ -72,7 +72,7 @@ struct incise_fixed_opening {
 enum incise_fixed_pose_answer {
 	INCISE_FIXED_POSE_TAKEN,
 	INCISE_FIXED_POSE_OLD,	   /* not newer than the last */
-	INCISE_FIXED_POSE_FAR,	   /* its position is none, or its time below 0 */
+	INCISE_FIXED_POSE_FAR,	   /* its position is invalid, or its time below 0 */
 	INCISE_FIXED_POSE_UNKNOWN, /* bits of tool that are not known here */
 	INCISE_FIXED_POSE_NONE,	   /* its quaternion is 0: only its tool was taken */
 };
@@ -109,7 +109,7 @@ struct incise_fixed_plan_header {
 
 #define INCISE_FIXED_PLAN_CRC_FROM 20
 
-/* A surface that is not in the plan, as a program has; the kernel has none. */
+/* A surface outside the plan, of a program; the kernel has no such surface. */
 struct incise_fixed_surface {
 	void *context;
 	void (*move)(void *context, const int32_t tool[3],

@@ -88,7 +88,7 @@ static uint64_t acceleration_per_tick(const struct incise_profile_limits *limits
 	uint64_t a = per_tick((uint64_t)limits->acceleration << 32, limits->tick_ns);
 
 	a = per_tick(a, limits->tick_ns);
-	/* One off for the rounding of the average; of the smallest, 10, are 9 left. */
+	/* One off for the rounding of the average; the smallest, 10, becomes 9. */
 	return average(limits) > 1 ? a - 1 : a;
 }
 

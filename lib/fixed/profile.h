@@ -41,7 +41,7 @@
  * Arithmetic is of 64-bit integers in units of 2^-32 steps. Limits are rounded down: an
  * acceleration by less than 0.2 steps/s² at 50 µs and 0.0002 at 2 ms, a velocity by less than
  * 10⁻⁵ steps/s. No float, no allocation: builds in a kernel, for 32 bits too. All functions are
- * real-time safe. One profile is one motor's, used by one thread at a time.
+ * real-time safe. A profile belongs to one motor, and one thread at a time uses it.
  */
 #ifndef INCISE_PROFILE_H
 #define INCISE_PROFILE_H
@@ -98,7 +98,7 @@ struct incise_profile {
 	uint32_t tick_ns;
 	uint32_t velocity; /* steps/s */
 	uint32_t average;  /* N */
-	uint32_t rest;	   /* what rounding left of output, 1/N */
+	uint32_t rest;	   /* rounding rest of output, 1/N */
 	uint32_t at;	   /* place of the oldest position */
 	uint32_t still;	   /* ticks at rest */
 	uint32_t reserved;
@@ -111,7 +111,7 @@ struct incise_profile_slot {
 	uint64_t first;	  /* private: way to the first step, 2^-32 steps */
 	uint32_t tick_ns;
 	int32_t n;   /* steps, 0 … */
-	int32_t dir; /* of all of them, and of the motion: +1, -1; 0: none */
+	int32_t dir; /* of all of them, and of the motion: +1, -1; 0: at rest */
 	int32_t reserved;
 };
 

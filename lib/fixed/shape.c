@@ -82,7 +82,7 @@ bool incise_fixed_shape_nearest(const struct incise_fixed_shape *shape,
 	}
 }
 
-/* The normal on a capsule's axis, before there was another one. */
+/* The first normal on a capsule's axis. */
 static const int32_t up[3] = {0, 0, INCISE_FIXED_UNIT};
 
 /* Where the way from outside to inside enters, by false position. */

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later OR GPL-2.0-only */
 /*
- * Surfaces in integers, each asked in a time that does not depend on it: a plane, a capsule (a
- * sphere is one without length), and a grid of heights, which stands for anything without
- * overhangs. lib/surface has the same in double, and meshes as they are.
+ * Surfaces in integers, each asked in a time that does not depend on it: a plane, a capsule (a sphere
+ * is a capsule without length), and a grid of heights, which stands for anything without overhangs.
+ * lib/surface has the same in double, and meshes as they are.
  *
  *   places, depths Q16.16 mm     normals Q2.30
  */
@@ -41,7 +41,7 @@ bool incise_fixed_shape_good(const struct incise_fixed_shape *shape);
  * @param grid of a shape of that kind
  * @param last a unit vector: the normal where all directions are as near, on a capsule's axis
  *
- * Returns whether there is one: beyond a grid's edge there is none, and @touch is left as it is.
+ * Returns whether there is a point: not beyond a grid's edge, where @touch is left as it is.
  */
 bool incise_fixed_shape_nearest(const struct incise_fixed_shape *shape,
 				const struct incise_fixed_grid *grid, const int32_t p[3],

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later OR GPL-2.0-only
 /*
- * A tick of a plan in integers: lib/tissue's physics, and what the integers have beside that: the
- * surfaces of a plan, its model, and the targets of its actuators. See plan.h.
+ * A tick of a plan in integers: lib/tissue's physics, and besides them the surfaces of a plan, its
+ * model, and the targets of its actuators. See plan.h.
  */
 #include "plan.h"
 #include "../number/fixed.h"

@@ -13,7 +13,7 @@
 
 #define INCISE_FIXED_UNIT (1 << 30) /* 1.0 as part of a direction */
 
-/* Of the sum of squares of a unit vector, Q60: each component is off by 2^4 at most. */
+/* Error of the sum of squares of a unit vector, Q60: each component is off by 2^4 at most. */
 #define INCISE_FX_UNIT_SLACK ((int64_t)1 << 36)
 
 /* A difference of places beyond this counts as this: 16384 mm. */
@@ -68,7 +68,7 @@ void incise_fx_cross(int32_t to[3], const int32_t u[3],
 /* |a|, to the nearest; a in any format, each component below 2^31. */
 uint32_t incise_fx_length(const int32_t a[3]) INCISE_REALTIME;
 
-/* Whether that is no more than @most, ≥ 0: the same without a root. */
+/* Whether the length is no more than @most, ≥ 0, without a root. */
 bool incise_fx_is_short(const int32_t a[3], int32_t most) INCISE_REALTIME;
 
 /*

@@ -49,11 +49,12 @@ static int solve(struct state *s, const struct incise_pairs *pairs, double ridge
 	return incise_lsq_solve(s->lsq, &plain, s->x);
 }
 
-static double check_rmse(const struct state *s, const struct incise_pairs *pairs)
+static double check_rmse(const struct state *s, const struct incise_pairs *pairs,
+			 struct incise_watch *watch)
 {
 	double sum = 0;
 
-	for (size_t n = 0; n < pairs->n; n++) {
+	for (size_t n = 0; n < pairs->n && !incise_watch_count(watch, s->n_linear); n++) {
 		const double *x = pairs->rows + n * (pairs->n_inputs + 1);
 		double e = incise_basis_error(&s->basis, x, s->x);
 
@@ -80,13 +81,15 @@ static void add_gradient(struct state *s, const double *x, const double *w,
 }
 
 /* Training RMSE, and the gradient on the way. */
-static double gradient(struct state *s, const struct incise_pairs *pairs)
+static double gradient(struct state *s, const struct incise_pairs *pairs,
+		       struct incise_watch *watch)
 {
 	double buffer[INCISE_MODEL_RULES_MAX], f[INCISE_MODEL_RULES_MAX], sum = 0;
 	int d = pairs->n_inputs;
 
 	memset(s->gradient, 0, s->basis.n_premises * sizeof(double));
-	for (size_t n = 0; n < pairs->n; n++) {
+	for (size_t n = 0; n < pairs->n && !incise_watch_count(watch, 10 * s->n_linear);
+	     n++) {
 		const double *x = pairs->rows + n * (d + 1);
 		const double *w = strengths(s, n, x, buffer);
 		double y = incise_basis_output(&s->basis, w, x, s->x, f);
@@ -147,11 +150,11 @@ static int epoch(struct state *s, struct incise_anfis *anfis, int number)
 
 	if (rc)
 		return rc;
-	train = gradient(s, anfis->train);
-	check = anfis->check ? check_rmse(s, anfis->check) : NAN;
+	train = gradient(s, anfis->train, anfis->watch);
+	check = anfis->check ? check_rmse(s, anfis->check, anfis->watch) : NAN;
 	score = anfis->check ? check : train;
-	if (anfis->progress)
-		anfis->progress(anfis->user, number + 1, train, check);
+	if (incise_watch_epoch(anfis->watch, number + 1, train, check))
+		return -ECANCELED;
 	if (!anfis->best_epoch ||
 	    score < (anfis->check ? anfis->check_rmse : anfis->train_rmse)) {
 		anfis->best_epoch = number + 1;
@@ -192,7 +195,7 @@ int incise_anfis_run(struct incise_model *model, struct incise_anfis *anfis)
 	if (s->n_kept > anfis->train->n)
 		s->n_kept = anfis->train->n;
 	rc = -ENOMEM;
-	s->lsq = incise_lsq_new(s->n_linear);
+	s->lsq = incise_lsq_new(s->n_linear, anfis->watch);
 	s->kept = malloc(s->n_kept * s->basis.n_rules * sizeof(double));
 	s->x = malloc(s->n_linear * sizeof(double));
 	s->best_x = malloc(s->n_linear * sizeof(double));
@@ -202,7 +205,7 @@ int incise_anfis_run(struct incise_model *model, struct incise_anfis *anfis)
 	anfis->best_epoch = 0;
 	rc = 0;
 	for (int e = 0; e < anfis->epochs && !rc; e++)
-		rc = anfis->stop && *anfis->stop ? -ECANCELED : epoch(s, anfis, e);
+		rc = epoch(s, anfis, e);
 	if (rc)
 		goto out;
 	incise_basis_store(&s->best, model);

@@ -7,7 +7,7 @@
 #ifndef INCISE_ANFIS_H
 #define INCISE_ANFIS_H
 
-#include <incise/train.h>
+#include "watch.h"
 
 struct incise_anfis {
 	const struct incise_pairs *train;
@@ -15,10 +15,7 @@ struct incise_anfis {
 	double ridge;
 	double step; /* initial */
 	int epochs;
-	/* Called with the epoch, from 1, and RMSEs; may be NULL. */
-	incise_train_progress progress;
-	void *user;
-	const volatile int *stop; /* as of incise_train_options */
+	struct incise_watch *watch; /* or NULL */
 	/* Results, of the kept epoch: that of the least check (else training) error. */
 	int best_epoch;
 	double train_rmse, check_rmse;

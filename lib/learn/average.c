@@ -66,6 +66,7 @@ struct incise_average {
 	int n_units;
 	double *consequents; /* work: settings × n */
 	double *matrix;	     /* work: a triangle */
+	struct incise_watch *watch;
 };
 
 static size_t triangle(const struct incise_average *a)
@@ -198,7 +199,8 @@ static bool solve(const struct incise_average *a, const double *equations,
 {
 	memcpy(a->matrix, equations, triangle(a) * sizeof(*equations));
 	add_penalty(a, setting, a->matrix);
-	return factorise(a->matrix, a->n, a->stride) &&
+	return !incise_watch_count(a->watch, pow(a->n, 3) / 3) &&
+	       factorise(a->matrix, a->n, a->stride) &&
 	       !incise_lsq_back(a->matrix, a->stride, a->n, a->n, consequents);
 }
 
@@ -293,10 +295,6 @@ static int predict(struct incise_average *a, const struct incise_basis *basis,
 	for (int f = 0; f < folds->n && !rc; f++) {
 		const struct incise_pairs *held = &folds->held[f];
 
-		if (folds->stop && *folds->stop) {
-			rc = -ECANCELED;
-			break;
-		}
 		equations(a, f, cuts, whole);
 		for (int s = from; s < to; s++)
 			if (!solve(a, whole, &a->setting[s],
@@ -442,6 +440,7 @@ int incise_average_find(struct incise_average **average, const struct incise_bas
 	a->n = basis->n_rules * (basis->n_inputs + 1);
 	a->stride = a->n + 1;
 	a->n_units = folds->n_units;
+	a->watch = folds->watch;
 	make_settings(a, folds->cuts);
 	if (pow(a->n, 3) / 6 * a->n_settings * folds->n > BUDGET) {
 		rc = -E2BIG;

@@ -6,8 +6,8 @@
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
-#include <incise/train.h>
 #include "lsq.h"
+#include "watch.h"
 #include "../base/random.h"
 
 static const int ks[] = {1, 3, 5, 10, 20, 50};
@@ -48,7 +48,7 @@ static int linear_rmse(const struct incise_pairs *train, const struct incise_pai
 		       const struct column *columns, double *rmse)
 {
 	int d = train->n_inputs;
-	struct incise_lsq *lsq = incise_lsq_new(d + 1);
+	struct incise_lsq *lsq = incise_lsq_new(d + 1, NULL);
 	/* Just enough ridge to be defined where inputs depend on each other. */
 	struct incise_ridge ridge = {1e-9 * train->n, 1, d + 1, 1};
 	double p[INCISE_MODEL_INPUTS_MAX + 1], sum = 0;
@@ -85,6 +85,7 @@ struct pool {
 	const struct column *columns;
 	size_t *pairs; /* n of them, in random order */
 	size_t n;
+	struct incise_watch *watch;
 };
 
 /* At most so many of n numbers from 0, in random order; NULL with errno ENOMEM. */
@@ -116,6 +117,8 @@ static void knn_predict(const struct pool *pool, const double *x, long excluded,
 	double near[K_MAX], value[K_MAX];
 	int width = train->n_inputs + 1, found = 0;
 
+	if (incise_watch_count(pool->watch, (double)pool->n * width))
+		return;
 	for (size_t n = 0; n < pool->n; n++) {
 		const double *row = train->rows + pool->pairs[n] * width;
 		double distance = 0;
@@ -152,7 +155,7 @@ static int choose_k(const struct pool *pool)
 {
 	int width = pool->train->n_inputs + 1, best = 0;
 	const struct column *output = &pool->columns[width - 1];
-	double sum[N_KS] = {0}, y[N_KS];
+	double sum[N_KS] = {0}, y[N_KS] = {0};
 
 	for (size_t n = 0; n < pool->n && n < CHOOSERS; n++) {
 		const double *x = pool->train->rows + pool->pairs[n] * width;
@@ -175,7 +178,7 @@ static int knn_rmse(struct pool *pool, const struct incise_pairs *on,
 {
 	int d = on->n_inputs, best;
 	const struct column *output = &pool->columns[d];
-	double sum = 0, y[N_KS];
+	double sum = 0, y[N_KS] = {0};
 	size_t n_queries, *queries = some_of(on->n, QUERIES_MAX, &n_queries);
 
 	pool->pairs = some_of(pool->train->n, POOL_MAX, &pool->n);
@@ -203,11 +206,14 @@ static int knn_rmse(struct pool *pool, const struct incise_pairs *on,
 }
 
 int incise_baselines(const struct incise_pairs *train, const int *groups,
-		     const struct incise_pairs *on, struct incise_baselines *result,
+		     const struct incise_pairs *on, incise_train_progress progress,
+		     void *user, struct incise_baselines *result,
 		     struct incise_error *err)
 {
 	struct column columns[INCISE_MODEL_INPUTS_MAX + 1];
-	struct pool pool = {.train = train, .groups = groups, .columns = columns};
+	struct incise_watch watch = {progress, user, .step.phase = INCISE_TRAIN_SOLVE};
+	struct pool pool = {
+		.train = train, .groups = groups, .columns = columns, .watch = &watch};
 	int d = train->n_inputs, rc;
 	double mean = 0;
 
@@ -220,6 +226,8 @@ int incise_baselines(const struct incise_pairs *train, const int *groups,
 	if (!rc)
 		rc = knn_rmse(&pool, on, result);
 	free(pool.pairs);
+	if (watch.stopped)
+		return incise_error_set(err, ECANCELED, "training was stopped");
 	if (rc)
 		return incise_error_set(err, -rc,
 					rc == -ENOMEM

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Training from many sources; see incise/corpus.h.
+ * Training from many sources; see corpus.h.
  *
  * A row has a random number that is a function of the seed and of its values. The sample are the
  * different rows with the smallest ones; without groups, so are the rows that are held out, by
@@ -12,9 +12,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <incise/corpus.h>
 #include "../base/random.h"
-#include "design.h"
+#include "corpus.h"
 #include "pairs.h"
 
 #define COLUMNS_MAX (INCISE_MODEL_INPUTS_MAX + 1)
@@ -47,7 +46,6 @@ struct incise_corpus {
 	size_t n_rows, capacity, sample;
 	uint64_t limit; /* keys above it are not in the sample */
 	uint64_t *bins; /* rows by their number for checking; NULL with groups */
-	const volatile int *stop;		/* or NULL */
 	struct incise_propagation *propagation; /* or NULL */
 	/* After settling: */
 	struct group *groups; /* by key */
@@ -93,20 +91,10 @@ void incise_corpus_free(struct incise_corpus *corpus)
 	free(corpus);
 }
 
-void incise_corpus_set_stop(struct incise_corpus *corpus, const volatile int *stop)
-{
-	corpus->stop = stop;
-}
-
 void incise_corpus_weigh(struct incise_corpus *corpus,
 			 struct incise_propagation *propagation)
 {
 	corpus->propagation = propagation;
-}
-
-static bool is_stopped(const struct incise_corpus *corpus)
-{
-	return corpus->stop && *corpus->stop;
 }
 
 /* --- random numbers of rows ---------------------------------------------------------- */
@@ -224,13 +212,13 @@ struct surveyor {
 static uint64_t key_of(const struct incise_corpus_source *source, const char *group,
 		       struct same_group *same)
 {
-	if (source->group)
+	if (*source->group)
 		group = source->group;
 	if (!group)
 		return 0;
 	if (!same->key || strcmp(same->name, group)) {
 		same->key = incise_group_key(
-			source->own_groups && !source->group ? source->hash : "", group);
+			source->own_groups && !*source->group ? source->hash : "", group);
 		snprintf(same->name, sizeof(same->name), "%s", group);
 	}
 	return same->key;
@@ -298,12 +286,10 @@ static int survey_row(void *user, const double *row, const char *name,
 			      .hash = hash_row(corpus, row)};
 	struct incise_corpus_group *group =
 		find_survey_group(s, c.group,
-				  s->source->group ? s->source->group
-				  : name	   ? name
-						   : "");
+				  *s->source->group ? s->source->group
+				  : name	    ? name
+						    : "");
 
-	if (is_stopped(corpus))
-		return incise_error_set(err, ECANCELED, "canceled");
 	if (!group)
 		return incise_error_set(err, ENOMEM, "no memory for more groups");
 	for (int i = 0; i < corpus->columns; i++) {
@@ -372,7 +358,9 @@ int incise_corpus_survey(struct incise_corpus *corpus,
 	if (rc)
 		return rc;
 	s.survey = &corpus->surveys[corpus->n_surveys++];
+	snprintf(s.survey->group, sizeof(s.survey->group), "%s", source->group);
 	rc = source->read(source->user, survey_row, &s, err);
+	s.survey->left_out = source->left_out;
 	free(s.place);
 	return rc;
 }
@@ -393,7 +381,7 @@ static size_t size_of_bins(const struct incise_corpus *corpus)
 
 void *incise_corpus_encode(struct incise_corpus *corpus, size_t *size)
 {
-	struct header header = {.magic = "survey3",
+	struct header header = {.magic = "survey4",
 				.columns = corpus->columns,
 				.n_surveys = corpus->n_surveys};
 	char *bytes, *at;
@@ -443,7 +431,7 @@ int incise_corpus_add(struct incise_corpus *corpus, const void *bytes, size_t si
 		return incise_error_set(err, EINVAL, "%s", damaged);
 	memcpy(&header, at, sizeof(header));
 	at += sizeof(header);
-	if (memcmp(header.magic, "survey3", 8) || header.columns != corpus->columns ||
+	if (memcmp(header.magic, "survey4", 8) || header.columns != corpus->columns ||
 	    header.size != size || header.n_surveys < 0 ||
 	    (size_t)(end - at) < size_of_bins(corpus) ||
 	    ((size_t)(end - at) - size_of_bins(corpus)) / sizeof(struct candidate) <
@@ -474,6 +462,7 @@ int incise_corpus_add(struct incise_corpus *corpus, const void *bytes, size_t si
 		at += sizeof(survey);
 		survey.hash[64] = survey.text[sizeof(survey.text) - 1] = 0;
 		survey.name[sizeof(survey.name) - 1] = 0;
+		survey.group[sizeof(survey.group) - 1] = 0;
 		n = (size_t)survey.n_groups * sizeof(*survey.groups);
 		if (survey.n_groups < 0 || (size_t)(end - at) < n)
 			return incise_error_set(err, EINVAL, "%s", damaged);
@@ -775,7 +764,7 @@ struct folder {
 	const struct incise_corpus *corpus;
 	const struct incise_corpus_source *source;
 	struct incise_factor *fit, *check;
-	uint64_t row, digest, left_out;
+	uint64_t row, digest;
 	struct same_group same;
 };
 
@@ -788,13 +777,10 @@ static int fold_row(void *user, const double *row, const char *name,
 	struct incise_error own;
 	int rc;
 
-	if (is_stopped(f->corpus))
-		return incise_error_set(err, ECANCELED, "canceled");
 	f->digest = incise_random_bits(f->digest ^ group, hash);
 	/* Without groups each row is in a part of cross-validation by itself, with its equals. */
 	if (is_check(f->corpus, hash, group)) {
-		rc = incise_factor_add(f->check, row, group, &own);
-		f->left_out += rc == -ERANGE;
+		rc = incise_factor_add(f->check, row, group, 1, &own);
 		rc = rc == -ERANGE ? 0 : rc;
 	} else {
 		double weight =
@@ -802,7 +788,7 @@ static int fold_row(void *user, const double *row, const char *name,
 				? incise_propagation_add(f->corpus->propagation, row)
 				: 1;
 
-		rc = incise_factor_add_weighted(
+		rc = incise_factor_add(
 			f->fit, row,
 			f->corpus->grouped ? group : row_key(f->corpus, FOR_SAMPLE, hash),
 			weight, &own);
@@ -836,7 +822,7 @@ static void count_parts(const struct incise_corpus *corpus,
 int incise_corpus_fold(const struct incise_corpus *corpus,
 		       const struct incise_corpus_source *source,
 		       struct incise_factor *fit, struct incise_factor *check,
-		       uint64_t *left_out, struct incise_error *err)
+		       struct incise_error *err)
 {
 	struct folder f = {
 		.corpus = corpus, .source = source, .fit = fit, .check = check};
@@ -862,7 +848,5 @@ int incise_corpus_fold(const struct incise_corpus *corpus,
 				      source->name);
 	if (survey)
 		count_parts(corpus, survey, fit);
-	if (left_out)
-		*left_out += f.left_out;
 	return rc;
 }

@@ -124,7 +124,7 @@ static void add_errors(const struct incise_folds *folds, int f,
 
 static int go_on(const struct incise_folds *folds)
 {
-	return folds->stop && *folds->stop ? -ECANCELED : 0;
+	return incise_watch_count(folds->watch, 0) ? -ECANCELED : 0;
 }
 
 int incise_crossval_ridges(const struct incise_basis *basis,
@@ -132,7 +132,7 @@ int incise_crossval_ridges(const struct incise_basis *basis,
 			   const struct incise_ridge *ridges, int n, double *error)
 {
 	int n_linear = basis->n_rules * (basis->n_inputs + 1);
-	struct incise_lsq *lsq = incise_lsq_new(n_linear);
+	struct incise_lsq *lsq = incise_lsq_new(n_linear, folds->watch);
 	double *x = malloc(n_linear * sizeof(*x));
 	int rc = lsq && x ? 0 : -ENOMEM;
 
@@ -189,7 +189,7 @@ static int find_ratios(const struct incise_folds *folds, int f,
 	const struct incise_pairs *held = &folds->held[f];
 	double w[INCISE_MODEL_RULES_MAX];
 	int d = held->n_inputs, n = basis->n_rules * (d + 1), stride, rc = -ENOMEM;
-	struct incise_lsq *lsq = incise_lsq_new(n);
+	struct incise_lsq *lsq = incise_lsq_new(n, folds->watch);
 	double *phi = malloc(n * sizeof(*phi));
 	const double *factor;
 
@@ -201,7 +201,8 @@ static int find_ratios(const struct incise_folds *folds, int f,
 	if (!factor)
 		goto out;
 	rc = 0;
-	for (size_t i = 0; i < held->n; i++) {
+	for (size_t i = 0;
+	     i < held->n && !incise_watch_count(folds->watch, (double)n * n); i++) {
 		const double *x = held->rows + i * (d + 1);
 		double e = incise_basis_error(basis, x, consequents);
 
@@ -233,7 +234,8 @@ int incise_crossval_search(const struct incise_basis *basis,
 					       .ridge = ridge,
 					       .epochs = epochs,
 					       .each = add_epoch,
-					       .user = &search};
+					       .user = &search,
+					       .watch = folds->watch};
 		struct incise_basis trial = *basis;
 
 		rc = go_on(folds);

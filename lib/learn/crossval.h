@@ -9,6 +9,7 @@
 #define INCISE_CROSSVAL_H
 
 #include "basis.h"
+#include "watch.h"
 
 #define CROSSVAL_FOLDS 5
 #define CROSSVAL_REPEATS 4
@@ -25,8 +26,8 @@ struct incise_folds {
 	double zero;   /* raw output 0 in scaled units */
 	size_t n_held; /* pairs, over all folds */
 	struct incise_pairs fit[CROSSVAL_MAX], held[CROSSVAL_MAX];
-	int *unit[CROSSVAL_MAX];  /* of each held pair */
-	const volatile int *stop; /* no further fold once it is not 0; NULL: all */
+	int *unit[CROSSVAL_MAX];    /* of each held pair */
+	struct incise_watch *watch; /* or NULL */
 };
 
 /* Returns 0 or -ENOMEM; incise_folds_free() in either case. */

@@ -10,8 +10,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <incise/arrow.h>
-#include <incise/dataset.h>
-#include "../base/crypto/sha256.h"
 #include "../base/lines.h"
 #include "pairs.h"
 
@@ -305,13 +303,14 @@ static int read_rows(struct reader *in, struct sink *sink)
 	return rc;
 }
 
+/* Of any size: only the columns that are asked for are kept. */
+static const struct incise_infile_kind csv = {
+	.name = "a CSV file",
+	.advice = "give a CSV file with a header row",
+};
+
 static int read_file(const char *path, struct sink *sink, struct incise_error *err)
 {
-	/* Of any size: only the columns that are asked for are kept. */
-	static const struct incise_infile_kind csv = {
-		.name = "a CSV file",
-		.advice = "give a CSV file with a header row",
-	};
 	struct reader in;
 	int rc = incise_lines_open(&in.lines, path, &csv, err);
 
@@ -320,6 +319,23 @@ static int read_file(const char *path, struct sink *sink, struct incise_error *e
 	rc = read_rows(&in, sink);
 	incise_lines_close(&in.lines);
 	return rc < 0 ? rc : 0;
+}
+
+bool incise_dataset_has(const char *path, const char *column, bool *stated)
+{
+	struct reader in;
+	double value;
+	int at = -ENOENT;
+
+	if (incise_lines_open(&in.lines, path, &csv, NULL))
+		return false;
+	if (next_row(&in) > 0)
+		at = look_for_column(&in, column);
+	if (at >= 0 && stated && next_row(&in) > 0 &&
+	    (at >= in.n_fields || number(&in, at, column, &value)))
+		*stated = false;
+	incise_lines_close(&in.lines);
+	return at >= 0;
 }
 
 int incise_dataset_each(const char *path, const char *const *columns, int n,
@@ -742,18 +758,6 @@ size_t incise_dataset_rows(const struct incise_dataset *data)
 const double *incise_dataset_row(const struct incise_dataset *data, size_t row)
 {
 	return data->values + row * data->columns;
-}
-
-int incise_dataset_sha256(const struct incise_dataset *data, char hex[65])
-{
-	struct incise_sha256 sha = {0};
-
-	incise_sha256_start(&sha);
-	incise_sha256_add(&sha, data->values,
-			  data->rows * data->columns * sizeof(*data->values));
-	if (data->group)
-		incise_sha256_add(&sha, data->group, data->rows * sizeof(*data->group));
-	return incise_sha256_end(&sha, hex);
 }
 
 int incise_dataset_group(const struct incise_dataset *data, size_t row)

@@ -47,16 +47,4 @@ void incise_design_target(const struct incise_design *design, struct incise_gram
 /* A rule that never fires stronger than this learns nothing from the data. */
 #define DESIGN_UNFIRED 0.05
 
-struct incise_factor;
-
-/* Whether texts of sources name the same recording by its identity, though its bytes may differ. */
-bool incise_is_same_recording(const char *a, const char *b);
-
-/* As incise_factor_add(), with a weight above 0 and at most 1; the factor cannot be encoded then. */
-int incise_factor_add_weighted(struct incise_factor *factor, const double *row,
-			       uint64_t group, double weight, struct incise_error *err);
-
-/* The design of a factor, with the sums of all its pairs; valid until the factor changes. */
-struct incise_design *incise_factor_design(struct incise_factor *factor);
-
 #endif

@@ -11,7 +11,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-#include <incise/factor.h>
 #include <incise/infile.h>
 #include <incise/outfile.h>
 #include <incise/version.h>
@@ -20,6 +19,7 @@
 #include "../base/crypto/sha256.h"
 #include "../base/random.h"
 #include "design.h"
+#include "factor.h"
 #include "tune.h"
 
 #define FORM 2 /* of the file */
@@ -48,11 +48,9 @@ struct incise_factor {
 	char version[40], options[INCISE_FACTOR_TEXT_MAX];
 };
 
-/* --- hashes -------------------------------------------------------------------------- */
-
 int incise_file_sha256(const char *path, char hex[65], struct incise_error *err)
 {
-	return incise_sha256_file(path, hex, err);
+	return incise_sha256_file(path, hex, NULL, NULL, err);
 }
 
 uint64_t incise_group_key(const char *source, const char *name)
@@ -332,13 +330,7 @@ static int part_of(const struct incise_factor *factor, uint64_t group)
 }
 
 int incise_factor_add(struct incise_factor *factor, const double *row, uint64_t group,
-		      struct incise_error *err)
-{
-	return incise_factor_add_weighted(factor, row, group, 1, err);
-}
-
-int incise_factor_add_weighted(struct incise_factor *factor, const double *row,
-			       uint64_t group, double weight, struct incise_error *err)
+		      double weight, struct incise_error *err)
 {
 	const struct incise_model_info *info = incise_model_info(factor->model);
 	const struct incise_scaling *scaling = &factor->design.scaling;
@@ -1225,10 +1217,10 @@ static int solve(struct solver *s, const struct incise_factor_ridge *wanted,
 	if (!rc)
 		rc = incise_basis_set_consequents(model, raw);
 	free(raw);
-	if (!rc && uncertainty)
-		rc = make_uncertainty(s, &ridge, wanted->noise, held, model, uncertainty);
 	if (!rc && report)
 		fill_report(s, &ridge, held, model, report);
+	if (!rc && uncertainty)
+		rc = make_uncertainty(s, &ridge, wanted->noise, held, model, uncertainty);
 	return rc;
 }
 
@@ -1236,6 +1228,7 @@ struct incise_model *incise_factor_solve(struct incise_factor *factor,
 					 const struct incise_factor_ridge *ridge,
 					 struct incise_train_report *report,
 					 struct incise_uncertainty **uncertainty,
+					 struct incise_watch *watch,
 					 struct incise_error *err)
 {
 	const struct incise_basis *basis = &factor->design.basis;
@@ -1245,18 +1238,22 @@ struct incise_model *incise_factor_solve(struct incise_factor *factor,
 	uint64_t rows = different ? different : rows_of(factor);
 	int rc = -ENODATA;
 
-	s.lsq = incise_lsq_new(s.n);
+	s.lsq = incise_lsq_new(s.n, watch);
 	s.x = malloc(s.n * sizeof(*s.x));
 	if (!model || !s.lsq || !s.x)
 		rc = -ENOMEM;
 	else if (rows >= (uint64_t)s.n)
 		rc = solve(&s, ridge, report, model, uncertainty);
+	if (!rc && watch && watch->stopped)
+		rc = -ECANCELED;
 	incise_lsq_free(s.lsq);
 	free(s.x);
 	if (!rc)
 		return model;
 	incise_model_free(model);
-	if (rc == -ENODATA)
+	if (watch && watch->stopped)
+		incise_error_set(err, ECANCELED, "training was stopped");
+	else if (rc == -ENODATA)
 		incise_error_set(
 			err, ENODATA,
 			"%llu training pairs cannot determine the %d consequent "

@@ -25,6 +25,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "gram.h"
+#include "watch.h"
 #ifdef __x86_64__
 #include <immintrin.h>
 #endif
@@ -453,9 +454,11 @@ static void row_subtract(v4 *restrict high, v4 *restrict low, const v4 *restrict
  * Cholesky's factor of m columns in place: row k has its highs at a + 2·stride·k and its lows
  * behind them. squares: those of the columns.
  */
-static void cholesky(v4 *a, int m, int stride, const double *squares)
+static void cholesky(v4 *a, int m, int stride, const double *squares,
+		     struct incise_watch *watch)
 {
-	for (int k = 0; k < m; k++) {
+	for (int k = 0; k < m && !incise_watch_count(watch, 10.0 * (m - k) * (m - k));
+	     k++) {
 		v4 *high = a + (size_t)2 * stride * k, *low = high + stride;
 		double *h = (double *)high, *l = (double *)low;
 		struct pair root;
@@ -536,7 +539,7 @@ int incise_gram_factor(struct incise_gram *gram, double mean, double scale,
 		l[n] = p.low;
 		squares[i] = h[i];
 	}
-	cholesky(a, m, stride, squares);
+	cholesky(a, m, stride, squares, incise_lsq_watch(lsq));
 	for (int i = 0; i < m; i++) {
 		const double *h = (const double *)(a + (size_t)2 * stride * i);
 		double *row = incise_lsq_factor_row(lsq, i);

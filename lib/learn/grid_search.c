@@ -46,6 +46,7 @@ struct race {
 	struct incise_scaling scaling;
 	struct incise_sample sample;
 	struct incise_folds folds;
+	struct incise_watch watch;
 	double *errors; /* ridges × units */
 	struct grid visited[VISITED_MAX];
 	int n;
@@ -176,7 +177,7 @@ static int run(struct race *race, const struct incise_pairs *pairs,
 	if (!rc)
 		rc = incise_folds_init(&race->folds, &race->sample.pairs,
 				       race->sample.groups, options->seed);
-	race->folds.stop = options->stop;
+	race->folds.watch = &race->watch;
 	if (rc)
 		return rc;
 	race->errors =
@@ -217,7 +218,11 @@ int incise_choose_grid(const struct incise_pairs *pairs,
 	race->n_inputs = pairs->n_inputs;
 	race->inputs = inputs;
 	race->type = type;
-	rc = run(race, pairs, options, n_mfs);
+	race->watch = incise_watch_of(options);
+	if (!incise_watch_ask(&race->watch))
+		rc = run(race, pairs, options, n_mfs);
+	if (race->watch.stopped)
+		rc = -ECANCELED;
 	for (int i = 0; i < race->n; i++)
 		free(race->visited[i].error);
 	incise_folds_free(&race->folds);

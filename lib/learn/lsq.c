@@ -23,6 +23,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "lsq.h"
+#include "watch.h"
 
 /* Rows folded in at a time: the block of 60 unknowns then fits the first-level cache. */
 #define BLOCK 64
@@ -41,6 +42,7 @@ struct incise_lsq {
 	double *a;	      /* BLOCK × stride */
 	double *v;	      /* of the reflection */
 	double *work, *ridge; /* a copy of r, and rows to fold into it */
+	struct incise_watch *watch;
 };
 
 static double *matrix(int rows, int stride)
@@ -53,13 +55,14 @@ static double *matrix(int rows, int stride)
 	return m;
 }
 
-struct incise_lsq *incise_lsq_new(int n)
+struct incise_lsq *incise_lsq_new(int n, struct incise_watch *watch)
 {
 	struct incise_lsq *lsq = calloc(1, sizeof(*lsq));
 
 	if (!lsq)
 		return NULL;
 	lsq->n = n;
+	lsq->watch = watch;
 	lsq->stride = (n + 1 + 3) & ~3;
 	lsq->r = matrix(n + 1, lsq->stride);
 	lsq->a = matrix(BLOCK, lsq->stride);
@@ -82,6 +85,11 @@ void incise_lsq_free(struct incise_lsq *lsq)
 	free(lsq->work);
 	free(lsq->ridge);
 	free(lsq);
+}
+
+struct incise_watch *incise_lsq_watch(const struct incise_lsq *lsq)
+{
+	return lsq->watch;
 }
 
 void incise_lsq_reset(struct incise_lsq *lsq)
@@ -236,16 +244,19 @@ static double length(double alpha, const double *v, int rows)
  * Fold rows of a into the triangle r; a is left zero. Of a staircase, row i starts in
  * column i: what lies below is not touched.
  */
-static void fold(double *r, double *a, double *v, int n, int stride, int rows,
-		 bool staircase)
+static void fold(struct incise_lsq *lsq, double *r, double *a, int rows, bool staircase)
 {
 	reflect_fn *reflect = reflect_here();
+	int n = lsq->n, stride = lsq->stride;
+	double *v = lsq->v;
 
 	for (int j = 0; j <= n; j++) {
 		double *top = r + (size_t)j * stride, alpha = top[j], beta, over;
 		int m = staircase && j + 1 < rows ? j + 1 : rows;
 		bool zero = true;
 
+		if (incise_watch_count(lsq->watch, 4.0 * m * (n - j)))
+			return;
 		for (int i = 0; i < m; i++) {
 			v[i] = a[(size_t)i * stride + j];
 			a[(size_t)i * stride + j] = 0;
@@ -271,7 +282,7 @@ static void fold(double *r, double *a, double *v, int n, int stride, int rows,
 static void fold_waiting(struct incise_lsq *lsq)
 {
 	if (lsq->rows)
-		fold(lsq->r, lsq->a, lsq->v, lsq->n, lsq->stride, lsq->rows, false);
+		fold(lsq, lsq->r, lsq->a, lsq->rows, false);
 	lsq->rows = 0;
 }
 
@@ -325,13 +336,13 @@ static void fold_ridge(struct incise_lsq *lsq, const struct incise_ridge *ridge)
 	if (ridge->mean == 1) {
 		for (int i = 0; i < ridge->n; i++)
 			lsq->ridge[(size_t)i * (lsq->stride + 1)] = sqrt(ridge->ridge);
-		fold(lsq->work, lsq->ridge, lsq->v, lsq->n, lsq->stride, ridge->n, true);
+		fold(lsq, lsq->work, lsq->ridge, ridge->n, true);
 		return;
 	}
 	contrast_rows(lsq, ridge);
-	fold(lsq->work, lsq->ridge, lsq->v, lsq->n, lsq->stride, ridge->n - width, true);
+	fold(lsq, lsq->work, lsq->ridge, ridge->n - width, true);
 	mean_rows(lsq, ridge);
-	fold(lsq->work, lsq->ridge, lsq->v, lsq->n, lsq->stride, width, false);
+	fold(lsq, lsq->work, lsq->ridge, width, false);
 }
 
 const double *incise_lsq_factor(struct incise_lsq *lsq, const struct incise_ridge *ridge,
@@ -353,6 +364,8 @@ const double *incise_lsq_factor(struct incise_lsq *lsq, const struct incise_ridg
 		fold_ridge(lsq, ridge);
 		factor = lsq->work;
 	}
+	if (incise_watch_count(lsq->watch, 0))
+		return NULL;
 	for (int i = 0; i <= lsq->n; i++)
 		for (int k = i; k <= lsq->n; k++)
 			if (!isfinite(factor[(size_t)i * lsq->stride + k]))
@@ -424,12 +437,14 @@ static double make_reflection(double *v, int n, double *tau)
  * Reflections from both sides (Golub and Van Loan, Matrix Computations, 5.4.8) make a, n × n,
  * bidiagonal, with its singular values kept. v and sums are scratch, n each.
  */
-static void make_bidiagonal(double *a, struct bidiagonal *to, double *v, double *sums)
+static void make_bidiagonal(double *a, struct bidiagonal *to, double *v, double *sums,
+			    struct incise_watch *watch)
 {
 	int n = to->n;
 	double tau;
 
-	for (int j = 0; j < n; j++) {
+	for (int j = 0; j < n && !incise_watch_count(watch, 8.0 * (n - j) * (n - j));
+	     j++) {
 		for (int i = j; i < n; i++)
 			v[i - j] = a[(size_t)i * n + j];
 		to->d[j] = make_reflection(v, n - j, &tau);
@@ -511,7 +526,7 @@ int incise_lsq_condition(struct incise_lsq *lsq, double *condition)
 					factor[(size_t)i * stride + k] / largest;
 		b.d = lines;
 		b.e = lines + n;
-		make_bidiagonal(a, &b, lines + 2 * n, lines + 3 * n);
+		make_bidiagonal(a, &b, lines + 2 * n, lines + 3 * n, lsq->watch);
 		/* elements are at most 1, so no singular value is above n */
 		smallest = singular_value(&b, 0, n + 1);
 		if (smallest > 0)

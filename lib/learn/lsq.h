@@ -11,6 +11,7 @@
 #define INCISE_LSQ_H
 
 struct incise_lsq;
+struct incise_watch;
 
 /*
  * The ridge: ridge·|p|² over the first n unknowns. Where these are `blocks` alike ones
@@ -23,9 +24,13 @@ struct incise_ridge {
 	int n, blocks;
 };
 
-/* For n unknowns; NULL with errno ENOMEM. */
-struct incise_lsq *incise_lsq_new(int n);
+/*
+ * For n unknowns. Where the watch (or NULL) ends the training, solutions fail. NULL with errno ENOMEM.
+ */
+struct incise_lsq *incise_lsq_new(int n, struct incise_watch *watch);
 void incise_lsq_free(struct incise_lsq *lsq);
+
+struct incise_watch *incise_lsq_watch(const struct incise_lsq *lsq);
 
 /* Forget all rows. */
 void incise_lsq_reset(struct incise_lsq *lsq);

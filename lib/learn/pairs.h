@@ -14,6 +14,28 @@
 #include <incise/train.h>
 #include "basis.h"
 
+struct ArrowArrayStream;
+
+/*
+ * Take a row of numbers, in the order of the columns, with the text of its group (NULL without);
+ * both are valid during the call. Not 0: no further row is read, and that is returned.
+ */
+typedef int (*incise_row_taker)(void *user, const double *row, const char *group,
+				struct incise_error *err);
+
+/*
+ * Read rows one by one, in memory of one row, as incise_dataset_read_where() and
+ * incise_dataset_from_arrow() do. 0, their negative errno, or what the taker returned; left_out (or
+ * NULL) is set to the number of omitted rows.
+ */
+int incise_dataset_each(const char *path, const char *const *columns, int n,
+			const char *group, const char *where, incise_row_taker take,
+			void *user, uint64_t *left_out, struct incise_error *err);
+int incise_dataset_each_arrow(struct ArrowArrayStream *stream, const char *const *columns,
+			      int n, const char *group, const char *where,
+			      incise_row_taker take, void *user, uint64_t *left_out,
+			      struct incise_error *err);
+
 /* Scaled = (raw - offset) / scale, per column; the output is the last. */
 struct incise_scaling {
 	int n_inputs;

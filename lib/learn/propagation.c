@@ -12,8 +12,8 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <incise/propagation.h>
 #include "lsq.h"
+#include "propagation.h"
 
 /* The smallest share of the noise that is left to the scatter. */
 #define SCATTER_LEAST 0.2
@@ -323,7 +323,7 @@ static int join(struct incise_propagation *p)
 			       (size_t)p->n * sizeof(double));
 		return 0;
 	}
-	lsq = incise_lsq_new(p->n);
+	lsq = incise_lsq_new(p->n, NULL);
 	if (!lsq)
 		return -ENOMEM;
 	for (int i = 0; i < p->n_origins; i++) {

@@ -13,11 +13,11 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <incise/factor.h>
 #include "anfis.h"
 #include "design.h"
 #include "interval.h"
 #include "pairs.h"
+#include "train.h"
 #include "tune.h"
 #include "varpro.h"
 
@@ -31,6 +31,8 @@ struct learner {
 	struct incise_model *model; /* the one at work */
 	const struct incise_pairs *train, *check;
 	const struct incise_train_options *options;
+	const struct incise_train_sums *sums; /* NULL: of the pairs given */
+	struct incise_watch watch;
 	struct incise_train_report *report;
 	struct incise_scaling scaling;
 	struct incise_basis basis; /* scaled */
@@ -38,6 +40,7 @@ struct learner {
 	struct incise_lsq *lsq;
 	struct incise_design design; /* of all pairs, or those of a sample's factor: */
 	struct incise_factor *all;
+	bool failed; /* to find that */
 	struct incise_sample tuned;
 	struct incise_folds folds; /* of that */
 	struct incise_tuning tuning;
@@ -116,13 +119,14 @@ static int check_trainable(const struct incise_model *model, struct incise_error
 }
 
 /* RMSE in the output's unit of scaled parameters over raw pairs. */
-static double rmse_of(const struct learner *l, const struct incise_basis *basis,
+static double rmse_of(struct learner *l, const struct incise_basis *basis,
 		      const double *consequents, const struct incise_pairs *pairs)
 {
 	double x[INCISE_MODEL_INPUTS_MAX + 1], sum = 0;
 	int d = pairs->n_inputs;
 
-	for (size_t i = 0; i < pairs->n; i++) {
+	for (size_t i = 0;
+	     i < pairs->n && !incise_watch_count(&l->watch, basis->n_rules * 10); i++) {
 		double e;
 
 		incise_scaling_row(&l->scaling, pairs->rows + i * (d + 1), x);
@@ -135,14 +139,11 @@ static double rmse_of(const struct learner *l, const struct incise_basis *basis,
 static bool on_epoch(void *user, int epoch, const struct incise_basis *basis,
 		     const double *consequents)
 {
-	const struct learner *l = user;
-	const struct incise_train_options *options = l->options;
+	struct learner *l = user;
 
-	if (options->progress)
-		options->progress(
-			options->user, epoch, rmse_of(l, basis, consequents, l->train),
-			l->check ? rmse_of(l, basis, consequents, l->check) : NAN);
-	return !options->stop || !*options->stop;
+	return !incise_watch_epoch(
+		&l->watch, epoch, rmse_of(l, basis, consequents, l->train),
+		l->check ? rmse_of(l, basis, consequents, l->check) : NAN);
 }
 
 /* The design of the pairs given, which are all. */
@@ -158,7 +159,10 @@ static int design_pairs(struct learner *l)
 	}
 	rc = incise_design_init(&l->design, l->model, min, max);
 	for (size_t i = 0; i < l->train->n && !rc; i++)
-		rc = incise_design_add(&l->design, l->train->rows + i * (d + 1));
+		rc = incise_watch_count(&l->watch, pow(l->basis.n_rules * (d + 1), 2))
+			     ? -ECANCELED
+			     : incise_design_add(&l->design,
+						 l->train->rows + i * (d + 1));
 	return rc;
 }
 
@@ -172,16 +176,17 @@ static int fold_all(struct learner *l)
 	int d = l->train->n_inputs, rc = 0;
 	double unit, mean, scale;
 
-	if (l->options->all) {
-		l->all = l->options->all(l->options->user, l->model);
-		if (!l->all)
-			return -ECANCELED;
-		design = incise_factor_design(l->all);
+	if (l->sums) {
+		rc = l->sums->find(l->sums->user, l->model, &l->all);
+		l->failed = rc;
+		if (!rc)
+			design = incise_factor_design(l->all);
 	} else {
 		rc = design_pairs(l);
 	}
 	if (rc)
 		return rc;
+	l->watch.step.phase = INCISE_TRAIN_SOLVE;
 	for (int r = 0; r < l->basis.n_rules; r++) {
 		l->report->unfired[r] = design->largest[r] < DESIGN_UNFIRED;
 		l->report->rules_unfired += l->report->unfired[r];
@@ -201,9 +206,7 @@ static int train_classic(struct learner *l, struct incise_tuning *tuning)
 		.ridge = CLASSIC_RIDGE,
 		.step = l->options->step,
 		.epochs = l->options->epochs,
-		.progress = l->options->progress,
-		.user = l->options->user,
-		.stop = l->options->stop,
+		.watch = &l->watch,
 	};
 	int rc = incise_anfis_run(l->model, &anfis);
 
@@ -232,8 +235,10 @@ static int set_consequents(struct learner *l, double *consequents)
 
 static int train_default(struct learner *l, struct incise_tuning *tuning)
 {
-	struct incise_varpro varpro = {
-		.pairs = &l->tuned.pairs, .each = on_epoch, .user = l};
+	struct incise_varpro varpro = {.pairs = &l->tuned.pairs,
+				       .each = on_epoch,
+				       .user = l,
+				       .watch = &l->watch};
 	struct incise_basis raw;
 	int rc = incise_tune(&l->basis, &l->folds, l->options, tuning);
 
@@ -243,14 +248,14 @@ static int train_default(struct learner *l, struct incise_tuning *tuning)
 	varpro.epochs = tuning->epochs;
 	l->basis = tuning->basis;
 	rc = incise_varpro_run(&l->basis, l->consequents, &varpro);
-	if (!rc && l->options->stop && *l->options->stop)
+	if (!rc && l->watch.stopped)
 		rc = -ECANCELED;
 	if (rc)
 		return rc;
 	raw = l->basis;
 	incise_scaling_premises(&l->scaling, &raw, true);
 	incise_basis_store(&raw, l->model);
-	if (l->options->weighted)
+	if (l->sums && l->sums->weighted)
 		rc = set_consequents(l, l->consequents);
 	if (!rc)
 		rc = fold_all(l);
@@ -291,6 +296,10 @@ static int find_uncertainty(struct learner *l, const struct incise_tuning *tunin
 		factor = incise_lsq_factor(l->lsq, &ridge, &stride);
 	if (!factor)
 		return tuning->average ? -errno : -EDOM;
+	if (l->watch.stopped) {
+		free(own);
+		return -ECANCELED;
+	}
 	*l->options->uncertainty =
 		incise_uncertainty_new(l->model,
 				       noise * l->scaling.scale[l->basis.n_inputs],
@@ -315,7 +324,7 @@ static int learn(struct learner *l)
 	if (most < (size_t)3 * n)
 		most = (size_t)3 * n;
 	l->consequents = malloc(n * sizeof(*l->consequents));
-	l->lsq = incise_lsq_new(n);
+	l->lsq = incise_lsq_new(n, &l->watch);
 	if (!l->consequents || !l->lsq)
 		return -ENOMEM;
 	incise_scaling_premises(&l->scaling, &l->basis, false);
@@ -325,10 +334,11 @@ static int learn(struct learner *l)
 	if (!rc && l->tuned.rows)
 		rc = incise_folds_init(&l->folds, &l->tuned.pairs, l->tuned.groups,
 				       l->options->seed);
-	l->folds.stop = l->options->stop;
+	l->folds.watch = &l->watch;
 	l->folds.zero = -l->scaling.offset[l->basis.n_inputs] /
 			l->scaling.scale[l->basis.n_inputs];
-	l->folds.cuts &= l->tuned.pairs.n == l->train->n && !l->options->weighted;
+	l->folds.cuts &=
+		l->tuned.pairs.n == l->train->n && !(l->sums && l->sums->weighted);
 	if (!rc)
 		rc = classic ? train_classic(l, tuning) : train_default(l, tuning);
 	if (!rc)
@@ -375,15 +385,17 @@ static int fail(struct incise_error *err, int rc)
 			  "them or give fewer membership functions");
 }
 
-int incise_train(struct incise_model *model, const struct incise_pairs *train,
-		 const struct incise_pairs *check,
-		 const struct incise_train_options *options,
-		 struct incise_train_report *report, struct incise_error *err)
+int incise_train_sample(struct incise_model *model, const struct incise_pairs *train,
+			const struct incise_pairs *check,
+			const struct incise_train_options *options,
+			const struct incise_train_sums *sums,
+			struct incise_train_report *report, struct incise_error *err)
 {
 	const struct incise_model_info *info = incise_model_info(model);
 	struct incise_variable inputs[INCISE_MODEL_INPUTS_MAX];
 	struct incise_train_report own;
 	struct learner *l;
+	bool failed;
 	int rc;
 
 	for (int i = 0; i < info->n_inputs; i++)
@@ -399,11 +411,17 @@ int incise_train(struct incise_model *model, const struct incise_pairs *train,
 	l->train = train;
 	l->check = check;
 	l->options = options;
+	l->sums = sums;
+	l->watch = incise_watch_of(options);
 	l->report = report ? report : &own;
 	memset(l->report, 0, sizeof(*l->report));
 	incise_scaling_find(&l->scaling, inputs, train);
 	l->model = incise_model_copy(model);
-	rc = l->model ? learn(l) : -ENOMEM;
+	rc = l->model ? 0 : -ENOMEM;
+	if (!rc && !incise_watch_ask(&l->watch))
+		rc = learn(l);
+	if (l->watch.stopped)
+		rc = -ECANCELED;
 	if (!rc)
 		incise_model_assign(model, l->model);
 	incise_model_free(l->model);
@@ -413,6 +431,15 @@ int incise_train(struct incise_model *model, const struct incise_pairs *train,
 	incise_average_free(l->tuning.average);
 	free(l->consequents);
 	incise_sample_free(&l->tuned);
+	failed = l->failed;
 	free(l);
-	return rc ? fail(err, rc) : 0;
+	return rc && !failed ? fail(err, rc) : rc;
+}
+
+int incise_train(struct incise_model *model, const struct incise_pairs *train,
+		 const struct incise_pairs *check,
+		 const struct incise_train_options *options,
+		 struct incise_train_report *report, struct incise_error *err)
+{
+	return incise_train_sample(model, train, check, options, NULL, report, err);
 }

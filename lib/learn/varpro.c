@@ -174,9 +174,9 @@ int incise_varpro_run(struct incise_basis *basis, double *consequents,
 	double *trial = malloc(n * sizeof(double)), error, mu = MU_FIRST;
 	int rc = -ENOMEM;
 
-	s.linear = incise_lsq_new(n);
-	s.all = incise_lsq_new(n + q);
-	s.damped = incise_lsq_new(q);
+	s.linear = incise_lsq_new(n, varpro->watch);
+	s.all = incise_lsq_new(n + q, varpro->watch);
+	s.damped = incise_lsq_new(q, varpro->watch);
 	s.kept = malloc((varpro->pairs->n + 1) * basis->n_rules * sizeof(double));
 	s.step = malloc(q * sizeof(double));
 	s.scale = malloc(q * sizeof(double));

@@ -8,6 +8,7 @@
 #define INCISE_VARPRO_H
 
 #include "basis.h"
+#include "watch.h"
 
 struct incise_varpro {
 	const struct incise_pairs *pairs;
@@ -20,7 +21,8 @@ struct incise_varpro {
 	bool (*each)(void *user, int epoch, const struct incise_basis *basis,
 		     const double *consequents);
 	void *user;
-	int run; /* result: the last epoch */
+	struct incise_watch *watch; /* ends the search; or NULL */
+	int run;		    /* result: the last epoch */
 };
 
 /*

@@ -16,9 +16,9 @@ struct incise_loop_control {
 	_Atomic(struct incise_plan *) offered, retired;
 	_Atomic uint64_t ticks;
 	_Atomic int tool;   /* at the last tick */
-	_Atomic int wanted; /* tool that was set, + 1; 0: none was */
+	_Atomic int wanted; /* tool that was set, + 1; 0: not set */
 	struct incise_ring events;
-	struct incise_ring kept; /* ticks; without memory where nobody wants them */
+	struct incise_ring kept; /* ticks; without memory unless a caller wants them */
 };
 
 struct incise_loop_control *incise_loop_control_new(void)

@@ -23,13 +23,13 @@ void incise_loop_control_retire(struct incise_loop_control *control,
 void incise_loop_control_event(struct incise_loop_control *control,
 			       const struct incise_loop_event *event) INCISE_REALTIME;
 
-/* Events that were dropped because nobody took the ones before. Any thread's. */
+/* Events that were dropped because the ring was full. Any thread's. */
 uint64_t incise_loop_control_events_lost(const struct incise_loop_control *control);
 
 void incise_loop_control_ticked(struct incise_loop_control *control, uint64_t ticks,
 				enum incise_tool tool) INCISE_REALTIME;
 
-/* The tool that was set; false: none was. */
+/* The tool that was set; false: not set. */
 bool incise_loop_control_wanted_tool(const struct incise_loop_control *control,
 				     enum incise_tool *tool) INCISE_REALTIME;
 

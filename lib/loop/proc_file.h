@@ -18,7 +18,7 @@ int proc_file_read(const char *root, const char *path, char *text, size_t size);
 /* A whole number and nothing else. */
 bool proc_file_integer(const char *text, long long *value);
 
-/* Whether a list of CPUs such as "0-2,5" has this one; a malformed list has none. */
+/* Whether a list of CPUs such as "0-2,5" has this one; a malformed list has no CPU. */
 bool proc_file_lists(const char *list, int cpu);
 
 #endif

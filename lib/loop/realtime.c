@@ -32,7 +32,7 @@
 #include "proc_file.h"
 #include "realtime.h"
 
-/* Of each thread: with memory locked, the whole stack is resident. */
+/* For each thread: with memory locked, the whole stack is resident. */
 #define STACK_BYTES (256 << 10)
 #define TOUCH_BYTES (128 << 10)
 #define SPARE_BYTES (16 << 10)
@@ -55,7 +55,7 @@ struct attributes {
 /* Periods of SCHED_DEADLINE: /proc/sys/kernel/sched_deadline_period_{min,max}_us. */
 #define DEADLINE_MIN_NS 100000
 
-/* One part in two of the period: ticks need far less, and a loop that hangs leaves half. */
+/* Half of the period: ticks need far less, and a loop that hangs leaves the other half. */
 #define DEADLINE_SHARE 2
 
 /* Threads, rings and modules of devices map up to this much more. */
@@ -207,7 +207,7 @@ static int try_lock(uint64_t bytes)
 	return rc;
 }
 
-/* A program may raise its soft limit to the hard one by itself. */
+/* A program may raise its soft limit to the hard limit by itself. */
 static rlim_t raise_limit(int resource)
 {
 	struct rlimit limit;

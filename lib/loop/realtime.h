@@ -34,7 +34,7 @@ int realtime_judge(const struct incise_realtime_setup *setup,
 		   const struct realtime_answers *answers, const char *root,
 		   struct incise_realtime_check *checks, int n);
 
-/* One line with everything that is needed and denied; the errno of the first. */
+/* One line with all denied needs; the errno of the first. */
 int realtime_denied(const struct realtime_answers *answers,
 		    const struct incise_realtime_check *checks, int n,
 		    struct incise_error *err);

@@ -14,7 +14,7 @@
 #define CPUS "/sys/devices/system/cpu/"
 #define CLOCKSOURCE "/sys/devices/system/clocksource/clocksource0/"
 
-/* Raises both limits: whoever needs one needs the other. */
+/* Raises both limits: a user who needs one needs the other. */
 #define GRANT "sudo prlimit --pid $$ --rtprio=90 --memlock=unlimited"
 #define GRANT_FOR_GOOD                                                       \
 	"printf '%s - rtprio 90\\n%s - memlock unlimited\\n' $USER $USER | " \
@@ -55,7 +55,7 @@ static void set_keep(struct incise_realtime_check *check, const char *command)
 	snprintf(check->keep, sizeof(check->keep), "%s", command);
 }
 
-/* The first line of a file below the root; false and "" when there is none. */
+/* The first line of a file below the root; false and "" without one. */
 static bool read_line(const struct judgement *j, const char *path, char *text,
 		      size_t size)
 {
@@ -261,7 +261,7 @@ static void check_throttling(const struct judgement *j,
 			"sudo tee /etc/sysctl.d/60-incise.conf");
 }
 
-/* Of the set-up's CPU, or of all. */
+/* Look at the set-up's CPU, or at all. */
 static void check_governor(const struct judgement *j, struct incise_realtime_check *check)
 {
 	char online[256], path[128], text[32], other[32] = "";

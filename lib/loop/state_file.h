@@ -4,8 +4,8 @@
  *
  *   made without a name ── locked, written ── put under its name ── kept open and locked
  *
- * It is written by pwrite(2) and never mapped: others may cut it off, which ends who touches a
- * mapping of it by SIGBUS.
+ * It is written by pwrite(2) and never mapped: others may cut it off, and then SIGBUS ends a
+ * program that touches a mapping of it.
  *
  * The lock is a write lock of the open file (F_OFD_SETLK): it ends with the process, needs the
  * right to write, and can be queried without being taken. With a flock(2), which needs only the
@@ -32,8 +32,8 @@ int incise_state_file_new(struct incise_state_file *file, const char *path, size
 			  struct incise_error *err);
 
 /*
- * Put it under its name. Of two simultaneous callers only one succeeds. Returns 0; -EBUSY, errno
- * of linkat(2), rename(2).
+ * Put it under its name. If two callers do so at once, only one succeeds. Returns 0; -EBUSY,
+ * errno of linkat(2), rename(2).
  */
 int incise_state_file_publish(struct incise_state_file *file, struct incise_error *err);
 

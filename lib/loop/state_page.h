@@ -96,7 +96,7 @@ struct state_live {
 };
 
 struct state_slot {
-	uint64_t number; /* of the tick, from 1 on; 0: none */
+	uint64_t number; /* of the tick, from 1 on; 0: no tick */
 	struct state_tick tick;
 };
 
@@ -143,7 +143,7 @@ void incise_state_tick(struct incise_state_writer *writer, const struct incise_t
 		       uint64_t skipped) INCISE_REALTIME;
 
 /*
- * Copy to the file, now, what the loop has published; the writer's own thread does so every few
+ * Copy the loop's published state to the file now; the writer's own thread does so every few
  * milliseconds. For the normal thread.
  */
 void incise_state_mirror(struct incise_state_writer *writer);

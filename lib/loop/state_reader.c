@@ -3,9 +3,9 @@
  * The reader of a state page; see incise/state.h.
  *
  * It copies by pread(2), so that a truncated file is a short read and no signal, and checks its
- * copy, which nobody else can change. Its loads happen in the order of the calls: a fence also
- * orders the kernel's loads in them. Aligned words of 8 bytes are copied whole; a seq that was
- * not would differ when it is read again.
+ * copy, which no other process can change. Its loads happen in the order of the calls: a fence
+ * also orders the kernel's loads in them. Aligned words of 8 bytes are copied whole; a seq that
+ * was not would differ when it is read again.
  */
 #include <errno.h>
 #include <fcntl.h>

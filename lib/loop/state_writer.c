@@ -5,8 +5,8 @@
  *     loop ─── tick ───▶ page in own memory ─── mirror: a thread, each 5 ms ───▶ file
  *     normal thread ─ run ─▶ ┘                  (and the normal thread at each change)
  *
- * The loop writes memory that nobody else can reach: it depends neither on the disk that the file
- * is on, nor on others who change the file or cut it off.
+ * The loop writes private memory: it depends neither on the disk that the file is on, nor on
+ * others who change the file or cut it off.
  */
 #include <errno.h>
 #include <math.h>
@@ -87,7 +87,7 @@ struct work {
 	struct sum returned; /* to the hand; ≥ 0 */
 	double tool_mm[3], force_N[3];
 	enum incise_tool tool;
-	bool known; /* tool_mm and force_N are those of the last tick */
+	bool known; /* tool_mm and force_N of the last tick */
 };
 
 static void add_work(struct work *work, const struct incise_tick *tick)
@@ -205,7 +205,7 @@ static void put_head(struct state_head *head, const struct incise_state_setup *s
 
 static void mirror_put(struct mirror *m, size_t offset, const void *from, size_t size)
 {
-	/* A full disk, say: what is missing is written once there is room. */
+	/* A full disk, say: the missing part is written once there is room. */
 	incise_state_file_write(&m->file, offset, from, size);
 }
 
@@ -266,7 +266,7 @@ static void mirror_times(struct mirror *m, size_t offset, const uint64_t *counts
 	mirror_put(m, offset, copy, sizeof(copy));
 }
 
-/* A slot with the tick of that number, or with none: it has been overwritten. */
+/* A slot with the tick of that number, or without a tick: it has been overwritten. */
 static bool take_slot(const struct state_page *page, uint64_t tick,
 		      struct state_slot *copy)
 {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
  * Many evaluations of a compiled model at once, for surfaces, exports and benches: four
- * at a time where the processor has AVX2, one by one elsewhere. Results are those of
- * incise_fixed_eval() to the bit: this is a copy of lib/fixed/eval.c in vectors, and a test
- * compares both.
+ * at a time where the processor has AVX2, one by one elsewhere. Results equal
+ * incise_fixed_eval()'s to the bit: this is a copy of lib/fixed/eval.c in vectors, and a
+ * test compares both.
  *
  * Numbers stand in the lower halves of 64-bit lanes, whose products are exact. AVX2 has
  * no arithmetic shift of 64 bits: where the result fits in 32 bits and the shift is by at
@@ -30,7 +30,7 @@ static void one_by_one(const struct incise_fixed *fx, const int32_t *x, int32_t 
 /* One input of four evaluations: the place in the table, and the way into the cell. */
 struct place {
 	__m256i cell; /* 64-bit lanes */
-	__m256i from; /* share of the knot below: 2^cell_shift - share of the one above */
+	__m256i from; /* share of the knot below: 2^cell_shift - share of the knot above */
 	__m256i to;
 };
 
@@ -318,7 +318,7 @@ static size_t by_vectors(const struct incise_fixed *fx, const int32_t *x, int32_
 			 size_t n)
 {
 	n -= n % LANES;
-	/* The direct arithmetic is all 64-bit products: AVX2 has none. */
+	/* The direct arithmetic is all 64-bit products, which AVX2 lacks. */
 	if (fx->arithmetic == INCISE_FIXED_DIRECT || !__builtin_cpu_supports("avx2"))
 		return 0;
 	if (fx->n_inputs == 1)

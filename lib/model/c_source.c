@@ -2,7 +2,7 @@
 /*
  * A compiled model as a C file of its own, for a microcontroller: the blob's numbers as
  * constant tables, and the arithmetic of lib/fixed with this model's formats filled in.
- * Its outputs are those of incise_fixed_eval() to the bit; a test compiles it.
+ * Its outputs equal incise_fixed_eval()'s to the bit; a test compiles it.
  */
 #include <ctype.h>
 #include <errno.h>

@@ -29,7 +29,7 @@ struct compiled {
 struct source {
 	const struct incise_model *model;
 	struct incise_axis axis[INCISE_FIXED_INPUTS_MAX]; /* of each input */
-	/* Of one and two inputs; else NULL. */
+	/* For one and two inputs; else NULL. */
 	const struct incise_grid *grid;
 	const struct incise_survey *survey;
 	struct incise_grid_size size;
@@ -152,7 +152,7 @@ static long double knot(const struct cells *cells, int k)
 	return cells->from + (long double)cells->width * k;
 }
 
-/* The two inputs' cells as the grid's a and b; a trivial input a has none. */
+/* The two inputs' cells as the grid's a and b; a trivial input a has no cells. */
 static void image_cells(const struct image *image, struct cells *a, struct cells *b)
 {
 	*a = image->grid->one ? (struct cells){0} : cells_of(image, 0);
@@ -209,7 +209,7 @@ static struct incise_fixed *image_finish(struct image *image, struct incise_erro
 	return &owned->fx;
 }
 
-/* --- table: what the rules depend on --- */
+/* --- table: the premises of the rules --- */
 
 /* Weights at each knot of input a, rounded so that they add up to just 2^30. */
 static int put_weights(struct image *image, const struct cells *cells)
@@ -307,7 +307,7 @@ static int build_table(struct image *image, int cells)
 	image->head.shift_b = (int)fmin(45, 30 - bits_of(size->slope));
 	if (image->head.shift_a < 17 || 16 + image->head.shift_b < image->head.shift_a)
 		return -ERANGE;
-	/* A shift by more than 62 is none; more digits of h than that say nothing. */
+	/* Shifts by more than 62 are invalid; h needs no more digits than that. */
 	if (16 + image->head.shift_b - image->head.shift_a > 62)
 		image->head.shift_b = 46 + image->head.shift_a;
 	image_cells(image, &a, &b);
@@ -338,7 +338,7 @@ static bool compile_mf(const struct incise_axis *axis, int i, struct incise_fx_m
 	/* So wide that it is flat: 2^-32 of a width is less than an LSB of the result. */
 	fx->slope = shift > 62 ? 0 : (int32_t)fmin(slope, 1 << 30);
 	fx->shift = shift > 62 ? 62 : shift;
-	/* The rounding of the centre would act like one of the input: as much as 30 µN. */
+	/* Rounding the centre would act like rounding the input: as much as 30 µN. */
 	lost = axis->c[i] - fx->centre / (double)INCISE_FIXED_ONE;
 	fx->offset = (int32_t)lrint(ldexp(fmax(-127, fmin(lost * k, 127)), 24));
 	fx->centre = incise_fx_int32(fx->centre);
@@ -524,8 +524,7 @@ static int build(struct image *image, const struct source *source, int arithmeti
 	return rc;
 }
 
-/* The first candidate, from cheap to dear, whose bound is within the budget; else the one
- * of the least bound is left in *best. */
+/* The cheapest candidate within the budget; else *best has the least bound. */
 static int choose(struct image *best, const struct incise_grid *grid,
 		  const struct incise_fixed_options *o, const struct incise_model *model)
 {

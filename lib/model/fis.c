@@ -113,8 +113,8 @@ static int read_name(struct reader *in, const char *text, char *name)
 }
 
 /*
- * [a b c]: just n finite numbers, then the end of the line; one may lack its brackets. @padded: zeros may
- * follow, with which MATLAB once filled the numbers of each function up to four.
+ * [a b c]: just n finite numbers, then the end of the line; a single number may lack its brackets.
+ * @padded: zeros may follow, with which MATLAB once filled the numbers of each function up to four.
  */
 static int read_numbers(struct reader *in, const char *text, double *values, int n,
 			bool padded)
@@ -219,7 +219,7 @@ static int system_key(struct reader *in, const char *key, const char *value)
 	return i < 0 ? i : 0;
 }
 
-/* One character between white space; *text moves behind all. */
+/* One character between white space; *text moves behind them. */
 static bool skip(const char **text, char c)
 {
 	const char *at = *text + strspn(*text, BLANKS);
@@ -568,7 +568,7 @@ out:
 
 /* --- writing --- */
 
-/* A name within single quotes: what would end it early or break the line is replaced. */
+/* A name within single quotes; characters that would end it early or break the line are replaced. */
 static void write_name(FILE *out, const char *key, const char *name)
 {
 	fprintf(out, "%s='", key);

@@ -24,8 +24,8 @@
 #define LN_FAR 345.38776394910684
 
 /*
- * The gap on a foot itself, where the degree is zero already. And the width in which gaps
- * of a function without any (a = d) are counted: further than all others, yet in order.
+ * The gap on a foot itself, where the degree is zero already. Gaps of a function without
+ * a width (a = d) are counted in this width: further than all others, yet in order.
  */
 #define GAP_MIN 1e-300
 #define WIDTH_MIN 1e-150

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * A model as a full grid of Gaussians, with certified bounds of what it can do between
- * points; see model_grid.h.
+ * A model as a full grid of Gaussians, with certified bounds of its values and slopes between points;
+ * see model_grid.h.
  *
  * With L(i) = -(x-c(i))²/(2s(i)²) and ⟨f⟩ = Σ ā(k) f(k), the degrees of one input are
  *
@@ -438,7 +438,7 @@ struct interval incise_patch_mixed(const struct incise_patch *patch,
 #define LEVELS 5
 #define BLOCKS 128
 
-/* Each so manyth of the finest patches is looked at first: what coarse ones are compared with. */
+/* Every so many of the finest patches are looked at first, to compare coarse patches with. */
 #define SAMPLE 8
 
 /* Rounding an input to Q16.16. */
@@ -582,7 +582,7 @@ static void degree_errors(const struct incise_axis *axis,
 
 		q_error[i] = 2 * z * z_error + z_error * z_error + 0x1p-26;
 	}
-	/* The exponent that is taken off may be that of any function near the largest. */
+	/* The exponent that is taken off may belong to any function near the largest. */
 	for (int i = 0; i < axis->n; i++)
 		if (block->range.a[i].hi >= 0.5 * block->range.a[block->main].lo)
 			worst = fmax(worst, q_error[i]);

@@ -111,7 +111,7 @@ struct incise_survey;
 /* Fewest cells per input that a table may have: how far one cell may reach. */
 #define INCISE_SURVEY_CELLS 32
 
-/* Of a grid that outlives it. NULL without memory. */
+/* A survey of a grid that outlives it. NULL without memory. */
 struct incise_survey *incise_survey_new(const struct incise_grid *grid);
 void incise_survey_free(struct incise_survey *survey);
 
@@ -131,10 +131,10 @@ double incise_survey_direct(const struct incise_survey *survey);
  * patches over four dimensions.
  */
 
-/* 0; -ENOTSUP, -E2BIG, -ERANGE as incise_grid_init(). Of any number of inputs. */
+/* 0; -ENOTSUP, -E2BIG, -ERANGE as incise_grid_init(). For any number of inputs. */
 int incise_many_check(const struct incise_model *model, struct incise_error *err);
 
-/* Of a model that was checked: sizes but for @slope; and as incise_survey_direct(). */
+/* For a checked model: sizes except @slope; and as incise_survey_direct(). */
 void incise_many_size(const struct incise_model *model, struct incise_grid_size *size);
 double incise_many_direct(const struct incise_model *model);
 

@@ -39,7 +39,7 @@
 #define FIXED_SECANT 256
 #define FIXED_SECANT_LSB 64
 
-/* Points to search from at most, and what one may cost, in degrees and rules. */
+/* The most points to search from, and the cost of one, in degrees and rules. */
 #define POINTS_MAX 8192
 #define POINTS_WORK (1 << 21)
 #define POINTS_MIN 256
@@ -70,9 +70,9 @@ static void blocks_over(const struct incise_grid *grid, struct incise_block bloc
 }
 
 /*
- * Enclose a box's slopes in two ways and take what both allow: directly, and as those in
- * its middle plus second derivatives times the way from there, which is the tighter one
- * for small boxes. The slopes in the middle are met.
+ * Enclose a box's slopes in two ways and take what both allow: directly, and as the slopes in
+ * its middle plus second derivatives times the way from there, which is tighter for small boxes.
+ * The slopes in the middle are met.
  */
 static void look(struct branches *b, struct box *box)
 {

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
  * The slopes of a model over its support by each input: ∂y/∂x from the lowest to the
- * highest. Of a cutting model the highest slope by depth is the stiffness that the hand
- * meets, N/mm, and that by velocity, N s/mm, acts as damping: a check of stability needs both
- * before a model is felt.
+ * highest. The highest slope of a cutting model by depth is the stiffness that the hand
+ * meets, N/mm; the slope by velocity, N s/mm, acts as damping: a check of stability needs
+ * both before a model is felt.
  *
  *   y ▲              ╱ highest
  *     │           __╱
@@ -25,8 +25,8 @@ struct incise_slope {
 	double lowest, highest;
 	/*
 	 * Every slope lies within lowest … highest, by interval arithmetic, and each end is
-	 * off by about 1 % of the larger one. Else a search found lowest and highest: where
-	 * it looked, there are none beyond.
+	 * off by about 1 % of the larger one. Else a search found lowest and highest: it met
+	 * no slopes beyond.
 	 */
 	bool certified;
 };
@@ -39,8 +39,8 @@ struct incise_slope {
  * support, at some thousand points spread evenly and from the best of these on uphill. A
  * step, as upright edges have, counts as its height over such a secant.
  *
- * Outside the support a model that clamps its inputs has slope 0, and one that does not
- * is not examined.
+ * Outside the support a model that clamps its inputs has slope 0; other models are not
+ * examined there.
  *
  * 0; -ENOMEM. Takes some 20 ms for a model of 20 rules, up to 0.3 s for the largest.
  */

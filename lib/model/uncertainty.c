@@ -25,7 +25,7 @@ struct incise_uncertainty {
 	int n;
 	double noise;
 	double *factor; /* upper triangle, row by row, packed */
-	/* Rows k of n: |k φ|² is a variance. Of the training's calibrations, of another rig's. */
+	/* Rows k of n: |k φ|² is a variance. Of the training's rigs; of another rig. */
 	int n_common, n_rig;
 	double *calibration; /* of both, after each other */
 };
@@ -35,7 +35,7 @@ static int calibrations(const struct incise_uncertainty *u)
 	return u->n_common + u->n_rig;
 }
 
-/* FNV-1a of what the output depends on, in the machine's double format. */
+/* FNV-1a of the numbers that the output depends on, in the machine's double format. */
 static void sum(uint64_t *hash, double value)
 {
 	unsigned char bytes[sizeof(value)];

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later OR GPL-2.0-only */
 /*
- * The operations that are written alike for both kinds of numbers; fixed.h and double.h have the others. What is
- * not a number is neither below nor above anything.
+ * The operations that are written alike for both kinds of numbers; fixed.h and double.h have the others. A NaN
+ * is neither below nor above anything.
  */
 #ifndef INCISE_NUMBER_BOTH_H
 #define INCISE_NUMBER_BOTH_H

@@ -10,10 +10,10 @@
  *              own           how far rounding at this tick does
  *              bits          behind the point of the integer
  *   a vector   one `ball` for all of its parts: high is the bound of its length, in and own of the length
- *              of its error. Frames do not count: what is turned has the same length.
+ *              of its error. Frames do not count: a turned vector keeps its length.
  *
  * A branch which is not decided is taken both ways, one after the other: a tick is run again and again, along
- * all paths. A path narrows what it knows by what it decided. In a copy of a number all of that is known, too,
+ * all paths. A path narrows its numbers by its decisions. In a copy of a number all of that is known, too,
  * as a number is only a place in a table.
  *
  *              ┌─ a < b ──┬─ c < 0 ── path 1      a force that is continuous where the integer goes
@@ -21,7 +21,7 @@
  *              └─ else ────────────── path 3      the largest `in` of all paths and the largest `own`
  *
  * For on the straight way from the double's state to that of the integers each piece of the way lies on
- * some path, and adds at most its share of that path's `in`. What is not continuous is not in the bound: see
+ * some path, and adds at most its share of that path's `in`. The bound does not cover discontinuities: see
  * incise_plan_bound().
  */
 #ifndef INCISE_NUMBER_BOUNDED_H
@@ -32,7 +32,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Sine of 30°: what a blade in the skin has no less of across it. */
+/* Sine of 30°: a blade in the skin has at least this share of its length across it. */
 #define STANDS 0.5
 
 struct bounds {
@@ -65,7 +65,7 @@ struct paths {
 	long n_paths; /* gone along so far */
 };
 
-/* Those of the thread, while a bound is computed. */
+/* Paths of the thread, while a bound is computed. */
 static __thread struct paths *paths;
 
 /* Room for one computation; end_paths() frees it. Returns false: no memory. */
@@ -79,7 +79,7 @@ static inline bool begin_paths(void)
 	return true;
 }
 
-/* Returns the bound, infinite where there is none. */
+/* Returns the bound, infinite without one. */
 static inline double end_paths(double bound)
 {
 	if (paths->failed || !(bound >= 0))
@@ -133,8 +133,8 @@ static inline int choose(int ways)
 }
 
 /*
- * The paths from here on. Those of a part of a tick are joined at its end, so that their number adds to that
- * of the others, and does not multiply it.
+ * The paths from here on. The paths of a part of a tick are joined at its end, so that their number adds to the
+ * number of the others, and does not multiply it.
  *
  *   fork.begin(); do { ... } while (fork.next());
  */
@@ -153,7 +153,7 @@ struct fork {
 		alive = false;
 	}
 
-	/* Return to where they begin, for the next one. Returns false when there is none. */
+	/* Return to their begin, for the next path. Returns false after the last one. */
 	bool next()
 	{
 		int last = paths->n_chosen;
@@ -190,7 +190,7 @@ static inline double lsb(int bits)
 	return ldexp(1, -bits);
 }
 
-/* A constant, and what rounds it. */
+/* A constant, with its rounding. */
 static inline uint32_t constant(double value, int bits)
 {
 	double whole = rint(ldexp(value, bits));
@@ -255,7 +255,7 @@ struct bounded_wide {
 #define CUTS 1
 #define OWNED
 #define T_PART(state, part) (&(state)->part)
-/* A number along all paths to it; what else the state becomes on them, its errors hold. */
+/* A number along all paths to it; the state's errors cover its other numbers on them. */
 #define T_JOINED(state, of) joined(state, [&] { return of; })
 #define T_OWN_SURFACE
 
@@ -333,7 +333,7 @@ static inline uint32_t product(uint32_t ia, uint32_t ib, int bits)
 	return put(to);
 }
 
-/* Of another scale. */
+/* The number at another scale. */
 static inline uint32_t scaled(uint32_t ia, int bits)
 {
 	struct bounds to = at(ia);
@@ -563,7 +563,7 @@ static inline num n_within(num v, num least, num most)
 	return v;
 }
 
-/* Of places in a cut, which are not looked at here. */
+/* A number between places in a cut, which are not looked at here. */
 static inline num n_between(num a, num, num, num)
 {
 	fail("unbounded");
@@ -646,7 +646,7 @@ static inline uint32_t along(uint32_t a, uint32_t b, int bits)
 	return put({of.low, of.high, of.in, of.own + lsb(bits + 1), bits, false});
 }
 
-/* Of length 1: what it is made of is longer than @least; by twice the difference over both lengths. */
+/* A vector of length 1, from a vector longer than @least; by twice the difference over both lengths. */
 static inline uint32_t unit_of(uint32_t ia, double least)
 {
 	struct bounds a = at(ia);
@@ -718,7 +718,7 @@ static inline bool d_unit4(dir to[4], const wide q[4])
 	return true;
 }
 
-/* Of normals that differ by no more than 60° from it. */
+/* The mean of normals that differ by no more than 60° from it. */
 static inline bool d_mean(dir to[3], const wide sum[3])
 {
 	uint32_t id = ball_of(sum);
@@ -929,7 +929,7 @@ static inline wide w_seconds(int64_t ns)
 	return wide::of(put({0, (double)ns * 1e-9, 0, 1.5 * lsb(30), 30, false}));
 }
 
-/* At any time of a period; what has no share left is the end of what has little. */
+/* The share left at any time of a period; no share is the limit of a small share. */
 static inline wide w_left(int64_t, span period_ns)
 {
 	return wide::of(put({2 * lsb(26), 1, 0, lsb(26) + 1 / period_ns, 26, false}));

@@ -20,7 +20,7 @@
 #define HALF_PI (M_PI / 2)
 #define LEAST 0.0
 #define FAR_MOST INFINITY
-#define CREEP 1e-12 /* what rounds a length, mm */
+#define CREEP 1e-12 /* rounding of a length, mm */
 #define DT_MOST INT64_MAX
 
 /* --- numbers --- */
@@ -59,7 +59,7 @@ static inline int64_t n_cell(num at, num size)
 {
 	double cell = floor(at / size);
 
-	/* NaN is in none. */
+	/* NaN is in no range. */
 	return cell >= 0 ? (int64_t)fmin(cell, 1e9) : -1;
 }
 

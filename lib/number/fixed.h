@@ -21,7 +21,7 @@
 #define HALF_PI N_OF(1570796327, 1000000000)
 #define LEAST 1 /* the smallest number */
 #define FAR_MOST INT32_MAX
-#define CREEP (2 * LEAST) /* what rounds a length, mm */
+#define CREEP (2 * LEAST) /* rounding of a length, mm */
 #define DT_MOST INT32_MAX /* of a ramp, ns */
 
 /* --- numbers --- */
@@ -118,7 +118,7 @@ static inline void d_turn(dir to[3], const dir q[4], const dir u[3])
 	incise_fx_rotate(to, q, u);
 }
 
-/* Of length 1, unless it is not longer than @least; then @to stays, and it returns false. */
+/* Make a vector of length 1. Returns false, and leaves @to, unless @a is longer than @least. */
 static inline bool d_unit(dir to[3], const dir a[3], dir least)
 {
 	const int64_t from[3] = {a[0], a[1], a[2]};
@@ -126,13 +126,13 @@ static inline bool d_unit(dir to[3], const dir a[3], dir least)
 	return incise_fx_unit(to, from, 3, least);
 }
 
-/* Of a quaternion. Returns false where it is 0. */
+/* The same of a quaternion. Returns false if it is 0. */
 static inline bool d_unit4(dir to[4], const wide q[4])
 {
 	return incise_fx_unit(to, q, 4, 0);
 }
 
-/* Of a sum of directions, exact; one as short as this is nothing but rounding. */
+/* The length of a sum of directions, exact; a sum as short as this is only rounding. */
 static inline bool d_mean(dir to[3], const wide sum[3])
 {
 	return incise_fx_unit(to, sum, 3, 64);
@@ -302,7 +302,7 @@ static inline wide w_times(wide a, wide b, int shift)
 	return incise_fx_rounded(a * b, shift);
 }
 
-/* Of another scale. */
+/* The number at another scale. */
 static inline wide w_shifted(wide a, int shift)
 {
 	return incise_fx_rounded(a, shift);

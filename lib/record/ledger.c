@@ -28,174 +28,11 @@ const struct incise_ledger_form incise_ledger_forms[INCISE_LEDGER_FORMS] = {
 				"iiinrriissss"},
 };
 
-/* Before form 4 frames had no digest. */
-static const struct incise_ledger_form camera_3 = {
-	"camera", "frames",
-	"seq, t_ns, arrival_ns, pts, bytes, crc, length_px, sd_px, depth_mm, quality",
-	"iiiiiinnnn"};
-
-const struct incise_ledger_form *incise_ledger_form(int stream, int form)
-{
-	return stream == INCISE_LEDGER_CAMERA && form < 4 ? &camera_3
-							  : &incise_ledger_forms[stream];
-}
-
-/* --- rows ------------------------------------------------------------------------- */
-
 static uint8_t *put(uint8_t *to, uint64_t value)
 {
 	for (int i = 0; i < 8; i++)
 		to[i] = value >> 8 * i;
 	return to + 8;
-}
-
-static void put_integer(struct incise_ledger_row *row, int64_t value)
-{
-	put(row->bytes + row->n, value);
-	row->n += 8;
-}
-
-static void put_real(struct incise_ledger_row *row, double value)
-{
-	uint64_t bits = 0x7ff8000000000000;
-
-	value += 0.0; /* -0 becomes 0 */
-	if (!isnan(value))
-		memcpy(&bits, &value, sizeof(bits));
-	put_integer(row, bits);
-}
-
-static void put_digest(struct incise_ledger_row *row, const uint8_t *bytes)
-{
-	memcpy(row->bytes + row->n, bytes, INCISE_FRAMES_DIGEST);
-	row->n += INCISE_FRAMES_DIGEST;
-}
-
-void incise_ledger_row_force(struct incise_ledger_row *row, uint64_t seq, int64_t t_ns,
-			     int32_t code)
-{
-	row->seq = seq;
-	row->t_ns = t_ns;
-	row->n = 0;
-	put_integer(row, seq);
-	put_integer(row, t_ns);
-	put_integer(row, code);
-}
-
-void incise_ledger_row_tracker(struct incise_ledger_row *row, int64_t t_ns,
-			       const struct incise_tracker_sample *sample)
-{
-	row->seq = sample->seq;
-	row->t_ns = t_ns;
-	row->n = 0;
-	put_integer(row, sample->seq);
-	put_integer(row, t_ns);
-	put_integer(row, sample->t_ns + sample->after_ns);
-	for (int i = 0; i < 3; i++)
-		put_real(row, sample->position_mm[i]);
-	for (int i = 0; i < 4; i++)
-		put_real(row, sample->quaternion[i]);
-	row->bytes[row->n++] = sample->status;
-	put_integer(row, sample->station);
-	put_integer(row, sample->button);
-}
-
-void incise_ledger_row_frame(struct incise_ledger_row *row,
-			     const struct incise_frame_record *record)
-{
-	row->seq = record->seq;
-	row->t_ns = record->t_ns;
-	row->n = 0;
-	put_integer(row, record->seq);
-	put_integer(row, record->t_ns);
-	put_integer(row, record->arrival_ns);
-	put_integer(row, record->pts_ms);
-	put_integer(row, record->bytes);
-	put_integer(row, record->crc);
-	put_real(row, record->length_px);
-	put_real(row, record->sd_px);
-	put_real(row, record->depth_mm);
-	put_real(row, record->quality);
-	put_digest(row, record->sha256);
-}
-
-static void put_text(struct incise_ledger_row *row, const char *text, size_t length)
-{
-	memset(row->bytes + row->n, 0, INCISE_LEDGER_TEXT + 1);
-	memcpy(row->bytes + row->n, text, length);
-	row->n += INCISE_LEDGER_TEXT + 1;
-}
-
-void incise_ledger_row_wall(struct incise_ledger_row *row, uint64_t seq,
-			    const struct incise_wall_point *point)
-{
-	const char *const texts[] = {point->source, point->reference, point->leap,
-				     point->restart};
-
-	row->seq = seq;
-	row->t_ns = point->t_ns;
-	row->n = 0;
-	put_integer(row, seq);
-	put_integer(row, point->t_ns);
-	put_integer(row, point->tai_ns);
-	put_real(row, isfinite(point->uncertainty_ns) ? point->uncertainty_ns : NAN);
-	put_real(row, point->rate_ppb);
-	put_real(row, point->rate_uncertainty_ppb);
-	put_integer(row, point->utc_offset_s);
-	put_integer(row, point->held);
-	for (size_t i = 0; i < sizeof(texts) / sizeof(*texts); i++)
-		put_text(row, texts[i], strlen(texts[i]));
-}
-
-bool incise_ledger_row_read(struct incise_ledger_row *row,
-			    const struct incise_ledger_form *form, sqlite3_stmt *stmt)
-{
-	row->n = 0;
-	row->seq = sqlite3_column_int64(stmt, 0);
-	row->t_ns = sqlite3_column_int64(stmt, 1);
-	for (int i = 0; form->types[i]; i++) {
-		int type = sqlite3_column_type(stmt, i);
-
-		switch (form->types[i]) {
-		case 'i':
-			if (type != SQLITE_INTEGER)
-				return false;
-			put_integer(row, sqlite3_column_int64(stmt, i));
-			break;
-		case 'n':
-			if (type == SQLITE_NULL) {
-				put_real(row, NAN);
-				break;
-			}
-			/* fall through */
-		case 'r':
-			if (type != SQLITE_FLOAT)
-				return false;
-			put_real(row, sqlite3_column_double(stmt, i));
-			break;
-		case 'c':
-			if (type != SQLITE_TEXT || !sqlite3_column_text(stmt, i) ||
-			    sqlite3_column_bytes(stmt, i) != 1)
-				return false;
-			row->bytes[row->n++] = *sqlite3_column_text(stmt, i);
-			break;
-		case 'h':
-			if (type != SQLITE_BLOB ||
-			    sqlite3_column_bytes(stmt, i) != INCISE_FRAMES_DIGEST ||
-			    !sqlite3_column_blob(stmt, i))
-				return false;
-			put_digest(row, sqlite3_column_blob(stmt, i));
-			break;
-		case 's':
-			if (type != SQLITE_TEXT || !sqlite3_column_text(stmt, i) ||
-			    sqlite3_column_bytes(stmt, i) > INCISE_LEDGER_TEXT)
-				return false;
-			put_text(row, (const char *)sqlite3_column_text(stmt, i),
-				 sqlite3_column_bytes(stmt, i));
-			break;
-		}
-	}
-	return true;
 }
 
 /* --- blocks ------------------------------------------------------------------------ */
@@ -223,16 +60,10 @@ void incise_ledger_count(struct incise_ledger *ledger, int64_t seq, int64_t t_ns
 	ledger->last_ns = t_ns;
 }
 
-void incise_ledger_add(struct incise_ledger *ledger, const struct incise_ledger_row *row)
-{
-	incise_ledger_count(ledger, row->seq, row->t_ns);
-	ledger->open.crc = incise_crc32c(ledger->open.crc, row->bytes, row->n);
-}
-
-int incise_ledger_select(sqlite3 *db, int form, const char *stream, int64_t from_block,
+int incise_ledger_select(sqlite3 *db, const char *stream, int64_t from_block,
 			 bool from_end, sqlite3_stmt **stmt)
 {
-	const bool blocks = form >= 5 && !strchr(stream, ':');
+	const bool blocks = !strchr(stream, ':');
 	char sql[200];
 	int rc;
 

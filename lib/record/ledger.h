@@ -19,8 +19,6 @@
 #include <stddef.h>
 #include <stdint.h>
 #include <sqlite3.h>
-#include <incise/tracker.h>
-#include <incise/wall.h>
 #include "frames.h"
 
 /* A stream, its table, and the encoding of its columns. */
@@ -39,44 +37,15 @@ enum {
 	INCISE_LEDGER_TRACKER,
 	INCISE_LEDGER_CAMERA,
 	INCISE_LEDGER_STREAMS,
-	/* Not of a device: readings of the computer's clocks, from form 3 of the tables on. */
+	/* Not of a device: readings of the computer's clocks. */
 	INCISE_LEDGER_WALL = INCISE_LEDGER_STREAMS,
 	INCISE_LEDGER_FORMS
 };
 
 extern const struct incise_ledger_form incise_ledger_forms[INCISE_LEDGER_FORMS];
 
-/* That of a stream in a recording whose tables have this form, see schema.h. */
-const struct incise_ledger_form *incise_ledger_form(int stream, int form);
-
 #define INCISE_LEDGER_TEXT 23
 #define INCISE_LEDGER_DIGEST 32 /* bytes of SHA-256 */
-
-/*
- * One row, encoded: integers and reals (IEEE 754) as 8 bytes, little-endian, a character as
- * one, a text with zeros up to 24 bytes, a digest as its 32. Minus zero is zero, since SQLite keeps no minus zero;
- * NULL is the NaN 0x7ff8000000000000, since it keeps no NaN.
- */
-struct incise_ledger_row {
-	int64_t seq, t_ns;
-	size_t n;
-	uint8_t bytes[20 * 8];
-};
-
-void incise_ledger_row_force(struct incise_ledger_row *row, uint64_t seq, int64_t t_ns,
-			     int32_t code);
-void incise_ledger_row_tracker(struct incise_ledger_row *row, int64_t t_ns,
-			       const struct incise_tracker_sample *sample);
-/* NaN stands for a column that is NULL; t_ns is the time as in the table. */
-void incise_ledger_row_frame(struct incise_ledger_row *row,
-			     const struct incise_frame_record *record);
-/* An uncertainty that is INFINITY stands for a column that is NULL. */
-void incise_ledger_row_wall(struct incise_ledger_row *row, uint64_t seq,
-			    const struct incise_wall_point *point);
-
-/* Encode the row of a SELECT of a form's columns. False: a column has a wrong type. */
-bool incise_ledger_row_read(struct incise_ledger_row *row,
-			    const struct incise_ledger_form *form, sqlite3_stmt *stmt);
 
 /* As in table ledger. */
 struct incise_ledger_block {
@@ -99,13 +68,12 @@ struct incise_ledger {
 void incise_ledger_init(struct incise_ledger *ledger);
 
 /* Add the next row; numbers increase. */
-void incise_ledger_add(struct incise_ledger *ledger, const struct incise_ledger_row *row);
+void incise_ledger_count(struct incise_ledger *ledger, int64_t seq, int64_t t_ns);
 
 /* End the block. Returns false, and does nothing, when it has no rows. */
 bool incise_ledger_end(struct incise_ledger *ledger, struct incise_ledger_block *block);
 
-/* Of form 5 rows are counted only, and a block's CRC is that of its data and then of its fields. */
-void incise_ledger_count(struct incise_ledger *ledger, int64_t seq, int64_t t_ns);
+/* The CRC of a block: that of its data, and then of its fields. */
 void incise_ledger_crc(struct incise_ledger_block *block, const void *data, size_t size);
 
 /* End the ledger after the last block; @lost: losses that no gap shows. */
@@ -113,19 +81,19 @@ void incise_ledger_close(struct incise_ledger *ledger, uint64_t lost,
 			 struct incise_ledger_block *block);
 
 /*
- * Select the entries of a stream from a block on, INT64_MIN: all, in order, or the last one first; of form 5
- * they are table blocks. Returns an SQLite code.
+ * Select the blocks of a stream, or the seals of a name, from a block on, INT64_MIN: all, in order, or the last one
+ * first. Returns an SQLite code.
  */
-int incise_ledger_select(sqlite3 *db, int form, const char *stream, int64_t from_block,
+int incise_ledger_select(sqlite3 *db, const char *stream, int64_t from_block,
 			 bool from_end, sqlite3_stmt **stmt);
 
-/* Of form 5: the first block that ends with this number, or @by_time at this time, or later; by bisection. */
+/* The first block that ends with this number, or @by_time at this time, or later; by bisection. */
 int64_t incise_ledger_find(sqlite3 *db, const char *stream, bool by_time, int64_t value);
 
 /* Read the entry of a row of that. False: a value is impossible in any entry. */
 bool incise_ledger_block_read(struct incise_ledger_block *block, sqlite3_stmt *stmt);
 
-/* Of form 5: the data of that block, until the next step. False: they do not agree with its CRC. */
+/* The data of that block, until the next step. False: they do not agree with its CRC. */
 bool incise_ledger_data(sqlite3_stmt *stmt, const struct incise_ledger_block *block,
 			const void **data, size_t *size);
 

@@ -3,89 +3,45 @@
  * The form of recording.db; see schema.h.
  */
 #include <errno.h>
-#include <stdbool.h>
+#include <stdarg.h>
 #include <string.h>
 #include "schema.h"
-
-#define FRAMES                                                                        \
-	"CREATE TABLE frames(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "        \
-	"arrival_ns INTEGER NOT NULL, pts INTEGER NOT NULL, bytes INTEGER NOT NULL, " \
-	"crc INTEGER NOT NULL, length_px REAL, sd_px REAL, depth_mm REAL, "           \
-	"quality REAL"
 
 /*
  * The texts that SQLite keeps of the tables are compared when a recording is opened, so a view,
  * a virtual table or a generated column cannot replace one. Additional tables are ignored.
  */
-static const struct {
-	const char *name;
-	int first, last; /* forms that have it so */
-	const char *sql;
-} tables[] = {
-	{"meta", 1, 5, "CREATE TABLE meta(key TEXT PRIMARY KEY NOT NULL, value)"},
-	{"force", 1, 4,
-	 "CREATE TABLE force(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "
-	 "code INTEGER NOT NULL)"},
-	{"tracker", 1, 1,
-	 "CREATE TABLE tracker(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "
-	 "arrival_ns INTEGER NOT NULL, x_mm REAL NOT NULL, y_mm REAL NOT NULL, "
-	 "z_mm REAL NOT NULL, qw REAL NOT NULL, qx REAL NOT NULL, "
-	 "qy REAL NOT NULL, qz REAL NOT NULL, status TEXT NOT NULL)"},
-	{"tracker", 2, 4,
-	 "CREATE TABLE tracker(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "
-	 "arrival_ns INTEGER NOT NULL, x_mm REAL NOT NULL, y_mm REAL NOT NULL, "
-	 "z_mm REAL NOT NULL, qw REAL NOT NULL, qx REAL NOT NULL, "
-	 "qy REAL NOT NULL, qz REAL NOT NULL, status TEXT NOT NULL, "
-	 "station INTEGER NOT NULL, button INTEGER NOT NULL)"},
-	{"depth", 1, 4,
-	 "CREATE TABLE depth(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "
-	 "depth_mm REAL NOT NULL, velocity_mm_s REAL NOT NULL)"},
-	{"events", 1, 5,
-	 "CREATE TABLE events(t_ns INTEGER NOT NULL, kind TEXT NOT NULL, "
-	 "text TEXT NOT NULL)"},
-	{"frames", 2, 3, FRAMES ")"},
-	{"frames", 4, 4, FRAMES ", sha256 BLOB NOT NULL)"},
-	{"streams", 2, 5,
+const struct incise_schema_table incise_schema_tables[] = {
+	{"meta", "CREATE TABLE meta(key TEXT PRIMARY KEY NOT NULL, value)"},
+	{"events", "CREATE TABLE events(t_ns INTEGER NOT NULL, kind TEXT NOT NULL, "
+		   "text TEXT NOT NULL)"},
+	{"streams",
 	 "CREATE TABLE streams(name TEXT PRIMARY KEY NOT NULL, device TEXT NOT NULL, "
 	 "stamped INTEGER NOT NULL, nominal_hz REAL, delay_ns INTEGER NOT NULL, "
 	 "delay_sd_ns INTEGER, grain_ns INTEGER NOT NULL, rows INTEGER NOT NULL, "
 	 "lost INTEGER NOT NULL, late INTEGER NOT NULL, rate_hz REAL, drift_ppm REAL, "
 	 "drift_sd_ppm REAL, jitter_ns REAL, jitter_max_ns REAL, offset_ns REAL, "
 	 "offset_sd_ns REAL, ended TEXT)"},
-	{"knots", 2, 5,
-	 "CREATE TABLE knots(stream TEXT NOT NULL, knot INTEGER NOT NULL, "
-	 "seq INTEGER NOT NULL, t_ns INTEGER NOT NULL, sd_ns REAL NOT NULL, "
-	 "begins INTEGER NOT NULL, PRIMARY KEY(stream, knot)) WITHOUT ROWID"},
-	{"ledger", 2, 5,
-	 "CREATE TABLE ledger(stream TEXT NOT NULL, block INTEGER NOT NULL, "
-	 "first_seq INTEGER NOT NULL, last_seq INTEGER NOT NULL, "
-	 "first_ns INTEGER NOT NULL, last_ns INTEGER NOT NULL, "
-	 "count INTEGER NOT NULL, lost INTEGER NOT NULL, crc INTEGER NOT NULL, "
-	 "PRIMARY KEY(stream, block)) WITHOUT ROWID"},
-	{"blocks", 5, 5,
+	{"knots", "CREATE TABLE knots(stream TEXT NOT NULL, knot INTEGER NOT NULL, "
+		  "seq INTEGER NOT NULL, t_ns INTEGER NOT NULL, sd_ns REAL NOT NULL, "
+		  "begins INTEGER NOT NULL, PRIMARY KEY(stream, knot)) WITHOUT ROWID"},
+	{"ledger", "CREATE TABLE ledger(stream TEXT NOT NULL, block INTEGER NOT NULL, "
+		   "first_seq INTEGER NOT NULL, last_seq INTEGER NOT NULL, "
+		   "first_ns INTEGER NOT NULL, last_ns INTEGER NOT NULL, "
+		   "count INTEGER NOT NULL, lost INTEGER NOT NULL, crc INTEGER NOT NULL, "
+		   "PRIMARY KEY(stream, block)) WITHOUT ROWID"},
+	{"blocks",
 	 "CREATE TABLE blocks(stream TEXT NOT NULL, block INTEGER NOT NULL, "
 	 "first_seq INTEGER NOT NULL, last_seq INTEGER NOT NULL, "
 	 "first_ns INTEGER NOT NULL, last_ns INTEGER NOT NULL, "
 	 "count INTEGER NOT NULL, lost INTEGER NOT NULL, crc INTEGER NOT NULL, "
 	 "sha256 BLOB NOT NULL, data BLOB NOT NULL, PRIMARY KEY(stream, block))"},
-	{"wall", 3, 4,
-	 "CREATE TABLE wall(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "
-	 "tai_ns INTEGER NOT NULL, uncertainty_ns REAL, rate_ppb REAL NOT NULL, "
-	 "rate_uncertainty_ppb REAL NOT NULL, utc_offset_s INTEGER NOT NULL, "
-	 "held INTEGER NOT NULL, source TEXT NOT NULL, reference TEXT NOT NULL, "
-	 "leap TEXT NOT NULL, restart TEXT NOT NULL)"},
-	{"seal", 4, 5,
+	{"seal",
 	 "CREATE TABLE seal(number INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "
 	 "force INTEGER NOT NULL, tracker INTEGER NOT NULL, camera INTEGER NOT NULL, "
 	 "wall INTEGER NOT NULL, head BLOB NOT NULL)"},
+	{NULL, NULL},
 };
-
-#define TABLES (sizeof(tables) / sizeof(*tables))
-
-static bool has(size_t table, int form)
-{
-	return form >= tables[table].first && form <= tables[table].last;
-}
 
 #define TEXT_OF(x) TEXT_OF_(x)
 #define TEXT_OF_(x) #x
@@ -100,9 +56,8 @@ int incise_schema_create(sqlite3 *db)
 							   INCISE_SCHEMA_VERSION) ";",
 		NULL, NULL, NULL);
 
-	for (size_t i = 0; i < TABLES && rc == SQLITE_OK; i++)
-		if (has(i, INCISE_SCHEMA_VERSION))
-			rc = sqlite3_exec(db, tables[i].sql, NULL, NULL, NULL);
+	for (int i = 0; incise_schema_tables[i].name && rc == SQLITE_OK; i++)
+		rc = sqlite3_exec(db, incise_schema_tables[i].sql, NULL, NULL, NULL);
 	return rc;
 }
 
@@ -158,6 +113,11 @@ int incise_schema_fail(sqlite3 *db, const char *path, struct incise_error *err)
 				db ? sqlite3_errmsg(db) : strerror(ENOMEM));
 }
 
+int incise_schema_no_memory(const char *path, struct incise_error *err)
+{
+	return incise_error_set(err, ENOMEM, "%s: out of memory", path);
+}
+
 /* The number that a statement returns. */
 static int pragma(sqlite3 *db, const char *sql, sqlite3_int64 *value)
 {
@@ -170,7 +130,38 @@ static int pragma(sqlite3 *db, const char *sql, sqlite3_int64 *value)
 	return sqlite3_finalize(stmt); /* reports a failed step too */
 }
 
-static int check_tables(sqlite3 *db, const char *path, int form, struct incise_error *err)
+int incise_schema_run(sqlite3_stmt *stmt)
+{
+	sqlite3_step(stmt);
+	return sqlite3_reset(stmt);
+}
+
+int64_t incise_schema_ask(sqlite3 *db, int64_t otherwise, const char *format, ...)
+{
+	sqlite3_stmt *stmt = NULL;
+	va_list args;
+	char *sql;
+
+	va_start(args, format);
+	sql = sqlite3_vmprintf(format, args);
+	va_end(args);
+	if (sql && sqlite3_prepare_v2(db, sql, -1, &stmt, NULL) == SQLITE_OK &&
+	    sqlite3_step(stmt) == SQLITE_ROW &&
+	    sqlite3_column_type(stmt, 0) == SQLITE_INTEGER)
+		otherwise = sqlite3_column_int64(stmt, 0);
+	sqlite3_finalize(stmt);
+	sqlite3_free(sql);
+	return otherwise;
+}
+
+bool incise_schema_is_joined(sqlite3 *db)
+{
+	return incise_schema_ask(db, 0, "PRAGMA application_id") == INCISE_SCHEMA_JOINED;
+}
+
+int incise_schema_check(sqlite3 *db, const char *path,
+			const struct incise_schema_table *tables,
+			struct incise_error *err)
 {
 	sqlite3_stmt *stmt;
 	int rc = 0;
@@ -179,12 +170,10 @@ static int check_tables(sqlite3 *db, const char *path, int form, struct incise_e
 		    db, "SELECT sql FROM sqlite_master WHERE name = ? AND type = 'table'",
 		    -1, &stmt, NULL) != SQLITE_OK)
 		return incise_schema_fail(db, path, err);
-	for (size_t i = 0; i < TABLES && !rc; i++) {
+	for (int i = 0; tables[i].name && !rc; i++) {
 		const char *sql;
 		int step;
 
-		if (!has(i, form))
-			continue;
 		sqlite3_reset(stmt);
 		sqlite3_bind_text(stmt, 1, tables[i].name, -1, SQLITE_STATIC);
 		step = sqlite3_step(stmt);
@@ -202,8 +191,7 @@ static int check_tables(sqlite3 *db, const char *path, int form, struct incise_e
 	return rc;
 }
 
-int incise_schema_check(sqlite3 *db, const char *path, int *form,
-			struct incise_error *err)
+int incise_schema_form(sqlite3 *db, const char *path, int *form, struct incise_error *err)
 {
 	sqlite3_int64 application, version, entries;
 
@@ -232,5 +220,5 @@ int incise_schema_check(sqlite3 *db, const char *path, int *form,
 			"%s: damaged: its format has the invalid number %lld", path,
 			(long long)version);
 	*form = version;
-	return check_tables(db, path, version, err);
+	return 0;
 }

@@ -8,9 +8,9 @@
 #include "seal_chain.h"
 #include "statement.h"
 
-/* Of rows, and from form 5 on of blocks. */
-#define GENESIS(form) ((form) < 5 ? "incise seal 1\n" : "incise seal 2\n")
-/* From form 5 on there is no table depth. */
+/* Of rows, or of blocks. */
+#define GENESIS(old) ((old) ? "incise seal 1\n" : "incise seal 2\n")
+/* Of table depth, which today's format has not. */
 #define NO_ROWS "SELECT 1 WHERE 0"
 
 /*
@@ -20,10 +20,10 @@
 #define START "'boot', 'host', 'identity', 'incise', 'kernel', 'started'"
 #define CALIBRATION \
 	"'calibration_conf', 'depth_mm_px', 'force_mV_N', 'tip_x_mm', 'tip_y_mm', 'tip_z_mm'"
-#define REWRITTEN                                                                    \
-	"'complete', 'cuts', 'depth_max_mm', 'depth_rows', 'force_clipped', "        \
-	"'force_lost', 'force_max_N', 'force_rows', "                                \
-	"'force_zero_mV', 'force_zero_samples', 'force_zero_sd_mV', 'frames_lost', " \
+#define REWRITTEN                                                                            \
+	"'complete', 'cut_ends_ns', 'cuts', 'depth_max_mm', 'depth_rows', 'force_clipped', " \
+	"'force_lost', 'force_max_N', 'force_rows', "                                        \
+	"'force_zero_mV', 'force_zero_samples', 'force_zero_sd_mV', 'frames_lost', "         \
 	"'frames_rows', 'frames_unlooked', 'tracker_lost', 'tracker_rows', 'wall_rows'"
 #define KEYS(which) "SELECT key, value FROM meta WHERE key " which " ORDER BY key"
 
@@ -56,7 +56,7 @@ int incise_seal_table(const struct incise_seal *seal, sqlite3 *db,
 		      uint8_t digest[INCISE_SEAL_BYTES])
 {
 	const char *sql = meta_sql[part] ? meta_sql[part]
-			  : part == INCISE_SEAL_DEPTH && seal->form >= 5
+			  : part == INCISE_SEAL_DEPTH && !seal->old
 				  ? NO_ROWS
 				  : incise_ledger_sql(incise_seal_parts[part]);
 	struct incise_sha256 sha = {0};
@@ -102,9 +102,9 @@ static bool has_failed(const struct incise_seal *seal)
 	return failed;
 }
 
-int incise_seal_init(struct incise_seal *seal, int form)
+int incise_seal_init(struct incise_seal *seal)
 {
-	*seal = (struct incise_seal){.form = form};
+	*seal = (struct incise_seal){0};
 	incise_sha256_start(&seal->commit);
 	for (int i = 0; i < INCISE_LEDGER_FORMS; i++)
 		incise_sha256_start(&seal->rows[i]);
@@ -133,8 +133,7 @@ int incise_seal_start(struct incise_seal *seal, sqlite3 *db)
 	int rc = SQLITE_OK;
 
 	incise_sha256_start(&seal->commit);
-	incise_sha256_add(&seal->commit, GENESIS(seal->form),
-			  strlen(GENESIS(seal->form)));
+	incise_sha256_add(&seal->commit, GENESIS(seal->old), strlen(GENESIS(seal->old)));
 	for (int i = INCISE_SEAL_START; i < INCISE_SEAL_STREAM && rc == SQLITE_OK; i++) {
 		rc = incise_seal_table(seal, db, i, &rows, part);
 		incise_sha256_add(&seal->commit, part, sizeof(part));
@@ -144,27 +143,10 @@ int incise_seal_start(struct incise_seal *seal, sqlite3 *db)
 	return rc == SQLITE_OK && has_failed(seal) ? SQLITE_NOMEM : rc;
 }
 
-void incise_seal_row(struct incise_seal *seal, int stream,
-		     const struct incise_ledger_row *row)
+void incise_seal_row(struct incise_seal *seal, int stream, const void *bytes, size_t n)
 {
-	incise_sha256_add(&seal->rows[stream], row->bytes, row->n);
+	incise_sha256_add(&seal->rows[stream], bytes, n);
 	seal->n_rows[stream]++;
-}
-
-void incise_seal_rows(struct incise_seal *seal, int stream,
-		      uint8_t digest[INCISE_SEAL_BYTES])
-{
-	incise_sha256_take(&seal->rows[stream], digest);
-	incise_sha256_start(&seal->rows[stream]);
-}
-
-void incise_seal_block(struct incise_seal *seal, int stream,
-		       const struct incise_ledger_block *block)
-{
-	uint8_t digest[INCISE_SEAL_BYTES];
-
-	incise_seal_rows(seal, stream, digest);
-	incise_seal_rows_block(seal, stream, block, digest);
 }
 
 void incise_seal_rows_block(struct incise_seal *seal, int stream,
@@ -189,14 +171,22 @@ void incise_seal_rows_block(struct incise_seal *seal, int stream,
 	seal->blocks[stream]++;
 }
 
+void incise_seal_block(struct incise_seal *seal, int stream,
+		       const struct incise_ledger_block *block,
+		       uint8_t digest[INCISE_SEAL_BYTES])
+{
+	incise_sha256_take(&seal->rows[stream], digest);
+	incise_sha256_start(&seal->rows[stream]);
+	incise_seal_rows_block(seal, stream, block, digest);
+}
+
 void incise_seal_data(struct incise_seal *seal, int stream,
 		      const struct incise_ledger_block *block, const void *data,
 		      size_t size, uint8_t digest[INCISE_SEAL_BYTES])
 {
 	incise_sha256_add(&seal->rows[stream], data, size);
 	seal->n_rows[stream] += block->count;
-	incise_seal_rows(seal, stream, digest);
-	incise_seal_rows_block(seal, stream, block, digest);
+	incise_seal_block(seal, stream, block, digest);
 }
 
 int incise_seal_tables(struct incise_seal *seal, sqlite3 *db, int fd, int64_t length)

@@ -38,7 +38,7 @@ enum incise_seal_number {
 };
 
 struct incise_seal {
-	int form;					/* of the recording's tables */
+	bool old; /* of format 4: over rows, and table depth; after the init */
 	struct incise_sha256 rows[INCISE_LEDGER_FORMS]; /* of the open blocks */
 	struct incise_sha256 commit;			/* of the open commit */
 	int64_t next;					/* number of the open commit */
@@ -49,7 +49,7 @@ struct incise_seal {
 };
 
 /* Returns 0, or -ENOMEM: libcrypto gives no SHA-256. Free it in any case. */
-int incise_seal_init(struct incise_seal *seal, int form);
+int incise_seal_init(struct incise_seal *seal);
 void incise_seal_free(struct incise_seal *seal);
 
 /* The genesis: start the chain over the parts of table meta that are never rewritten. */
@@ -58,20 +58,18 @@ int incise_seal_start(struct incise_seal *seal, sqlite3 *db);
 /* Go on from another head than the last: that of the table, where it is not the recomputed one. */
 void incise_seal_resume(struct incise_seal *seal, const uint8_t head[INCISE_SEAL_BYTES]);
 
-/* A row of a stream's open block, then the block. Within a commit: streams in their order. */
-void incise_seal_row(struct incise_seal *seal, int stream,
-		     const struct incise_ledger_row *row);
+/* A row of a stream's open block, then the block, with their digest. Within a commit: streams in their order. */
+void incise_seal_row(struct incise_seal *seal, int stream, const void *bytes, size_t n);
 void incise_seal_block(struct incise_seal *seal, int stream,
-		       const struct incise_ledger_block *block);
+		       const struct incise_ledger_block *block,
+		       uint8_t digest[INCISE_SEAL_BYTES]);
 
-/* The digest of the rows of the open block, and a block whose rows have one. */
-void incise_seal_rows(struct incise_seal *seal, int stream,
-		      uint8_t digest[INCISE_SEAL_BYTES]);
+/* A block whose rows have this digest. */
 void incise_seal_rows_block(struct incise_seal *seal, int stream,
 			    const struct incise_ledger_block *block,
 			    const uint8_t digest[INCISE_SEAL_BYTES]);
 
-/* A block of form 5, whose digest is that of its data. */
+/* A block of today's format, whose digest is that of its data. */
 void incise_seal_data(struct incise_seal *seal, int stream,
 		      const struct incise_ledger_block *block, const void *data,
 		      size_t size, uint8_t digest[INCISE_SEAL_BYTES]);

@@ -42,9 +42,9 @@ static int refused(struct incise_axes *axes, int i,
 }
 
 /*
- * Where the handle is: as the actuator measures it, else what the hand holds is the
- * handle, and the tracker's pose of it says where along the axis it is. Without a fresh
- * pose it is where it was; before the first one, where the spring is at rest.
+ * The position of the handle: as the actuator measures it, else by the tracker's pose of
+ * the tool in the hand, along the axis. Without a fresh pose it is where it was; before
+ * the first one, where the spring is at rest.
  */
 static void find_handle(struct incise_axis *axis, const struct incise_tick *tick,
 			const struct incise_stepper_status *status)

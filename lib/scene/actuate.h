@@ -4,11 +4,11 @@
  *
  *   force ─▶ f[i] = dual[i] · force ─▶ nut[i] = handle[i] + f[i] / spring[i]
  *
- *   felt = Σ f[i] direction[i]: the force's projection on what the directions span. The rest,
+ *   felt = Σ f[i] direction[i]: the force's projection on the span of the directions. The rest,
  *   force - felt, cannot be felt on this rig.
  *
- * A device that fails ends the ticks: then all nuts go to rest, and the reason names the one that
- * failed.
+ * A device that fails ends the ticks: then all nuts go to rest, and the reason names the failed
+ * device.
  */
 #ifndef INCISE_ACTUATE_H
 #define INCISE_ACTUATE_H
@@ -39,7 +39,7 @@ void incise_axes_take(struct incise_axes *axes, struct incise_rig *rig);
  * fill in the tick's actuated_N, rendered_N and unfelt_N. The status of all is read before the
  * first target is set.
  *
- * Returns 0, or the negative errno of the first one that fails.
+ * Returns 0, or the negative errno of the first actuator that fails.
  */
 int incise_axes_render(struct incise_axes *axes, const double force_N[3],
 		       struct incise_tick *tick) INCISE_REALTIME;
@@ -53,17 +53,17 @@ void incise_axes_rest(const struct incise_axes *axes, const double force_N[3],
 
 /*
  * Send all nuts to rest, also when some do not go any more. Returns 0 or the negative errno of
- * the first that does not; *axes keeps it as the one that failed, unless @keep.
+ * the first that fails; *axes remembers that actuator, unless @keep.
  */
 int incise_axes_release(struct incise_axes *axes, bool keep) INCISE_REALTIME;
 
-/* The reason why an actuator failed, in a few words; NULL: none has faults, or no power. */
+/* The reason why an actuator failed, in a few words; NULL: all have power and no faults. */
 const char *incise_axes_fault(const struct incise_axes *axes);
 
 /*
- * The reason of the errno @rc in one line, with the device's own words and, of several actuators,
- * the name of the one that failed. Returns the length of the line; 0: no actuator failed, or the
- * only one does not say why.
+ * The reason of the errno @rc in one line, with the device's own words and, if there are several
+ * actuators, the name of the failed one. Returns the length of the line; 0: no actuator failed,
+ * or the only one does not say why.
  */
 int incise_axes_cause(const struct incise_axes *axes, int rc, char *text, size_t size);
 

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The certified error of a plan in integers: how far its force can be from that of the same plan in
- * double, tick by tick, on the same poses. The stages of lib/tissue say it themselves, as they run on the
- * numbers of ../number/bounded.h: from a state that is as far off as it can become, along all paths.
+ * The certified error of a plan in integers: how far its force can be from the force of the same plan in double, tick
+ * by tick, on the same poses. The stages of lib/tissue say it themselves, as they run on the numbers of
+ * ../number/bounded.h: from a state with the largest possible errors, along all paths.
  *
  *   a pose ─▶ filter: Σ |Aʲ| r ─▶ predict ─▶ contact ─▶ normal ─▶ membrane ─▶ forces ─▶ the largest
  *                 ▲                             │                     ▲         error
  *            what adds up                       └─ opening, front, anchor: what a stage keeps
  *
- * A stage that keeps something from tick to tick says here how far off that becomes: no more without a
- * contraction, or for as long as a contact is. Else errors in each tick would add up.
+ * A stage that keeps something from tick to tick says here how far off that becomes: no further without a
+ * contraction, or for as long as a contact lasts. Else errors in each tick would add up.
  */
 #define _Static_assert static_assert
 extern "C" {
@@ -60,7 +60,7 @@ struct T(plan) {
 	double reach_mm;
 	double bend;	     /* between facets of the surface that meet */
 	struct errors poses; /* of what is shown, by their rounding */
-	/* Of a normal at any tick of the contact. */
+	/* The error of a normal at any tick of the contact. */
 	double turned_in, turned_own;
 };
 
@@ -70,7 +70,7 @@ struct T(plan) {
 #include "../tissue/incision.proto.c"
 #include "../tissue/tick.proto.c"
 
-/* --- what the bound holds for; see incise_plan_bound() ------------------------------------- */
+/* --- conditions of the bound; see incise_plan_bound() -------------------------------------- */
 
 /* A hand's speed at most, mm/s, and its largest acceleration that the filter lets pass, mm/s². */
 #define SPEED_MM_S 1000
@@ -187,7 +187,7 @@ void T(surface_restart)(const struct T(plan) *)
 {
 }
 
-/* Along the motion: by the vector's error, and by that of the direction. */
+/* Along the motion: by the vector's error, and by the error of the direction. */
 num T(input_acceleration)(const num velocity[3], const wide acceleration[3])
 {
 	struct bounds v = at(ball_of(velocity)), a = at(ball_of(acceleration));
@@ -316,7 +316,7 @@ static void set_numbers(struct T(plan) *plan)
 	plan->has_model = plan->of->doubles.plan.has_model;
 }
 
-/* --- poses: what a filter keeps ------------------------------------------------------------ */
+/* --- poses: the state of a filter ---------------------------------------------------------- */
 
 /* A state of the filter, or its errors, from one pose to the next: A = (I - K C) F. */
 static struct errors step(const struct incise_predict *p, const struct errors &from)
@@ -352,8 +352,8 @@ static bool ends(const struct errors &sum, const struct errors &last)
 #define REST 1.001
 
 /*
- * The filter is linear: what each pose adds, r, passes through A for each one that comes after, so that
- * Σ |Aʲ| r bounds all that adds up, of poses that come a period apart. Infinite where it does not settle.
+ * The filter is linear: the addition r of each pose passes through A for each later pose, so that Σ |Aʲ| r bounds the
+ * sum, for poses that come a period apart. Infinite where it does not settle.
  */
 static struct errors settle_filter(const struct incise_predict *p, const struct errors &r)
 {
@@ -384,9 +384,9 @@ static struct errors shown_of(const struct errors &state, double age_s, double s
 }
 
 /*
- * The rounding of poses as it is shown: of ±1 each, the sum of what each of them makes at most, from when a
- * pose arrives to the next. That is less than all that adds up in the filter's state, where place, speed and
- * acceleration of one pose's error count apart.
+ * The rounding of poses as it is shown: for ±1 each, the sum of their largest effects, from the arrival of a pose to
+ * the next. That is less than the sum in the filter's state, where place, speed and acceleration of one pose's error
+ * count apart.
  *
  *   place(age) = x + v age + a age²/2 + share · (what was shown when the pose arrived - what is)
  */
@@ -400,7 +400,7 @@ static struct errors respond(const struct incise_predict *p, double ahead_s)
 	for (int j = 0; j < POSES_MOST; j++) {
 		struct errors left = sum_of(shown_of(before, top, 0, {}), -1,
 					    shown_of(now, from, 0, {}));
-		/* Of the parabola the vertex, where it lies between. */
+		/* The vertex of the parabola, where it lies between. */
 		double vertex = fmin(fmax((left.x / T - now.v) / now.a, from), top);
 		struct errors most = larger(
 			larger(sizes(shown_of(now, from, 1, left)),
@@ -431,7 +431,7 @@ static void set_filter(struct T(predict) *p, const struct T(plan) *plan,
 	set_ball(p->a, ball(HARD_MM_S2, e.a, 0, 16));
 }
 
-/* The rest to blend out: as shown when a pose arrived, less what the filter says then. */
+/* The rest to blend out: as shown when a pose arrived, less the filter's value then. */
 static void set_shown(wide to[3], const wide before[3], const wide now[3], double most,
 		      int bits)
 {
@@ -484,8 +484,8 @@ static struct errors add_exact(const struct T(plan) *plan)
 }
 
 /*
- * The filter, as far off as its own rounding makes it, and what the rounding of poses makes of what it shows.
- * An attitude is that of the last poses; nothing of it adds up.
+ * The errors of the filter by its own rounding, and the effect of the rounding of poses on its output.
+ * An attitude comes from the last poses; its errors do not add up.
  */
 static void set_poses(struct T(plan) *plan, struct T(state) *state)
 {
@@ -510,12 +510,12 @@ static void set_poses(struct T(plan) *plan, struct T(state) *state)
 
 /* --- a tick -------------------------------------------------------------------------------- */
 
-/* A tick in one phase, and what its stages keep. */
+/* A tick in one phase, and the state of its stages. */
 struct tick {
 	struct T(plan) plan;
 	struct T(state) state;
 	struct T(tick) tick;
-	/* Found along all paths: the force, and what those that settle need. */
+	/* Found along all paths: the force, and the numbers that settling needs. */
 	struct worst force, normal, depth, cutting;
 };
 
@@ -604,7 +604,7 @@ static void run_contact(const struct T(plan) *plan, struct T(state) *state,
 	dir now[3];
 
 	T(stage_contact)(plan, state, tick);
-	/* Those of the ticks before this one are as far off as any. */
+	/* The numbers of the ticks before this one have the same errors as any. */
 	d_copy(now, state->sn);
 	if (plan->numbers.average_ticks > 1)
 		set_ball(state->sn, ball(1, plan->turned_in, plan->turned_own, 30));
@@ -621,7 +621,7 @@ static void run_contact(const struct T(plan) *plan, struct T(state) *state,
 
 typedef void stage(const struct T(plan) *, struct T(state) *, struct T(tick) *);
 
-/* Run a stage along all of its paths, and join its forces. The state's errors hold what it keeps. */
+/* Run a stage along all of its paths, and join its forces. The state's errors cover its numbers. */
 static void join_force(stage *run, const struct T(plan) *plan, struct T(state) *state,
 		       struct T(tick) *tick)
 {
@@ -679,7 +679,7 @@ static void run_paths(struct tick *t)
 	} while (fork.next());
 }
 
-/* --- what stages keep ---------------------------------------------------------------------- */
+/* --- the state of stages ------------------------------------------------------------------- */
 
 /*
  * The front's rest stays where it is, to the bit, or is set by depth and force of this tick; rounding does not
@@ -766,8 +766,8 @@ static void settle_tear(struct tick *t)
 
 /*
  * A cut that is remembered was the front's own, so that its numbers are as far off as that one's; which of them holds
- * the blade is a decision. The line of a cut began where the contact did; from there both ends are as uncertain as the tool. Its length
- * is what the front came up by in all ticks together: no more than that adds up.
+ * the blade is a decision. The line of a cut began where the contact did; from there both ends are as uncertain as
+ * the tool. Its length is the rise of the front in all ticks together: no more than that adds up.
  */
 static void set_line(struct T(state) *state, const struct T(tick) *tick, double reach,
 		     double turned_off)
@@ -850,7 +850,7 @@ static double bound_of(struct tick *t, int32_t held)
 		settle_skin(t);
 		run_paths(t);
 	}
-	/* Numbers of this tool are none of the next one's. */
+	/* Numbers of this tool do not apply to the next one. */
 	t->state = from;
 	paths->n = begin;
 	return t->force.in + t->force.own;
@@ -915,6 +915,6 @@ double incise_plan_bound(const struct incise_plan *plan, double reach_mm)
 		bound_N = fmax(bound_N, bound_of(t, INCISE_TOOL_HANDLE));
 		bound_N = fmax(bound_N, bound_of(t, INCISE_TOOL_TUBE));
 	}
-	/* None of the two is above the limit. */
+	/* Neither force is above the limit. */
 	return end_tick(t, fmin(bound_N, 2 * plan->scene->limits.force_N));
 }

@@ -127,7 +127,7 @@ static double largest_N(const struct incise_plan *plan, enum incise_cutting_phas
 	return largest;
 }
 
-/* The slope by which the force may rise from that of the puncture to that of the cut. */
+/* The slope by which the force may rise from the puncture's force to the cut's. */
 static double opening_slope(const struct incise_plan *plan)
 {
 	double x[INCISE_LOOP_INPUTS_MAX] = {0}, rise_N = 0;
@@ -155,7 +155,7 @@ static void set_tissue(struct incise_plan *plan)
 		own > 0 ? fmax(own, steepest_N_mm) : STEEPER * steepest_N_mm, LEAST_N_mm);
 }
 
-/* Take the slopes of a phase's model into those of the plan, where they are larger. */
+/* Take the slopes of a phase's model into the plan's, where they are larger. */
 static void take_slopes(struct incise_plan *plan, enum incise_cutting_phase phase,
 			const struct incise_slope *slopes)
 {
@@ -211,15 +211,15 @@ static int survey_model(struct incise_plan *plan)
 	s->acceleration_slope_N_s2_mm = plan->input_slope[INCISE_INPUT_ACCELERATION];
 	plan->steepest_N_mm += opening_slope(plan);
 	s->slope_N_mm = plan->gain * plan->steepest_N_mm;
-	/* That was looked at in places. */
+	/* The search looked at single places. */
 	if (plan->scene->cut[INCISE_PUNCTURE].model)
 		s->certified = false;
 	return 0;
 }
 
 /*
- * Set the delay of a force behind a pose: that of the scene, or the tracker's: its latency
- * and the period for which a pose is used.
+ * Set the delay of a force behind a pose: the scene's, or the tracker's latency and the period for which a pose is
+ * used.
  */
 static void set_delay(struct incise_plan *plan, const struct incise_tracker_info *tracker)
 {
@@ -242,7 +242,7 @@ static double pushed(const struct incise_plan *plan, int i)
 	return plan->axes.n > 1 ? fmax(1, v3_length(plan->axes.axis[i].dual)) : 1;
 }
 
-/* Lateness of each actuator: as the scene says, or as rig.conf does of this one. */
+/* Lateness of each actuator: the scene's, or rig.conf's for this actuator. */
 static int set_lateness(struct incise_plan *plan, struct incise_error *err)
 {
 	struct incise_plan_stability *s = &plan->stability;
@@ -276,9 +276,9 @@ static double membrane_N_mm(const struct incise_plan *plan)
 }
 
 /*
- * Whether tissue and membrane push at once: behind a membrane the tissue's force stays what it was
- * where the tool went through its plane, as long as the skin is as far away there. Half a millimetre
- * is let pass: a membrane of 5 mm in a neck of 55 mm has a quarter.
+ * Whether tissue and membrane push at once: behind a membrane the tissue's force stays as it was where the tool went
+ * through its plane, as long as the skin is as far away there. Half a millimetre is let pass: a membrane of 5 mm in a
+ * neck of 55 mm has a quarter.
  */
 #define ASLANT_MM 0.5
 
@@ -308,8 +308,8 @@ static bool is_aslant(struct incise_plan *plan)
 }
 
 /*
- * The largest stiffness in any phase, and the largest damping. Springs along the normal and
- * across it act along different lines, one to a side along a line that may be either.
+ * The largest stiffness in any phase, and the largest damping. Springs along the normal and across it act along
+ * different lines; a spring to a side acts along either.
  */
 static void add_up(struct incise_plan *plan, double model_N_mm)
 {
@@ -343,7 +343,7 @@ static void add_up(struct incise_plan *plan, double model_N_mm)
 		all = fmax(all, sum[INCISE_SPRING_NORMAL] + sum[INCISE_SPRING_ACROSS] +
 					sum[INCISE_SPRING_SIDE]);
 	}
-	/* More, so that no rounding of a potential's work is taken for none. */
+	/* More, so that rounding does not make a potential's work 0. */
 	plan->account_N_mm = fmin(1.25 * (all + K), 32767);
 }
 
@@ -455,8 +455,8 @@ struct advice {
 };
 
 /*
- * The search, with this gain or damping: only the way *@way, or all where that is below 0, and then *@way becomes the
- * one that swung.
+ * The search, with this gain or damping: only the way *@way, or all if *@way is below 0; then *@way becomes the way
+ * that swung.
  */
 static bool helps(struct incise_plan *plan, const struct incise_tracker_info *tracker,
 		  struct advice *advice, double value, int *way)
@@ -482,7 +482,7 @@ static bool helps(struct incise_plan *plan, const struct incise_tracker_info *tr
 
 /*
  * The advice is looked for down to a millionth of the gain, and up to 16 times the damping: by the way that swung alone, by
- * halvings of its logarithm, and then tried in all ways; if another one swings, by that one.
+ * halvings of its logarithm, and then tried in all ways; if another way swings, the search goes on with that.
  */
 #define GAIN_LEAST (1.0 / 1048576)
 #define DAMPING_MOST 16 /* times the device's own, or than 1 mN s/mm */
@@ -503,7 +503,7 @@ static double least_damping(const struct incise_plan *plan)
 	return fmax(plan->stability.device.damping_N_s_mm, 1e-3);
 }
 
-/* The nearest value to the plan's own, in three digits, that was tried and holds; 0: none was found. @way swung. */
+/* The nearest value to the plan's own, in three digits, that was tried and holds; 0: not found. @way swung. */
 static double find_advice(struct incise_plan *plan,
 			  const struct incise_tracker_info *tracker, bool damps, int way,
 			  struct advice *advice)
@@ -563,7 +563,7 @@ static void advise(struct incise_plan *plan, const struct incise_tracker_info *t
 			 plan->gain * GAIN_LEAST, DAMPING_MOST * least_damping(plan));
 }
 
-/* Of a run, for a message. */
+/* A run in words, for a message. */
 static void name_run(const struct incise_rest *rest, char name[160])
 {
 	static const char *const tools[] = {"tool", "blade", "handle", "tube"};

@@ -36,7 +36,7 @@ static const char *no_force(const struct incise_plan *plan,
 		return zero(plan, NULL);
 	if (own->number[0] > 0)
 		return NULL;
-	/* A force by a share of others is none where its stiffness is 0, too. */
+	/* A force by a share of others is left out if its stiffness is 0, too. */
 	return zero(plan, own->force->acts && own->number[own->force->acts] > 0
 				  ? own->force->number[0].zero
 				  : own->force->zero);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * A plan in double: its numbers, by what was found of the scene and the rig, and its ticks.
+ * A plan in double: its numbers, from the scene and the rig, and its ticks.
  */
 #include <errno.h>
 #include <math.h>
@@ -14,7 +14,7 @@ static void set_reaction(const struct incise_plan *plan,
 	bool model = plan->model || plan->fixed, front = model && plan->dissipates;
 
 	numbers->unloading = front ? plan->unloading_N_mm : 0;
-	/* Of a spring it is felt in a cut that was there, which scenes have that open one. */
+	/* Without a model friction acts in an open cut, which only insertion needs. */
 	if (!front && (model || !plan->inserts))
 		numbers->friction = 0;
 	if (!model)
@@ -81,7 +81,7 @@ void incise_plan_set_numbers(struct incise_plan *plan)
 		.leave = scene->tissue.leave_mm,
 		.average_ticks = plan->average_ticks,
 		.printed = scene->tissue.printed_orientation,
-		/* Not 0, where it is none of springs. */
+		/* Not 0 without springs. */
 		.account = plan->accounts ? fmax(plan->account_N_mm, 1e-3) : 0,
 		.upright = plan->upright,
 		.incision = incise_scene_cuts(scene),

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
  * The forces of a plan about a state of contact, by its own tick: each number of the tool's motion is changed by a
- * little, from the state on, and what the force does is the column of a matrix. A place that stays changed shows in the
- * force at once, and by the normal that is averaged within as many ticks:
+ * little, from the state on, and the change of the force is a column of a matrix. A place that stays changed shows in
+ * the force at once, and by the normal that is averaged within as many ticks:
  *
  *   place  ____,-----------    force ____,--.
  *              δ                        now  '--.____ now + mean
@@ -82,7 +82,7 @@ static void force_after(struct incise_plan *plan, const struct state *from, int6
 	v3_copy(force_N, state->force);
 }
 
-/* A column: what a change of this size in @part makes of the force. */
+/* A column: the change of the force by a change of this size in @part. */
 static void measure_column(struct incise_plan *plan, const struct state *from,
 			   int64_t t_ns, int ticks, struct change *change, double part[3],
 			   const double along[3], double size, double column[3])
@@ -98,7 +98,7 @@ static void measure_column(struct incise_plan *plan, const struct state *from,
 	v3_copy(part, (double[3]){0});
 }
 
-/* Speeds and accelerations to both sides: what has a corner at rest, as |v| has, is the search's. */
+/* Speeds and accelerations to both sides: the search covers corners at rest, such as |v|'s. */
 static void measure_mean_column(struct incise_plan *plan, const struct state *from,
 				int64_t t_ns, struct change *change, double part[3],
 				const double along[3], double size, double column[3])
@@ -161,7 +161,7 @@ void incise_plan_force_map(struct incise_plan *plan, int64_t t_ns,
 			double at_once = v3_dot(axis[i], first);
 			double later = v3_dot(axis[i], all_of_it) - at_once;
 
-			/* Of the mean the last place is a part. */
+			/* The last place is a part of the mean. */
 			map->mean[i][j] = n > 1 ? later * n / (n - 1) : 0;
 			map->now[i][j] = at_once + later - map->mean[i][j];
 			map->damping[i][j] = v3_dot(axis[i], damping);

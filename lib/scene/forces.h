@@ -41,19 +41,18 @@ struct incise_force_number {
 	const char *key, *unit;
 	double max;
 	const char *initial;
-	double skin; /* of neck.scene: what tests and benchmarks take */
+	double skin; /* of neck.scene: for tests and benchmarks */
 	const char *help;
 	const char *zero; /* it is 0 */
 };
 
 /*
- * Over so much more depth the force goes from that of the puncture to that of the cut: a blade that is
- * pushed as it opens the skin loses the hold of it on that way, and not at once. OPENS_OVER of
- * ../tissue/tick.proto.c.
+ * Over so much more depth the force goes from the puncture's to the cut's: skin lets go of a pushed blade
+ * on that way, and not at once. OPENS_OVER of ../tissue/tick.proto.c.
  */
 #define INCISE_PUNCTURE_MM 0.5
 
-/* A stage of lib/tissue, for both kinds of numbers: one that lacks either does not build. */
+/* A stage of lib/tissue, for both kinds of numbers: a stage that lacks either does not build. */
 struct incise_stage_pair {
 	incise_double_stage_fn *in_double;
 	incise_fixed_stage_fn *in_integers;

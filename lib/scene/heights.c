@@ -54,7 +54,7 @@
 /* sin 45° / √2: a square has that slope at its corners. */
 #define UPPER 0.5
 
-/* Of areas and places: the rounding of doubles, far above it. */
+/* For areas and places: far above the rounding of doubles. */
 #define NEARLY 1e-6
 
 struct shares {
@@ -329,7 +329,7 @@ static void outline(const struct heights *h, uint32_t face, struct polygon *p)
 			p->at[i][k] = h->vertex[c[i]][k] - h->from[k];
 }
 
-/* Area and knots: a corner of the cell that is one of the polygon too. */
+/* Area and knots: a corner of the cell that is also a corner of the polygon. */
 static void cover(struct heights *h, uint32_t face, int i, int j, const struct polygon *p)
 {
 	double area = 0;
@@ -421,7 +421,7 @@ static int fill_mesh(struct heights *h)
 				continue;
 			memcpy(edge.at[0], whole.at[i], sizeof(edge.at[0]));
 			memcpy(edge.at[1], whole.at[(i + 1) % 3], sizeof(edge.at[0]));
-			/* One that lies on the side of a cell takes nothing away from it. */
+			/* A border on the side of a cell takes nothing away from it. */
 			each_cell(h, face, &edge, NEARLY, mark);
 		}
 	}
@@ -474,7 +474,7 @@ static int fill_smooth(struct heights *h)
 
 /* --- shares of the error ---------------------------------------------------------------- */
 
-/* Of one cell: heights of its knots in mm, and their slopes. */
+/* One cell: heights of its knots in mm, and their slopes. */
 struct cell {
 	double z[2][2], slope[2][2][2]; /* by v, then u */
 };
@@ -580,7 +580,7 @@ static double product_norm(double a[2][2], double b[2][2])
 
 /*
  * κ and κ₃ of a cell. ñ's horizontal part is -γ/w: it changes with γ by 1/w across the slope and by
- * 1/w³ along it, all of ñ by 1/w and 1/w². None of these changes by more than 2 for each unit of γ.
+ * 1/w³ along it, all of ñ by 1/w and 1/w². These change by at most 2 for each unit of γ.
  * γ changes with the place by Γ, of which each column is on a line between two.
  */
 static void add_curvature(struct heights *h, const struct cell *c)
@@ -691,7 +691,7 @@ static int add_smooth(struct heights *h, int i, int j)
 		steepest = fmax(steepest, hypot(slope[0], slope[1]));
 		apart = fmax(apart, hypot(own[0] - slope[0], own[1] - slope[1]));
 	}
-	/* Of the slope per mm: (1 + slope²)^3/2 / R, and not twice that before the next look. */
+	/* The slope's change per mm, (1 + slope²)^3/2 / R; below twice that until the next look. */
 	bend = 2 * pow(1 + steepest * steepest, 1.5) * curvature;
 	steepest += bend * aside;
 	if (pow(1 + steepest * steepest, 1.5) * curvature > bend)
@@ -781,7 +781,7 @@ struct bounds {
 	double depth_mm, point_mm, normal_rad;
 };
 
-/* ρ: what the search leaves of its last step; HUGE_VAL where steps need not become smaller. */
+/* ρ: the rest of the search's last step; HUGE_VAL where steps need not become smaller. */
 static double last_step(const struct shares *s, double reach)
 {
 	double r = reach * s->sigma;
@@ -799,7 +799,7 @@ static double last_step(const struct shares *s, double reach)
 	return fmax(r, ROUNDING_MM);
 }
 
-/* Of all places no deeper, and no farther outside, than @reach. */
+/* Over all places no deeper, and no farther outside, than @reach. */
 static struct bounds bound(const struct shares *s, double reach)
 {
 	struct bounds bounds = {HUGE_VAL, HUGE_VAL, HUGE_VAL};
@@ -954,7 +954,7 @@ static int choose(struct heights *h, struct incise_heights *heights)
 		/* Finer cells only make the kinks between triangles sharper from here on. */
 		if (reach < best)
 			break;
-		/* As none was within it so far: the one that is nearest. */
+		/* No cell was within it so far: take the nearest. */
 		if (reach < 0 && best < 0 &&
 		    bound(&h->shares, least).depth_mm < HUGE_VAL &&
 		    (!heights->height ||

@@ -44,7 +44,7 @@ int incise_heights_make(const struct incise_surface *surface, const double up[3]
 			double leave_mm, double reach_mm, double wanted_mm,
 			struct incise_heights *heights, struct incise_error *err);
 
-/* One of {0} is accepted. */
+/* Accepts {0}. */
 void incise_heights_free(struct incise_heights *heights);
 
 #endif

@@ -255,7 +255,7 @@ int incise_integers_numbers(const struct incise_plan *plan,
 
 /* --- as a file ---------------------------------------------------------------------------- */
 
-/* Of the places where a contact began, mm: what the bound is certified for. */
+/* The places where a contact begins are certified up to here, mm. */
 #define REACH_MM 20
 
 /* Heights are off by no more than the first of these that lets a tool go deep enough, mm. */
@@ -393,7 +393,7 @@ static INCISE_REALTIME void mesh_move(void *context, const int32_t tool[3],
 	proxy->touching = integers->proxy.touching;
 	proxy->began = integers->proxy.began;
 	if (proxy->began)
-		/* Of the place itself: a normal, not a direction from the tool. */
+		/* The normal at the place itself, not a direction from the tool. */
 		take_touch(&proxy->first,
 			   &(struct incise_touch){
 				   .point_mm = {integers->proxy.first.point_mm[0],

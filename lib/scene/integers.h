@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * A plan with arithmetic = "fixed": the numbers of ../fixed/plan.h, from those of the plan in double,
- * and their way through the plan's stages.
+ * A plan with arithmetic = "fixed": the numbers of ../fixed/plan.h, from the plan in double, and
+ * their way through the plan's stages.
  */
 #ifndef INCISE_INTEGERS_H
 #define INCISE_INTEGERS_H
@@ -23,7 +23,7 @@ struct incise_integers {
 
 /*
  * The numbers of a plan, without actuators and without a surface that is a mesh: its shape is left a
- * plane. Returns 0; -ERANGE: the message names what integers do not hold.
+ * plane. Returns 0; -ERANGE: the message names the number that integers do not hold.
  */
 int incise_integers_numbers(const struct incise_plan *plan,
 			    struct incise_fixed_numbers *numbers,
@@ -31,7 +31,7 @@ int incise_integers_numbers(const struct incise_plan *plan,
 
 /*
  * The same of a plan as a file: with its actuators and its certified error, and with heights in
- * place of a mesh, else none. *heights is freed by the caller, also after an error.
+ * place of a mesh. *heights is freed by the caller, also after an error.
  */
 int incise_integers_file(const struct incise_plan *plan,
 			 struct incise_fixed_numbers *numbers,

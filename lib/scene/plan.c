@@ -12,7 +12,7 @@
 #include "../model/model.h"
 #include "plan.h"
 
-/* Without a rig poses are as of this tracker: a magnetic one of 120 Hz. */
+/* Without a rig this tracker sends the poses: a magnetic one of 120 Hz. */
 static const struct incise_tracker_info fed_tracker = {
 	.name = "fed",
 	.rate_hz = 120,
@@ -75,8 +75,8 @@ static int take_model(struct incise_plan *plan, struct incise_error *err)
 }
 
 /*
- * @tracker: that of the poses that are fed, or, with a rig, the rig's from here on, and
- * @place as well.
+ * @tracker: the tracker of the fed poses; with a rig, the rig's from here on, and @place as
+ * well.
  */
 static int take_rig(struct incise_plan *plan, struct incise_rig *rig,
 		    struct incise_tracker_info *tracker, struct place place,
@@ -100,7 +100,7 @@ static int take_rig(struct incise_plan *plan, struct incise_rig *rig,
 	return plan->surface ? 0 : -errno;
 }
 
-/* From here on @tracker is that of one station: it has a part of the rate. */
+/* From here on @tracker is one station, with a part of the rate. */
 static void take_stations(struct incise_plan *plan, struct incise_tracker_info *tracker)
 {
 	plan->poses.scalpel_station = tracker->scalpel_station;
@@ -168,7 +168,7 @@ static void set_tool(struct incise_plan *plan)
 	incise_surface_top(plan->surface, &top);
 	v3_copy(plan->up, top.normal);
 	incise_proxy_init(&plan->proxy, plan->surface, plan->scene->tissue.leave_mm);
-	/* The average of what never changes is a rounding beside it. */
+	/* The average of a constant normal differs from it by rounding only. */
 	plan->average_ticks = incise_surface_kind(plan->surface) == INCISE_SURFACE_PLANE
 				      ? 1
 				      : plan->scene->effects.average_ticks;
@@ -452,7 +452,7 @@ char incise_plan_pose_flag(const struct incise_plan *plan)
 	return plan->poses.flag;
 }
 
-/* The tracker works, but what it measures is no pose. */
+/* The tracker works, but gives no usable pose. */
 static int blind_cause(const struct incise_plan *plan, char *text, size_t size)
 {
 	struct incise_tracker_info info;

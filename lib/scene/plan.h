@@ -24,7 +24,7 @@
 typedef int incise_stage_fn(struct incise_plan *plan,
 			    struct incise_tick *tick) INCISE_REALTIME;
 
-/* A stage of a device, or one of numbers. */
+/* A stage of a device, or a stage of numbers. */
 struct incise_stage {
 	const char *name;
 	incise_stage_fn *run; /* or: */
@@ -41,13 +41,13 @@ struct incise_plan_ops {
 			  int64_t now_ns) INCISE_REALTIME;
 	/* Follow plan->wanted and plan->fading. */
 	void (*hold)(struct incise_plan *plan) INCISE_REALTIME;
-	/* Whether no force is asked for or left. */
+	/* Whether the wanted force and the last one are 0. */
 	bool (*faded)(const struct incise_plan *plan) INCISE_REALTIME;
 	/* No force from now on, at once. */
 	void (*zero)(struct incise_plan *plan) INCISE_REALTIME;
 	/* Returns 0; -EINVAL (farther than the numbers hold). */
 	int (*set_tip)(struct incise_plan *plan, const double tip_mm[3]) INCISE_REALTIME;
-	/* Whether the membrane is open, and the cuts: one of a number from 0 on; none; one more. */
+	/* Whether the membrane is open; and the cuts: get cut i from 0 on, drop all, add one. */
 	int32_t *(*punctured)(struct incise_plan *plan)INCISE_REALTIME;
 	bool (*cut)(struct incise_plan *plan, int i,
 		    struct incise_cut *cut) INCISE_REALTIME;
@@ -70,7 +70,7 @@ struct incise_doubles {
 _Static_assert(INCISE_PLAN_OTHER_STAGES + INCISE_FORCES <= INCISE_PLAN_STAGES_MAX,
 	       "raise INCISE_PLAN_STAGES_MAX");
 
-/* A tracker that gives only unusable poses for so long has failed, as one that is unplugged. */
+/* A tracker that gives only unusable poses for so long has failed, like an unplugged one. */
 #define INCISE_PLAN_BLIND_NS (10 * INCISE_NS_PER_S)
 
 /* The poses of a plan. */
@@ -92,7 +92,7 @@ struct incise_plan_kernel {
 	bool runs, feeds;
 	bool seen;
 	struct incise_stepper_rendered last_seen;
-	int64_t fed_ns;	 /* when a pose, or a sign of life, was given last; 0: none was */
+	int64_t fed_ns;	 /* when a pose, or a sign of life, was given last; 0: never */
 	int64_t life_ns; /* so often, at least */
 	bool follow;	 /* all actuators do */
 	bool fade_told;	 /* the last one said whether to fade as it is */
@@ -145,8 +145,8 @@ struct incise_plan {
 
 	struct incise_doubles doubles;	  /* by all of the above */
 	struct incise_integers *integers; /* with arithmetic = "fixed"; else NULL */
-	double last_N[3];		  /* what was rendered */
-	struct incise_axes axes;	  /* none: nothing is rendered */
+	double last_N[3];		  /* rendered last */
+	struct incise_axes axes;	  /* without axes nothing is rendered */
 	struct incise_plan_kernel kernel;
 };
 
@@ -165,8 +165,8 @@ incise_stage_fn incise_stage_pose, incise_stage_fed, incise_stage_actuate;
 /* --- plan --- */
 
 /*
- * A copy that can tick beside the plan, with another gain: as the plan of a scene with that. It shares what the
- * plan has allocated.
+ * A copy that can tick beside the plan, with another gain: as the plan of a scene with that. It shares the
+ * memory of the plan.
  */
 void incise_plan_copy(struct incise_plan *copy, const struct incise_plan *plan,
 		      double gain);
@@ -175,7 +175,7 @@ void incise_plan_copy(struct incise_plan *copy, const struct incise_plan *plan,
 void incise_plan_input_range(const struct incise_plan *plan,
 			     enum incise_cutting_phase phase, int i, double ends[2]);
 
-/* Of a plan that was checked: scale all that goes with the gain. incise_plan_set_numbers() takes it over. */
+/* Scale all numbers of a checked plan that go with the gain. incise_plan_set_numbers() takes it over. */
 void incise_plan_set_gain(struct incise_plan *plan, double gain);
 
 /* Fill in the plan in double, by all that was found of the scene. */
@@ -186,14 +186,14 @@ int incise_plan_fail(struct incise_plan *plan, struct incise_tick *tick,
 		     int rc) INCISE_REALTIME;
 
 /*
- * Largest difference of the front's force in integers on the same motion, N, where each cutting force
- * differs by no more than @cutting_bound_N and none is above @most_N, while no advance is short of work.
- * Infinite: it is not bounded.
+ * Largest difference of the front's force in integers on the same motion, N, where each cutting force differs
+ * by no more than @cutting_bound_N and is at most @most_N, while no advance is short of work. Infinite: it is
+ * not bounded.
  */
 double incise_front_bound(double unloading_N_mm, double friction, double most_N,
 			  double cutting_bound_N);
 
-/* Fill in the stages that the scene and the rig need, and why the others are left out. */
+/* Fill in the stages that the scene and the rig need, and the reasons to leave out the others. */
 void incise_plan_choose(struct incise_plan *plan);
 
 /*
@@ -209,10 +209,10 @@ void incise_plan_fade(struct incise_plan *plan, bool fading) INCISE_REALTIME;
 /* Whether a force that fades has reached zero. Real-time safe. */
 bool incise_plan_faded(const struct incise_plan *plan) INCISE_REALTIME;
 
-/* The flag of the scalpel's newest pose; ' ' or 0: none. Real-time safe. */
+/* The flag of the scalpel's newest pose; ' ' or 0: no flag. Real-time safe. */
 char incise_plan_pose_flag(const struct incise_plan *plan) INCISE_REALTIME;
 
-/* The reason of a fault in a few words, without what the device says; NULL: no fault. */
+/* The reason of a fault in a few words, without the device's own; NULL: no fault. */
 const char *incise_plan_fault(const struct incise_plan *plan);
 
 /*
@@ -225,7 +225,7 @@ int incise_plan_check(struct incise_plan *plan, const struct incise_tracker_info
 
 /*
  * Of a plan that is ready to run: whether a scene with a model comes to rest, by a search.
- * Returns 0; -EDOM (it swings: the message says what ends that), -ENOMEM.
+ * Returns 0; -EDOM (it swings: the message names the remedy), -ENOMEM.
  */
 int incise_plan_check_rest(struct incise_plan *plan,
 			   const struct incise_tracker_info *tracker,

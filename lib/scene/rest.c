@@ -14,8 +14,8 @@
 
 /*
  * A run: in the air until the force's ramp has ended, then the hand leans. It ends when nothing moved for two
- * windows, or little and ever less, or with a quarter whose swing is none. Where that of the last quarter is not less than before, it
- * stays: the run ends, too, and swings; so it does after LONGEST quarters.
+ * windows, or little and ever less, or with a quarter without a swing. If the swing of the last quarter is not less
+ * than before, it stays: the run ends, too, and swings; so it does after LONGEST quarters.
  */
 #define AIR_S 0.1 /* and the scene's ramp */
 #define WINDOW_S 0.2
@@ -30,10 +30,10 @@
 #define POSES_MOST 64 /* on their way */
 
 /*
- * The supports: nothing; a spring across the normal, which leaves the device bare but keeps it in its place; a firm hand. Its mass,
- * damping and stiffness are those of the arm that van Beek, Bergmann Tiest, Mugge and Kappers measured in a typical trial
- * (Haptic perception of force magnitude and its relation to postural arm dynamics in 3D, Scientific Reports 5, 18004,
- * 2015, fig. 3: 0.554 kg, 6.45 N s/m, 135 N/m), with four times its damping and stiffness.
+ * The supports: nothing; a spring across the normal, which keeps the bare device in its place; a firm hand. It has
+ * the mass, damping and stiffness of the arm that van Beek, Bergmann Tiest, Mugge and Kappers measured in a typical
+ * trial (Haptic perception of force magnitude and its relation to postural arm dynamics in 3D, Scientific Reports 5,
+ * 18004, 2015, fig. 3: 0.554 kg, 6.45 N s/m, 135 N/m), with four times its damping and stiffness.
  */
 static const struct incise_hand_impedance holds[] = {
 	[INCISE_HELD_ACROSS] = {0, 0, 0.54},
@@ -43,11 +43,11 @@ static const struct incise_hand_impedance holds[] = {
 /*
  * Ways to lean, with equal steps up to this share of the scene's largest force.
  *
- * Those of all scenes: at the top, in the deepest valley and on the sharpest crest, free in all directions, in no
+ * Runs of all scenes: at the top, in the deepest valley and on the sharpest crest, free in all directions, in no
  * hand and in each, straight from a touch, and askew from a drop. Where a model stands |v| has its corner, and a swing is found
  * at some leans only: held across there are the most of them.
  *
- * Those of a model besides: guided along the normal of the top, while it makes a slow or a fast cut.
+ * Further runs with a model: guided along the normal of the top, while it makes a slow or a fast cut.
  */
 #define LEANS 40
 #define HALVES_MOST 6 /* of the least, where all of them sink away */
@@ -64,7 +64,7 @@ static const struct {
 #define LOOK_EVERY 20
 #define PLACES 5
 static const double askew[] = {0.02, 0.25};
-/* The first one that swings is named: one that does not slide away, if there is any. */
+/* The first run that swings is named, if possible one that does not slide away. */
 static const enum incise_held held[] = {INCISE_HELD_ACROSS, INCISE_HELD_IN_HAND,
 					INCISE_HELD_FREE};
 
@@ -76,8 +76,8 @@ static const enum incise_held held[] = {INCISE_HELD_ACROSS, INCISE_HELD_IN_HAND,
 
 /*
  * Between the leans on a model that are tried there may be worse: forces count as so much larger, and the device's
- * damping as so much smaller. Of springs the linear check has such a reserve: of a scene without a model a part of it is
- * left here.
+ * damping as so much smaller. The linear check has such a reserve for springs: for a scene without a model a part of
+ * it is left here.
  */
 #define FREE_RESERVE 0.04
 #define RESERVE 0.05
@@ -122,7 +122,7 @@ struct search {
 	int64_t ticks;
 	double along[3]; /* in the skin */
 	double turn[4];	 /* of the tool */
-	double deep_mm;	 /* what is deeper has sunk: it nears another side */
+	double deep_mm;	 /* a deeper tool has sunk: it nears another side */
 	double axis[3]
 		   [3]; /* in which the device moves: of a guided one the normal first */
 };
@@ -136,7 +136,7 @@ struct motion {
 struct run {
 	double lean_N;
 	struct incise_plant device[3];
-	struct motion tick[3]; /* what each does in one */
+	struct motion tick[3]; /* the motion of each in one */
 	double t_s, next_pose_s;
 	struct {
 		double arrival_s, at_mm[3];
@@ -237,7 +237,7 @@ static void set_turn(double turn[4], const double from[3], const double to[3])
 	v3_copy(turn + 1, axis);
 }
 
-/* Tilt what is turned about a unit vector. */
+/* Tilt a rotation about a unit vector. */
 static void tilt(double turn[4], const double about[3], double angle)
 {
 	double c = cos(angle / 2), s = sin(angle / 2), *v = turn + 1, cross[3];
@@ -315,7 +315,7 @@ static int64_t to_ns(double t_s)
 	return 2 * INCISE_NS_PER_S + llround(t_s * INCISE_NS_PER_S);
 }
 
-/* Of an axis that is there, for a time. */
+/* Set the motion of an axis over a time. */
 static void set_motion(struct motion *to, const struct incise_plant *of, double way_s)
 {
 	struct incise_plant plant = *of;
@@ -419,7 +419,7 @@ static void tick(struct search *s, struct run *run)
 		run->pose[pose].arrival_s = run->t_s + s->device.latency_s;
 		for (int i = 0; i < 3; i++)
 			run->pose[pose].at_mm[i] = run->device[i].position_mm;
-		/* Of a guided one: along the normal. */
+		/* A guided device has its noise along the normal. */
 		if (run->noise_mm > 0)
 			run->pose[pose].at_mm[0] +=
 				run->noise_mm *
@@ -463,8 +463,8 @@ static void start(struct search *s, struct run *run)
 }
 
 /*
- * A number as it rises from its lowest and falls from its highest: a swing does both, and more than once. What sinks
- * or creeps does one, and a tool that slides over an edge both once.
+ * A number as it rises from its lowest and falls from its highest: a swing does both, and more than once. A sinking
+ * or creeping tool turns in one, a tool that slides over an edge once in both.
  */
 struct range {
 	double low, high, rise, fall;
@@ -558,7 +558,7 @@ static double split(const struct search *s, const double way[3], double *into)
 	return v3_length(at);
 }
 
-/* Whether it slides, or is where no search began. */
+/* Whether it slides, or left the places where searches begin. */
 static bool has_left(const struct search *s, const struct window *last)
 {
 	double way_mm[3], into_mm;
@@ -571,7 +571,7 @@ static bool has_left(const struct search *s, const struct window *last)
 	return split(s, last->to_mm, &into_mm) > AWAY_MM || into_mm > s->deep_mm;
 }
 
-/* Of the device; below 0 where it left the place, or goes on: that decides nothing. */
+/* The swing of the device; below 0 if it left the place, or goes on: that decides nothing. */
 static double depth_of(const struct search *s, const struct window *last)
 {
 	double middle_mm[3], into_mm;
@@ -673,7 +673,7 @@ static void note(const struct search *s, const struct run *run, const struct win
 	};
 }
 
-/* As if its normal were not averaged: the account of work lets what is late by that give none. */
+/* As if its normal were not averaged: the account of work lets the late part give no work. */
 static struct incise_force_map paid_for(const struct incise_force_map *map)
 {
 	struct incise_force_map springs = *map;
@@ -686,7 +686,7 @@ static struct incise_force_map paid_for(const struct incise_force_map *map)
 	return springs;
 }
 
-/* Without a switch forces are the same on both sides, but for what bends. */
+/* Without a switch forces are the same on both sides, except for curvature. */
 static bool is_same(const struct incise_force_map *a, const struct incise_force_map *b)
 {
 	const double *x = (const double *)a, *y = (const double *)b;
@@ -758,7 +758,7 @@ static bool judge_linear(struct search *s, const struct run *run, double depth_m
 		here.margin = here.paid ? INCISE_PLAN_MARGIN_MOST
 					: here.margin * (1 + s->way.reserve);
 		incise_rest_take_weakest(&rest->weakest, &here);
-		/* After a kick the other side is that of another state. */
+		/* After a kick the other side belongs to another state. */
 		if (settle_s >= 0)
 			return settle_s > 0;
 	}
@@ -788,7 +788,7 @@ static bool try(struct search *s, struct run *run, int lean_of, int way,
 	s->decides |= depth_mm >= 0;
 	if (!(settle_s > 0))
 		return false;
-	/* Of near leans the loops are near, too. */
+	/* Similar leans have similar loops. */
 	return s->way.guided || !(depth_mm > 0) || lean_of % LOOK_EVERY ||
 	       judge_linear(s, run, depth_mm, way, rest);
 }
@@ -900,7 +900,7 @@ static void shake(struct search *s, const struct incise_plan *plan,
 		if (k > ticks / 2)
 			see_run(&window, &run);
 	}
-	/* To and fro: what sinks, as nothing holds it, is not moved by noise. */
+	/* To and fro: noise does not move a sinking tool, as nothing holds it. */
 	rest->noise_mm = fmin(window.at_mm[0].rise, window.at_mm[0].fall);
 	rest->noise_N = fmin(window.N[0].rise, window.N[0].fall);
 }
@@ -953,7 +953,7 @@ static void set_top(struct search *s, const struct incise_surface *surface)
 	}
 }
 
-/* Besides the others, if it is none of them. */
+/* Besides the others, unless it is one of them. */
 #define APART_MM 2
 static void add_place(struct search *s, const struct incise_touch *place)
 {

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Whether a plan comes to rest: a search by closed loops in time, for what no linear view of a point of rest
- * shows. A model's force depends on |v|, which has a corner at rest; a tissue that unloads has memory; a normal that
- * is averaged is late: all can swing for ever where each slope alone is stable.
+ * Whether a plan comes to rest: a search by closed loops in time, for swings that no linear view of a point of rest
+ * shows. A model's force depends on |v|, which has a corner at rest; a tissue that unloads has memory; an averaged
+ * normal is late: all can swing for ever where each slope alone is stable.
  *
  *   hand leans ─▶ device ─▶ tracker ─▶ the plan's own stages ─▶ late ticks, slew ─┐
  *                   ▲                                                             │
@@ -44,19 +44,19 @@ struct incise_rest {
 	bool rests;
 	int runs;
 	int64_t ticks; /* of all runs */
-	/* The first run that swings, or the one that took longest to come to rest. */
+	/* The first run that swings, or the run that took longest to come to rest. */
 	struct incise_plan_lean worst;
 	double force_N[3]; /* its lean */
 	double swing_N;
 	int way; /* of the search */
 	struct incise_plan_weakest weakest;
 	/* Range of position and force, of a hand that leans with half of the scene's limit, by
-	 * the noise of a tracker: INCISE_REST_NOISE_MM. Of a plan that rests. */
+	 * the noise of a tracker: INCISE_REST_NOISE_MM. Results for a plan that rests. */
 	double noise_mm, noise_N;
 };
 
 /*
- * A haptic device in its loop: a later device fills it in, and is judged by that.
+ * A haptic device in its loop: a later device fills it in and passes the same check.
  *
  *   mass, damping ──pose, so often, so old──▶ plan ──force, so late, held for a tick──▶ mass
  */
@@ -78,7 +78,7 @@ void incise_plan_device(const struct incise_plan *plan,
 			const struct incise_tracker_info *tracker,
 			struct incise_device *device);
 
-/* Take the other one where it is weaker, and count its states. */
+/* Take the other margin where it is weaker, and count its states. */
 void incise_rest_take_weakest(struct incise_plan_weakest *to,
 			      const struct incise_plan_weakest *other);
 

@@ -20,7 +20,7 @@ static void take_pose(struct incise_plan *plan, bool tube,
 		return;
 	for (int i = 0; i < 3; i++)
 		pose.position[i] = n_from(sample->position_mm[i]);
-	/* One that is no quaternion leaves the attitude as it was; 0 would be no pose. */
+	/* An invalid quaternion leaves the attitude as it was; 0 would be no pose. */
 	for (int i = 0; i < 4; i++)
 		size += fabs(sample->quaternion[i]);
 	for (int i = 0; i < 4; i++)
@@ -54,7 +54,7 @@ static void finish_tick(struct incise_plan *plan, struct incise_tick *tick)
 	tick->flags |= from->flags;
 }
 
-/* Inlined into both, so that the one without times does not pay for them. */
+/* Inlined into both, so that the tick without times does not pay for them. */
 static inline __attribute__((always_inline)) int run_stages(struct incise_plan *plan,
 							    int64_t t_ns,
 							    struct incise_tick *tick,

@@ -35,7 +35,7 @@ static const struct incise_setting tissue[] = {
 		     "dissipative or paper: force of a model when the blade withdraws"),
 	SETTING_WORD(orientation, tissue.printed_orientation, orientations, "eased",
 		     "eased or paper: effect of the handle's rotation"),
-	/* Of a tracker with ±0.05 mm of noise the poses shown have ±0.16 mm. */
+	/* With a tracker of ±0.05 mm of noise the shown poses have ±0.16 mm. */
 	SETTING_NUMBER(leave_mm, tissue.leave_mm, "mm", 0, 5, "0.2",
 		       "a contact begins at the surface and ends this far outside"),
 	/* More than that: a blade that rests on the skin cuts nothing. */
@@ -569,7 +569,7 @@ static int read_model(struct incise_scene *scene, const config_setting_t *root,
 	return load_model(scene, &scene->cut[INCISE_CUT], beside(scene, name), err);
 }
 
-/* --- what keys are to each other ----------------------------------------------------------- */
+/* --- relations between keys --------------------------------------------------------- */
 
 static int check_membrane(const struct incise_scene *scene, const config_setting_t *root,
 			  struct incise_error *err)
@@ -609,7 +609,7 @@ static int check_forces(const struct incise_scene *scene, struct incise_error *e
 	bool model = scene->cut[INCISE_CUT].path, any = model;
 
 	for (int i = 0; i < incise_n_tissue_forces; i++) {
-		/* A share of the other forces is none alone. */
+		/* A share of the other forces is no force alone. */
 		bool there =
 			scene->tissue.force[i][0] > 0 && !incise_tissue_forces[i].acts;
 

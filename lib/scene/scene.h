@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Inside of a scene, for lib/scene. Names and units are those of the file.
+ * Inside of a scene, for lib/scene. Names and units are the same as in the file.
  */
 #ifndef INCISE_SCENE_INTERNAL_H
 #define INCISE_SCENE_INTERNAL_H
@@ -73,14 +73,14 @@ struct incise_scene {
 };
 
 /*
- * The keys of a scene, in a struct incise_scene: of its groups; of the group tissue, those of the forces
- * included; and of a surface of that kind, in a struct incise_scene_surface.
+ * The keys of a scene, in a struct incise_scene: of its groups; of the group tissue, including the
+ * forces; and of a surface of that kind, in a struct incise_scene_surface.
  */
 extern const struct incise_setting incise_scene_settings[];
 void incise_scene_tissue_settings(struct incise_setting rows[SETTING_ROWS_MAX + 1]);
 const struct incise_setting *incise_scene_surface_settings(const char *kind);
 
-/* Of its tissue and tools: what its cuts go by. */
+/* Numbers of its tissue and tools for its cuts. */
 struct incise_double_incision_setup incise_scene_cuts(const struct incise_scene *scene);
 
 #endif

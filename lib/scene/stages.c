@@ -18,8 +18,8 @@ static bool is_scalpel(const struct incise_plan *plan, uint8_t station)
 }
 
 /*
- * Whether a pose is used, by its flag. One that is not is left out as if it had not come, so
- * that the last one ages.
+ * Whether a pose is used, by its flag. An unusable pose is left out as if it had not come,
+ * so that the last one ages.
  */
 static bool is_usable(struct incise_plan *plan,
 		      const struct incise_tracker_sample *sample, int64_t now_ns)

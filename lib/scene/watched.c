@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * A plan whose force the kernel renders: a tick reads what that found, and computes nothing. One that
- * feeds gives it the poses, too.
+ * A plan whose force the kernel renders: a tick reads the kernel's results, and computes nothing. A
+ * plan that feeds gives it the poses, too.
  *
  *   tracker ── stage pose ──▶ set-point page ──▶ incise_stepper.ko
  *      tick ◀── stage kernel ── status page ◀──┘
@@ -75,13 +75,13 @@ static bool has_faded(const struct incise_plan *plan)
 {
 	enum incise_stepper_plan_state state = plan->kernel.last_seen.state;
 
-	/* One that only watches leaves it to the feeder. */
+	/* A plan that only watches leaves it to the feeder. */
 	return !plan->kernel.feeds ||
 	       (state != INCISE_STEPPER_PLAN_RISE && state != INCISE_STEPPER_PLAN_FELT &&
 		v3_length(plan->last_N) == 0);
 }
 
-/* The tip, from the end of what is held; that of a tube with its own station says nothing of it. */
+/* The tip, from the end of the held tool; the end of a tube with its own station does not give it. */
 static void find_tip(const struct incise_plan *plan, struct incise_tick *tick)
 {
 	double axis[3];
@@ -118,7 +118,7 @@ static int find_rendered(struct incise_plan *plan, struct incise_tick *tick)
 	if (plan->kernel.feeds)
 		send_life(plan, tick->t_ns);
 	rc = incise_stepper_rendered(plan->axes.axis[0].stepper, &rendered);
-	/* While it is written: what was read last. */
+	/* While the kernel writes: the last reading. */
 	if (rc == -EAGAIN)
 		rc = plan->kernel.seen ? 0 : -EIO;
 	else if (!rc)

@@ -52,7 +52,7 @@ struct sim_camera {
 	struct incise_camera camera;
 	struct incise_sim *sim;
 	uint64_t key;
-	uint64_t next, first; /* next frame by the world's count; that of seq 0 */
+	uint64_t next, first; /* next frame by the world's count; frame of seq 0 */
 	uint64_t lost;
 	uint8_t *rgb;	/* HEIGHT rows */
 	uint8_t *liver; /* HEIGHT rows of LIVER_PERIOD pixels */

@@ -22,7 +22,7 @@ struct sim_force {
 	struct incise_sim *sim;
 	uint64_t key, stamp_key;
 	int64_t stamp_ns;  /* the last one */
-	uint64_t n, first; /* next sample by the world's count; that of seq 0 */
+	uint64_t n, first; /* next sample by the world's count; sample of seq 0 */
 };
 
 static struct sim_force *of_force(const struct incise_force *force)

@@ -41,7 +41,7 @@ struct sim_stepper {
 	double rest_mm; /* of the nut, where the hand and the spring are at rest */
 	double target_mm, nut_mm, nut_mm_s;
 	double handle_mm, handle_mm_s;
-	double limit_mm_s; /* of the nut: that of the screw, or of a jog */
+	double limit_mm_s; /* of the nut: by the screw, or by a jog */
 	struct incise_bench bench;
 };
 
@@ -163,7 +163,7 @@ static void advance(struct sim_stepper *s, int64_t now)
 	}
 }
 
-/* For the force channel, at its own times, none later than the stepper's. */
+/* For the force channel, at its own times, at most the stepper's. */
 static INCISE_REALTIME double press_N(struct incise_stepper *stepper, int64_t t_ns)
 {
 	struct sim_stepper *s = of_stepper(stepper);

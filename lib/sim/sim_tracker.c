@@ -32,7 +32,7 @@ struct sim_tracker {
 	struct incise_sim *sim;
 	uint64_t key;
 	double hz;	    /* true, by the host's clock */
-	uint64_t n, first;  /* next record by the world's count; that of seq 0 */
+	uint64_t n, first;  /* next record by the world's count; record of seq 0 */
 	int64_t arrival_ns; /* of the last record */
 };
 

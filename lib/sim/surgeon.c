@@ -9,10 +9,10 @@
  *   -depth           `-.________________________~~~~~~~~~~~~~~~'
  *
  * Each nominal depth is cut all its times before the next. The blade follows a path in a plane of
- * x and z, next to that of the cut before, with progress p from 0 to 1 along it. The hand's speed
- * along the path swings about its mean, so that every depth occurs at every velocity; where the
- * path is steep the blade moves less in x, so that its speed remains the hand's. Tremor is across
- * the cut and along z only: along x it would hide the slow phases.
+ * x and z, next to the path of the cut before, with progress p from 0 to 1 along it. The hand's
+ * speed along the path swings about its mean, so that every depth occurs at every velocity; where
+ * the path is steep the blade moves less in x, so that its speed remains the hand's. Tremor is
+ * across the cut and along z only: along x it would hide the slow phases.
  */
 #include <math.h>
 #include "../base/vector.h"

@@ -15,7 +15,7 @@
  *
  * Front: mean is the force of a blade that cuts. When it draws back, the tissue unloads with the
  * stiffness unloading_N_mm, and then there is friction, up to the front; see ../tissue/front.proto.c.
- * Each cut of the script is a new one; one that is made by hand stays open where it is. Teeth tear
+ * Each cut of the script is a new one; a cut made by hand stays open where it is. Teeth tear
  * only while the blade cuts. Closed motions take work; with teeth, which are no part of the front's
  * account, all but one in some hundreds of wild ones do.
  *
@@ -52,7 +52,7 @@ void incise_tissue_init(struct incise_tissue *tissue,
 
 /*
  * Tissue that is only pressed springs back. The law's share of speed acts against the motion, and
- * in proportion to it, as that of foam: friction of any other kind would look like a delay.
+ * in proportion to it, as in foam: friction of any other kind would look like a delay.
  */
 static double pressing_force(const struct incise_sim_config *config,
 			     const struct incise_blade *blade)

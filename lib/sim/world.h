@@ -23,8 +23,8 @@
 /* --- the liver: the force on a blade that moves through it --------------------------- */
 
 /*
- * Its state moves on once a tick. A force within the tick is that of a copy, so that it does not
- * depend on which forces were asked for before.
+ * Its state moves on once a tick. A force within the tick comes from a copy, so that it does not
+ * depend on earlier requests.
  */
 struct incise_tissue {
 	const struct incise_sim_config *config;
@@ -34,11 +34,11 @@ struct incise_tissue {
 	int cut;			  /* of the script, that the front is of */
 	double factor;			  /* tooth and bound, where the blade cut last */
 	double force_N;			  /* of the last advance */
-	double work_N_mm;		  /* put into the cut, less what came back */
-	double most_N_mm;		  /* of that, so far */
-	double path_mm;			  /* cut so far */
-	double fracture_mm;		  /* path at the last fracture */
-	double tooth_mm;		  /* path from there to the next */
+	double work_N_mm;   /* put into the cut, less the work that came back */
+	double most_N_mm;   /* of that, so far */
+	double path_mm;	    /* cut so far */
+	double fracture_mm; /* path at the last fracture */
+	double tooth_mm;    /* path from there to the next */
 	uint64_t teeth;
 };
 
@@ -64,7 +64,7 @@ double incise_tissue_force(const struct incise_tissue *tissue,
 struct incise_sim_stream {
 	struct incise_sim_stream *next;
 	int64_t t_ns; /* script time of the next sample */
-	/* Take the sample at t_ns and set t_ns to that of the one after it. */
+	/* Take the sample at t_ns and set t_ns to the time of the next sample. */
 	void (*sample)(struct incise_sim_stream *stream,
 		       const struct incise_sim *sim) INCISE_REALTIME;
 };

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
  * Reading an ESRI ASCII grid as a height field: values are heights in mm at the middles
- * of cells, the first row that of the largest y. Four neighbouring middles are a square
+ * of cells, the first row has the largest y. Four neighbouring middles are a square
  * of two triangles.
  *
  *      y ▲   row 0     ●──●──●     xllcenter, yllcenter: the middle ● of the lower left

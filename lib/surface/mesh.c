@@ -2,9 +2,9 @@
 /*
  * Places on a mesh: normal, texture coordinates, border; searches; gliding.
  *
- * The normal on an edge is the middle of its faces', and at a corner that of the faces
- * around it weighted by their angles: with it the sign of (p - nearest) · normal shows
- * inside from outside exactly (Bærentzen & Aanæs 2005), which a face's does not.
+ * The normal on an edge is the mean normal of its faces, and at a corner the mean of the faces
+ * around it, weighted by their angles: with it the sign of (p - nearest) · normal shows inside from
+ * outside exactly (Bærentzen & Aanæs 2005), which a face's does not.
  */
 #include <stdlib.h>
 #include "mesh.h"
@@ -159,7 +159,7 @@ static bool over_border(const struct mesh *mesh, const struct mesh_spot *spot,
 	return over;
 }
 
-/* The place nearest to @middle among those of a face that are @top high; false if none. */
+/* The place nearest to @middle among the places of a face that are @top high; false without one. */
 static bool top_of_face(const struct mesh *mesh, uint32_t face, double top,
 			const double middle[3], struct mesh_spot *spot)
 {
@@ -229,7 +229,7 @@ static void widen(double lo[3], double hi[3], const double p[3])
 	}
 }
 
-/* The middle of the face that is nearest to a place; one at a border only if all are. */
+/* The middle of the face nearest to a place; of a face at a border only if all faces are. */
 static void inner_spot(const struct mesh *mesh, const double place[3],
 		       struct mesh_spot *spot)
 {
@@ -363,8 +363,8 @@ double mesh_nearest(const struct mesh *mesh, const double p[3], uint32_t hint,
 #define AHEAD 0.01
 
 /*
- * A face beside the border at a spot, on the other side of it: one that is nearer to p, which
- * is then @next, or one that goes on from there. False: there is none, the surface ends.
+ * A face on the other side of the border at a spot: a face nearer to p, which is then @next, or a
+ * face that goes on from there. False: no face, the surface ends.
  */
 static bool goes_on(const struct mesh *mesh, const struct mesh_spot *spot,
 		    const double p[3], const double out[3], uint32_t face,
@@ -427,7 +427,7 @@ bool mesh_beyond_border(const struct mesh *mesh, const struct mesh_spot *spot,
 }
 
 /*
- * A straight way, and what a watertight test with triangles needs of it (Woop, Benthin,
+ * A straight way, prepared for a watertight test with triangles (Woop, Benthin,
  * Wald 2013): axes with the longest one last, and a shear that lays the way along it. A
  * vertex then has the same two coordinates in each of its triangles, and an edge's sign
  * for the one face is exactly the opposite for the other.
@@ -583,13 +583,12 @@ bool mesh_enters(const struct mesh *mesh, const double from[3], const double to[
  *        ╲        ╱       On a face the way goes straight to the face's nearest point.
  *         ╲  f   ╱        When that lies on an edge, the face behind the edge may have
  *      ────●────●──▶ x    a nearer one; when it lies on a corner, any face around the
- *         ╱  g   ╲        corner may. Where none has, the place is the nearest one around.
+ *         ╱  g   ╲        corner may. Where no face has, the place is the nearest one around.
  *
  * A face's nearest point is never farther than any other of its points, so the distance
  * falls all along the way, and the way never leaves the surface: there is no jump, and
- * nothing to lock. What is nearest is decided by the parts that the points lie on
- * (enum triangle_part), not by comparing distances, of which small differences drown in rounding
- * when the tool is deep.
+ * nothing to lock. The parts that the points lie on (enum triangle_part) decide which is nearest,
+ * not distances, whose small differences drown in rounding when the tool is deep.
  */
 
 /*
@@ -658,7 +657,7 @@ static void cut(const double start[3], double reach, double a[3], const double b
 	half = v3_dot(sa, ab);
 	rest = fmax(reach * reach - v3_dot(sa, sa), 0);
 	root = sqrt(half * half + whole * rest);
-	/* Of the two forms of the root the one that does not cancel. */
+	/* This form of the root does not cancel. */
 	t = half > 0 ? rest / (half + root) : (root - half) / whole;
 	v3_add(a, a, fmin(fmax(t, 0), 1), ab);
 }

@@ -3,10 +3,9 @@
  * A triangle mesh as a proxy needs it: corners, neighbours, normals that give the sign of
  * a distance, and a tree of boxes. Lengths in mm.
  *
- * Triangles lie in the order of the tree and vertices in the order of the triangles, so
- * that what is near in space is near in memory. Each vertex has one fan of triangles
- * around it: where two fans meet in a point only, that point is two vertices, and a
- * proxy does not pass from the one fan to the other.
+ * Triangles lie in the order of the tree and vertices in the order of the triangles, so that neighbours in space
+ * are near in memory. Each vertex has one fan of triangles around it: where two fans meet in a point only, that
+ * point is two vertices, and a proxy does not pass from the one fan to the other.
  */
 #ifndef INCISE_MESH_H
 #define INCISE_MESH_H
@@ -218,7 +217,7 @@ struct mesh *height_grid_load(const char *path, const double at_mm[3],
 void mesh_touch(const struct mesh *mesh, const struct mesh_spot *spot, const double p[3],
 		struct incise_touch *touch) INCISE_REALTIME;
 
-/* A border this near to another part of the mesh, such as at a seam, is none. */
+/* A border this near to another part of the mesh, such as at a seam, does not count. */
 #define MESH_SEAM_MM 0.1
 
 /*
@@ -228,7 +227,7 @@ void mesh_touch(const struct mesh *mesh, const struct mesh_spot *spot, const dou
 bool mesh_beyond_border(const struct mesh *mesh, const struct mesh_spot *spot,
 			const double p[3], struct mesh_spot *next) INCISE_REALTIME;
 
-/* The highest place; of many the one nearest to the middle. */
+/* The highest place; among several the one nearest to the middle. */
 void mesh_top(const struct mesh *mesh, struct incise_touch *touch);
 
 void mesh_size(const struct mesh *mesh, struct incise_surface_size *size);
@@ -243,7 +242,7 @@ double mesh_nearest(const struct mesh *mesh, const double p[3], uint32_t hint,
 
 /*
  * The first front face that the straight way meets at @least mm from its start or later.
- * It goes through no edge and no corner: what lies on them counts as met. With @slack, the gap
+ * It goes through no edge and no corner: a point on them counts as met. With @slack, the gap
  * of a seam counts as well, if it is no wider on each side.
  */
 bool mesh_enters(const struct mesh *mesh, const double from[3], const double to[3],
@@ -300,7 +299,7 @@ static inline bool mesh_fan_face(const struct mesh *mesh, struct mesh_fan *fan,
 				 uint32_t *face)
 {
 	if (fan->next == MESH_NONE && fan->ccw) {
-		/* A border: what is left lies on the other side of the first face. */
+		/* A border: the rest lies on the other side of the first face. */
 		fan->ccw = false;
 		fan->next = mesh_turn(mesh, fan->first, fan->vertex, false);
 	}

@@ -48,7 +48,7 @@ static int compare_keys(const void *a, const void *b)
 	return p->point < q->point ? -1 : p->point > q->point;
 }
 
-/* The points that are welded: all of them, or those of borders; the others are MESH_NONE. */
+/* The welded points: all points, or the points of borders; the others are MESH_NONE. */
 static size_t sort_points(const struct mesh_builder *b, bool borders,
 			  struct keyed *sorted, uint32_t *to)
 {

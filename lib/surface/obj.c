@@ -2,17 +2,17 @@
 /*
  * Reading a file of triangles: a Wavefront OBJ, or an STL, text or binary.
  *
- * Of an OBJ: `v`, `vt` and `f`. A face's corner is v, v/vt, v//vn or
+ * From an OBJ: `v`, `vt` and `f`. A face's corner is v, v/vt, v//vn or
  * v/vt/vn, counted from 1, or from -1 backwards for the last one before the face. Normals
  * (`vn`) are counted, so that their indices can be checked, and not used: a proxy needs
  * the ones of the faces.
  *
- * A face refers to what stands before it. One with more corners is cut into a fan from
- * its first corner. Statements that hold no surface are passed over; those that are not
- * known, or describe one in another way, are errors.
+ * A face refers to vertices before it. A face with more corners is cut into a fan from its
+ * first corner. Statements that hold no surface are passed over; unknown statements, and
+ * other descriptions of a surface, are errors.
  *
- * Of an STL: each facet has three corners of its own, which the mesh welds. Those of which
- * two are the same are no part of the surface. Normals are not used. In messages on a binary
+ * From an STL: each facet has three corners of its own, which the mesh welds. A facet with
+ * two equal corners is no part of the surface. Normals are not used. In messages on a binary
  * one the number of the facet, from 1, stands for the line.
  *
  *     binary   80 bytes │ n, uint32 │ n × (12 floats: normal, 3 corners │ 2 bytes)
@@ -401,7 +401,7 @@ static int read_any(struct obj *obj)
 	return rc;
 }
 
-/* Texture coordinates of each triangle's corners; 0, 0 where it has none. */
+/* Texture coordinates of each triangle's corners; 0, 0 for a triangle without. */
 static int take_uv(struct obj *obj)
 {
 	struct mesh_draft *draft = &obj->draft;

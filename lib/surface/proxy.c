@@ -71,7 +71,7 @@ static void move_on_shape(struct incise_proxy *proxy, const double tool[3])
 				proxy->touching ? proxy->touch.normal : up, &touch);
 	v3_copy(last, proxy->tool_mm);
 	if (!proxy->touching) {
-		/* A way shorter than what is left to the surface does not reach it. */
+		/* A way shorter than the distance to the surface does not reach it. */
 		v3_sub(way, tool, last);
 		near = !(v3_length(way) < -touch.depth_mm);
 		if (near && proxy->placed &&
@@ -141,8 +141,8 @@ static double find_near(const struct mesh *mesh, const double tool[3], uint32_t 
  * A proxy that is still on its way has the tool in front of its face: because the tool
  * has gone out, or because there is a dent between the two. Where the straight way to the
  * tool enters it is a dent, the tool is inside, and the proxy goes on gliding. A way that
- * starts on the edge of the dent may enter right there, and rounding then hides it: when
- * none is found, the nearest one to the tool decides.
+ * starts on the edge of the dent may enter right there, and rounding then hides it: if no face is found, the nearest
+ * one to the tool decides.
  */
 static bool is_dent(const struct incise_proxy *proxy, const struct mesh_spot *spot,
 		    const double tool[3])
@@ -225,9 +225,8 @@ static void look(struct incise_proxy *proxy, const double tool[3])
 		return;
 	/*
 	 * Half a ball is good enough, and found in a bounded time even in the middle of a
-	 * sphere, where all the mesh is equally near. One that the next tick's way would
-	 * leave is not worth its search: then only the boxes around the tool are looked
-	 * into, for whether it is on the surface.
+	 * sphere, where all the mesh is equally near. A ball that the next tick's way would leave is not worth its
+	 * search: then only the boxes around the tool show whether it is on the surface.
 	 */
 	v3_sub(way, tool, proxy->tool_mm);
 	length = v3_length(way);

@@ -52,7 +52,7 @@ struct incise_surface *incise_surface_new_plane(const double point_mm[3],
 	if (!surface)
 		return NULL;
 	v3_copy(surface->plane.point, point_mm);
-	/* Of any length: scaled first, so that no square overflows or vanishes. */
+	/* A vector is scaled first, so that no square overflows or vanishes. */
 	for (int i = 0; i < 3; i++)
 		surface->plane.normal[i] = normal[i] / largest;
 	v3_unit(surface->plane.normal, surface->plane.normal, 0);

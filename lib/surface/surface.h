@@ -54,8 +54,8 @@ bool plane_enters(const struct plane *plane, const double from[3], const double 
 		  struct incise_touch *touch) INCISE_REALTIME;
 
 /*
- * On the axis all directions across it are as near: the one that @last points to is
- * taken, as far as it points across.
+ * On the axis all directions across it are as near: the direction of @last is taken, as far as it points
+ * across.
  */
 void capsule_nearest(const struct capsule *capsule, const double p[3],
 		     const double last[3], struct incise_touch *touch) INCISE_REALTIME;
@@ -125,8 +125,8 @@ enum incise_surface_kind incise_surface_kind(const struct incise_surface *surfac
 size_t incise_surface_memory(const struct incise_surface *surface);
 
 /*
- * The proxy of one tool on one surface. Its fields may be read; they are set by
- * incise_proxy_init() and incise_proxy_move(), and by nobody else.
+ * The proxy of one tool on one surface. Its fields may be read; only incise_proxy_init() and
+ * incise_proxy_move() set them.
  */
 struct incise_proxy {
 	const struct incise_surface *surface;
@@ -135,7 +135,7 @@ struct incise_proxy {
 	bool touching;	 /* in contact */
 	bool began;	 /* the contact began with the last move */
 	double tool_mm[3];
-	/* The proxy; while not touching, what a contact would begin with is not known. */
+	/* The proxy; while it does not touch, the begin of a contact is not known. */
 	struct incise_touch touch;
 	struct incise_touch
 		first; /* where the contact began: Bhasin et al.'s P(0), Q(0) */
@@ -167,12 +167,12 @@ void incise_proxy_init(struct incise_proxy *proxy, const struct incise_surface *
  * move: `began` is set again and `first` is new.
  *
  * On a mesh the proxy goes at most twice as far as the tool went, in a straight line from
- * its old place to its new one; a tool that does not move leaves it where it is. What it
- * could not go it goes with the next moves (`settled`). Its work is finite: after about
- * 1000 triangles in one move it stays where it got to as well.
+ * its old place to its new one; a tool that does not move leaves it where it is. It goes the rest of the way
+ * with the next moves (`settled`). Its work is finite: after about 1000 triangles in one move it stays where
+ * it got to as well.
  *
- * @param tool_mm beyond 1e9 it counts as there; one that is not finite changes nothing but
- *                `began`. Real-time safe.
+ * @param tool_mm beyond 1e9 it counts as there; a position that is not finite changes nothing
+ *                but `began`. Real-time safe.
  */
 void incise_proxy_move(struct incise_proxy *proxy,
 		       const double tool_mm[3]) INCISE_REALTIME;

@@ -183,7 +183,7 @@ num T(front_force)(struct T(front) *front, num unloading, num friction, num dept
 	}
 	upper = n_max(rubs, n_times(K, n_sub(depth, front->cut)));
 	force = n_max(n_neg(rubs), n_min(force, n_min(upper, cutting)));
-	/* Else it stays to the bit, and no rounding adds up. */
+	/* Else the line stays to the bit, and no rounding adds up. */
 	if (n_below(force, trial) || n_below(trial, force))
 		front->rest = n_sub(depth, n_over(force, K));
 	/* The blade cuts where all of the model's force acts. */

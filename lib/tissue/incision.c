@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The incision of those who only see ticks; see incise/incision.h. All memory is allocated at the start.
+ * The incision for readers of ticks; see incise/incision.h. All memory is allocated at the
+ * start.
  */
 #include <errno.h>
 #include <math.h>

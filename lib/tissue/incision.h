@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Inside of an incision: what lib/scene sets of it. See incise/incision.h.
+ * Inside of an incision: the members that lib/scene sets. See incise/incision.h.
  */
 #ifndef INCISE_TISSUE_INCISION_H
 #define INCISE_TISSUE_INCISION_H

@@ -59,12 +59,12 @@ static struct local localize(const struct T(cut) *cut, const num at[3])
 			      v_along(off, cut->normal)};
 }
 
-static num aside_of(const struct T(cut) *cut, const num at[3])
+static num across_of(const struct T(cut) *cut, const num at[3])
 {
 	num off[3];
 
 	v_sub(off, at, cut->at_mm);
-	return n_abs(v_along(off, cut->side));
+	return v_along(off, cut->side);
 }
 
 /* Whether a place is within @reach of the cut, as seen along its normal. */
@@ -88,9 +88,15 @@ static void join(struct T(incision) *incision, int a, int b)
 /* Whether the way between two places comes near the cut, or crosses it. */
 static bool meets(const struct T(cut) *cut, const num from[3], const num to[3])
 {
-	struct local a = localize(cut, from), b = localize(cut, to), at;
-	num part, whole;
+	num a_across = across_of(cut, from), b_across = across_of(cut, to), part, whole;
+	struct local a, b, at;
 
+	/* Most are far to one side: the rest is not looked at. */
+	if ((n_below(BESIDE, a_across) && n_below(BESIDE, b_across)) ||
+	    (n_below(a_across, -BESIDE) && n_below(b_across, -BESIDE)))
+		return false;
+	a = localize(cut, from);
+	b = localize(cut, to);
 	if (reaches(cut, &a, BESIDE) || reaches(cut, &b, BESIDE))
 		return true;
 	if ((!n_below(a.across, 0) && !n_below(b.across, 0)) ||
@@ -116,7 +122,7 @@ static void check_others(struct T(incision) *incision, const num to[3])
 	v_copy(incision->checked, to);
 }
 
-/* The blade is in this cut from now on: it opens by what was cut before. */
+/* The blade is in this cut from now on; @was keeps the cut as it was before. */
 static void come_into(struct T(incision) *incision, int cut)
 {
 	if (incision->entered && incision->growing == cut)
@@ -153,7 +159,7 @@ static bool faces(const struct T(cut) *cut, const struct local *here, const dir 
 	       d_below(FACING, d_dot(normal, cut->normal));
 }
 
-/* The cut to which a blade of this direction (unit) returns; -1: none. */
+/* The cut to which a blade of this direction (unit) returns; -1: no cut. */
 static int find_cut(const struct T(incision) *incision, const num at[3], const dir way[3],
 		    const dir normal[3])
 {
@@ -162,7 +168,7 @@ static int find_cut(const struct T(incision) *incision, const num at[3], const d
 		struct local here;
 
 		/* Most are far aside: the rest is not looked at. */
-		if (n_below(BESIDE, aside_of(cut, at)))
+		if (n_below(BESIDE, n_abs(across_of(cut, at))))
 			continue;
 		here = localize(cut, at);
 		if (reaches(cut, &here, BESIDE) && faces(cut, &here, normal) &&
@@ -179,7 +185,7 @@ static void deepen(struct T(incision) *incision, const num at[3], num depth)
 	num from = localize(cut, incision->at).along, to = localize(cut, at).along;
 	num low = n_min(from, to), high = n_max(from, to), way = n_sub(high, low);
 
-	/* One that comes back beside an end has cut as far as to it: half of the blade's width. */
+	/* A blade that comes back beside an end has cut as far as to it: half of the blade's width. */
 	for (int i = place_of(n_min(low, cut->to_mm));
 	     i <= place_of(n_max(high, cut->from_mm)); i++) {
 		num gone = n_within(n_sub(middle_of(i), low), 0, way), here = depth;
@@ -203,7 +209,7 @@ static bool is_on(const struct T(cut) *cut, const num at[3], const dir normal[3]
 	       !n_below(ABOVE, n_abs(here.above)) && faces(cut, &here, normal);
 }
 
-/* The direction in a surface of a way between two places; any there for none. */
+/* The direction in a surface of a way between two places; any direction there if they are equal. */
 static void way_along(dir along[3], const num from[3], const num to[3],
 		      const dir normal[3])
 {
@@ -249,7 +255,7 @@ static bool turn_away(struct T(incision) *incision, const struct T(incision_setu
 	num from[3];
 
 	v_copy(from, incision->at);
-	/* Since the last tick it went less than what a tracker's noise is. */
+	/* Since the last tick the blade went less than a tracker's noise. */
 	way_along(along, incision->behind, at, normal);
 	there = find_cut(incision, at, along, normal);
 	if (there >= 0)
@@ -261,8 +267,8 @@ static bool turn_away(struct T(incision) *incision, const struct T(incision_setu
 }
 
 /*
- * Once for each place on the way: join cuts that are met. One that runs along the same line is gone on
- * with, so that no line is there twice.
+ * Once for each place on the way: join cuts that are met. A cut along the same line goes on, so that no line is there
+ * twice.
  */
 static void check_at_places(struct T(incision) *incision, const num at[3],
 			    const dir normal[3])
@@ -391,7 +397,7 @@ static num needed(const struct T(incision_setup) *setup, enum incise_tool tool)
 
 /*
  * A stretch of a line of cuts, from the tool's place outward: places next to each other, the deeper neighbour
- * first. It is as deep as the shallowest of them, so that of all stretches of its length round the tool none is deeper.
+ * first. It is as deep as the shallowest of them, so that no stretch of its length round the tool is deeper.
  *
  *          low ◀─┬──┬──┬──┬──┬──┬──┐            places of one cut
  *      skin ─────┤  │  │  │  │  │  └──┬─▶ high  and, where it ends, of another
@@ -546,7 +552,7 @@ static bool lets_in(const struct T(incision) *incision, int cut, const num at[3]
 	const struct T(cut) *in = &incision->cut[cut];
 	struct local here;
 
-	if (n_below(reach, aside_of(in, at)))
+	if (n_below(reach, n_abs(across_of(in, at))))
 		return false;
 	here = localize(in, at);
 	return reaches(in, &here, reach) &&
@@ -555,8 +561,8 @@ static bool lets_in(const struct T(incision) *incision, int cut, const num at[3]
 }
 
 /*
- * The cut that lets a tool in the deepest, of those that are as near as the nearest that does, within the width of
- * a line: where cuts cross, a tool goes into that. -1: none does.
+ * The cut that lets a tool in the deepest, among the cuts as near as the nearest that does, within the width of a
+ * line: where cuts cross, a tool goes into that. -1: no cut does.
  */
 static int deepest_cut(const struct T(incision) *incision, const num at[3], num reach,
 		       num length, struct stretch *stretch)

@@ -61,7 +61,7 @@ static wide left(const struct T(predict) *p, const struct T(filter) *filter, int
 	return w_left(since(t_ns, p->arrival_ns), filter->period_ns);
 }
 
-/* As shown: the filter's, and what is left to blend out. */
+/* As shown: the filter's, and the rest to blend out. */
 static void show(const struct T(predict) *p, const struct T(filter) *filter, int64_t t_ns,
 		 wide x[3], wide v[3])
 {
@@ -109,7 +109,7 @@ void T(predict_attitude)(const struct T(predict) *p, const struct T(filter) *fil
 			attitude[i] = p->q[i];
 }
 
-/* Of the two quaternions of an attitude, the one on the shorter way from q_shown. */
+/* The quaternion of an attitude that is on the shorter way from q_shown. */
 static void turn_to(struct T(predict) *p, const dir quaternion[4])
 {
 	dir q[4];
@@ -135,8 +135,8 @@ static bool correct(struct T(predict) *p, const struct T(filter) *filter, int64_
 	if (!w_is_near(miss, JUMP))
 		return false;
 	/*
-	 * Gains are those of the nominal period: a filter that divided by the time that went by
-	 * would make any speed of two poses a nanosecond apart.
+	 * Gains are for the nominal period: a filter that divided by the time that went by would make
+	 * any speed of two poses a nanosecond apart.
 	 */
 	for (int i = 0; i < 3; i++) {
 		p->x[i] = x[i] + w_times(filter->alpha, miss[i], 22);
@@ -148,7 +148,7 @@ static bool correct(struct T(predict) *p, const struct T(filter) *filter, int64_
 	return true;
 }
 
-/* Start again at a place. Returns whether the way there from what was shown is no jump. */
+/* Start again at a place. Returns whether the way there from the shown pose is no jump. */
 static bool restart(struct T(predict) *p, const num position[3], const wide shown[3])
 {
 	wide step[3];

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later OR GPL-2.0-only
 /*
  * Tissue that a blade tears as it is drawn along its edge: a spring K holds the edge at the tip of the cut until it
- * pulls with J, work of fracture per area, times the depth that is uncut there; then the tip goes with the blade. So a
- * cut takes J for each area of it, and gives back what the spring took.
+ * pulls with J, work of fracture per area, times the depth that is uncut there; then the tip goes with the blade. So
+ * a cut takes J for each area of it, and gives back the work of the spring.
  *
  *     skin ──┬──────┬──┬──────┬─── along   force = K (s - tip), no more than J (d - D)
  *            │ torn │▒ tip    s            d: depth of the blade
@@ -13,7 +13,7 @@
  * its direction.
  */
 
-/* The line through a place and along a direction: one that was torn, or a new one. Returns whether it is reversed. */
+/* The line through a place and along a direction: a torn line, or a new one. Returns whether it is reversed. */
 static bool take_line(struct T(tears) *tears, const num from[3], num s,
 		      const dir along[3], const dir normal[3])
 {

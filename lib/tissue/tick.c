@@ -46,7 +46,7 @@ void incise_double_surface_move(const struct incise_double_plan *plan,
 	proxy->touching = there->touching;
 	proxy->began = there->began;
 	if (there->began) {
-		/* Of the place itself: a normal, not a direction from the tool. */
+		/* The normal at the place itself, not a direction from the tool. */
 		v3_copy(proxy->first.point, there->first.point_mm);
 		v3_copy(proxy->first.normal, there->first.normal);
 		proxy->first.depth = there->first.depth_mm;

@@ -34,7 +34,7 @@ struct incise_double_plan {
 	struct incise_double_numbers numbers;
 	bool has_model;
 	struct incise_proxy *proxy; /* on the scene's surface */
-	/* Of each phase: its model, or none, and its inputs as in numbers. */
+	/* Each phase has its model or NULL, and its inputs as in numbers. */
 	const struct incise_model *model[INCISE_CUTTING_PHASES];
 	uint32_t inputs[INCISE_CUTTING_PHASES];
 	const struct incise_fixed

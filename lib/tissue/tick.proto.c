@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later OR GPL-2.0-only
 /*
- * The stages of a tick; see tick.proto.h. The forces are those of Bhasin et al. (2005), and Song et al.'s
- * model as the first of them. P is the tool's end, P0 where the contact began, n the outward normal (the
- * paper's Sn, or Snavg), d the depth.
+ * The stages of a tick; see tick.proto.h. The forces follow Bhasin et al. (2005), with Song et al.'s model as the
+ * first of them. P is the tool's end, P0 where the contact began, n the outward normal (the paper's Sn, or Snavg), d
+ * the depth.
  *
  *   cutting     reaction    F += Kn d n                      §2.2, Fn; less in an open cut
  *               with a model F += F(d, |v|) n       Song et al. (2006), eq. (3), by the front
@@ -22,19 +22,19 @@
  * - Fd prints +Kd v. It is to damp, so it opposes v.
  * - Fxz prints a product of three distances along (Q0-P0), which is always zero when the contact starts on
  *   the surface. Its sentence asks for a force proportional to the distance of the instrument from where
- *   its contact began: that is what stands here.
+ *   its contact began, as here.
  */
 
 /*
- * sin of the angle between the scalpel and the surface, to either side, within which it stays what it
- * was: 12° are more than a hand's tremor.
+ * sin of the angle between the scalpel and the surface, to either side, within which the held end does not change:
+ * 12° are more than a hand's tremor.
  */
 #define UNDECIDED D_OF(1, 5)
 
 /* From here on the tube counts as nearer; a tracker's noise and a tremor are far less. */
 #define NEARER N(5)
 
-/* Of the force, in one tick: ticks are to be at least ten in a ramp. */
+/* Share of the force in one tick: a ramp has at least ten ticks. */
 #define RISE_MOST (W_ONE / 10)
 
 /* Skin that was not cut before gives way over so much more depth: INCISE_PUNCTURE_MM. */
@@ -63,7 +63,7 @@ static enum incise_fixed_pose_answer take_scalpel(const struct T(numbers) *numbe
 	num tip[3], end[3];
 	dir q[4], along[3];
 
-	/* One that is none leaves the attitude as it was. */
+	/* An invalid quaternion leaves the attitude as it was. */
 	if (!d_attitude(q, pose->quaternion))
 		for (int i = 0; i < 4; i++)
 			q[i] = state->scalpel.q[i];
@@ -173,14 +173,14 @@ static struct height height_of(const struct T(above) *last, const num end[3])
 	return (struct height){above - went, above + went};
 }
 
-/* The surface is only searched where what is known of the heights does not decide it. */
+/* The surface is only searched where the known heights do not decide. */
 static bool is_tube_nearer(const struct T(plan) *plan, struct T(state) *state,
 			   const struct T(tick) *tick)
 {
 	const struct T(filter) *filter = &plan->numbers.filter;
 	struct T(ends) *ends = T_PART(state, ends);
 	bool tube_held = state->held == INCISE_TOOL_TUBE, searched = false;
-	/* Of how much a tube that is nearer stays below the scalpel. */
+	/* A nearer tube stays below the scalpel by so much. */
 	wide nearer = w_of(tube_held ? n_neg(NEARER) : NEARER);
 	num end[T(ENDS)][3], velocity[3];
 
@@ -210,7 +210,7 @@ static bool is_tube_nearer(const struct T(plan) *plan, struct T(state) *state,
 	}
 }
 
-/* One of the two stations that is silent is far away, also in the tissue. */
+/* A silent station counts as far away, also in the tissue. */
 static bool find_tube(const struct T(plan) *plan, struct T(state) *state,
 		      const struct T(tick) *tick)
 {
@@ -250,7 +250,7 @@ static void choose_tool(const struct T(plan) *plan, struct T(state) *state)
 							: state->wanted;
 	if (state->held == before)
 		return;
-	/* The way from the end of one to that of the other is no motion. */
+	/* The way from the end of one tool to the end of the other is no motion. */
 	state->proxy = (struct T(proxy)){0};
 	T(surface_restart)(plan);
 	state->gain = 0;
@@ -418,7 +418,7 @@ static void push(struct T(state) *state, num size, const dir unit[3])
 	v_add(state->force, state->force, size, unit);
 }
 
-/* Along the normal. Where that is an average it is late: so much of the force that it is not that of Sn. */
+/* Along the normal. An average normal is late: this part of the force is due to its difference from Sn. */
 static void push_out(const struct T(plan) *plan, struct T(state) *state, num size)
 {
 	push(state, size, state->normal);
@@ -579,7 +579,7 @@ static num advance(struct T(state) *state)
 	if (state->proxy.began)
 		state->skin_open =
 			!T(front_enter)(&state->front, state->p0, state->sn, state->side);
-	/* Through a membrane it meets none. */
+	/* Through a membrane it meets no tissue. */
 	if (state->membrane.hit)
 		return 0;
 	return T(front_advance)(&state->front, state->proxy.touch.point, state->sn,
@@ -587,8 +587,8 @@ static num advance(struct T(state) *state)
 }
 
 /*
- * Drag on a blade that comes out, as a part of the force of its cut: what the model of the withdrawal says
- * where that pulls, else tissue.friction.
+ * Drag on a blade that comes out, as a part of the force of its cut: by the model of the withdrawal where that pulls,
+ * else tissue.friction.
  */
 static num front_friction(const struct T(plan) *plan, const struct T(state) *state,
 			  const struct T(tick) *tick, num most)
@@ -724,17 +724,17 @@ void T(stage_spread)(const struct T(plan) *plan, struct T(state) *state,
 /*
  * Coulomb's friction of a tool along the skin, as an anchor that is dragged: a spring from the place where the
  * tool stuck, along the skin, that holds up to a share of the force along the normal; beyond it the anchor
- * follows. So it holds a hand that rests, which the sign of a velocity would not, and gives no work back but
- * what the spring took.
+ * follows. So it holds a hand that rests, which the sign of a velocity would not, and gives back only the work of the
+ * spring.
  *
  *            stretch            force = min(K stretch, μ N) towards the anchor
  *   ────×─ ─ ─ ─ ─ ─○────       slips: the anchor moves by stretch - μ N / K
  *     anchor      tool
  *
  * The anchor has 32 bits behind the point, so that its rounding adds up to nothing in a contact. An error of the
- * tool's place does not add up along the way, where the anchor is set anew, nor across it, where its next place
- * is a mean of those of tool and anchor; but a hand that circles at little more than R = μ N / K magnifies it,
- * up to √(2 R δ) for one of δ: see ../scene/bound.cc.
+ * tool's place does not add up along the way, where the anchor is set anew, nor across it, where its next place is a
+ * mean of the places of tool and anchor; but a hand that circles at little more than R = μ N / K magnifies it, up to
+ * √(2 R δ) for an error of δ: see ../scene/bound.cc.
  */
 static void drag(struct T(state) *state, num way, const dir along[3])
 {
@@ -777,8 +777,8 @@ void T(stage_skin)(const struct T(plan) *plan, struct T(state) *state,
 /* --- start, work and limit --------------------------------------------------------------- */
 
 /*
- * The share of a force that is let through. It waits for a small force, so that a scene that starts with
- * the blade deep in the tissue pushes nobody; then it ramps up, and fades out when poses stop.
+ * The share of a force that is let through. It waits for a small force, so that a scene that starts with the blade
+ * deep in the tissue does not push the hand; then it ramps up, and fades out when poses stop.
  *
  *   wanted   ----.            .-------------------
  *                 '-. small  /
@@ -788,8 +788,8 @@ void T(stage_skin)(const struct T(plan) *plan, struct T(state) *state,
  *             poses ..............         ........
  *
  * However long a stall was, a tick brings back a tenth of the force at most; it may take all of it. After a
- * fade the gain rises again without waiting for a small force: the hand has not left, and whoever holds the
- * blade in the tissue would else feel nothing until it is out. The ramp is the protection.
+ * fade the gain rises again without waiting for a small force: the hand has not left, and would else feel nothing
+ * until the blade is out of the tissue. The ramp is the protection.
  */
 void T(stage_start)(const struct T(plan) *plan, struct T(state) *state,
 		    struct T(tick) *tick)
@@ -820,14 +820,14 @@ void T(stage_start)(const struct T(plan) *plan, struct T(state) *state,
 		tick->command[i] = w_scale(state->gain, state->force[i]);
 }
 
-/* Of the last way both forces are known. */
+/* The forces at both ends of the last way are known. */
 static void take_in(struct T(fund) *fund, const struct T(account) *account)
 {
 	fund->work2 = w_taken(fund->work2, fund->before, fund->last, account->way);
 	v_copy(fund->before, fund->last);
 }
 
-/* Leave out what nothing has paid for of a force, and of the command that it is a part of. Returns whether there is any. */
+/* Leave out the unpaid part of a force, also in the command that contains the force. Returns whether there is any. */
 static bool leave_out(const struct T(fund) *fund, num stiffness, const dir unit[3],
 		      num force[3], num command[3])
 {
@@ -845,20 +845,20 @@ static bool leave_out(const struct T(fund) *fund, num stiffness, const dir unit[
  * The account of a contact's work: no more comes back than was put in. Springs that hold the energy E, all together
  * of the stiffness K, push with no more than √(2 K E): forces that are a potential's, or only take, are below that.
  * Others come to it: a handle that is turned in its cut, another place beyond a membrane, a force that is late, the
- * border of a mesh, a force that comes back in the tissue after a fade. Of these the part of the force along the
- * way that nothing has paid for is left out. Unlike a force that ends where E does, this one has no step there.
+ * border of a mesh, a force that comes back in the tissue after a fade. The part of the force along the way that no
+ * work has paid for is left out. Unlike a force that ends where E does, this one has no step there.
  *
  *     force ▲ ¦ .-·'' √(2 K E)
  *           | ¦·  left out above
  *           |·'
  *         0 '────────▶ E: put in, less what came back
  *
- * Forces that are late, a damper's and that of a normal that is averaged, have a fund of their own: only they are left
+ * Late forces (a damper's, and the part due to an averaged normal) have a fund of their own: only they are left
  * out where they give work, and a tool at rest is held as by springs.
  *
  * After Hannaford and Ryu, Time-domain passivity control of haptic interfaces, IEEE Trans. Robotics and Automation
- * 18(1), 2002; the work between two ticks is by the mean of their forces, before the limit of their change: a force
- * that is slewed follows later, and what was stored would seem to be unpaid for ever.
+ * 18(1), 2002; the work between two ticks is by the mean of their forces, before the limit of their change: a slewed
+ * force follows later, and stored work would seem to be unpaid for ever.
  */
 void T(stage_work)(const struct T(plan) *plan, struct T(state) *state,
 		   struct T(tick) *tick)
@@ -883,7 +883,7 @@ void T(stage_work)(const struct T(plan) *plan, struct T(state) *state,
 		late[i] = w_scale(state->gain, state->late[i]);
 		within[i] = w_of(tick->command[i]);
 	}
-	/* Nobody feels a force above the limit. */
+	/* The hand does not feel a force above the limit. */
 	v_shorten(within, numbers->force);
 	for (int i = 0; i < 3; i++)
 		force[i] = n_of(within[i]);
@@ -911,7 +911,7 @@ void T(stage_work)(const struct T(plan) *plan, struct T(state) *state,
  *    |    / last            inside the ball
  *     '.     0     .'
  *
- * Where both limits cannot be kept, as when the largest force is made smaller, it is the force that is.
+ * Where both limits cannot be kept, for example when the largest force is made smaller, the force's limit is kept.
  */
 void T(stage_limit)(const struct T(plan) *plan, struct T(state) *state,
 		    struct T(tick) *tick)
@@ -919,7 +919,7 @@ void T(stage_limit)(const struct T(plan) *plan, struct T(state) *state,
 	const struct T(numbers) *numbers = &plan->numbers;
 	wide force[3], change[3];
 
-	/* One that is not finite asks for no force, and is gone at the rate of the slew. */
+	/* A target that is not finite asks for no force, and the force goes at the rate of the slew. */
 	if (!v_is_number(tick->command)) {
 		tick->flags |= INCISE_TICK_NOT_FINITE;
 		for (int i = 0; i < 3; i++)

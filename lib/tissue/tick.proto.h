@@ -30,7 +30,7 @@ struct T(predict) {
 	int64_t t_ns;	       /* of acquisition of the last pose */
 	int64_t arrival_ns;    /* of it */
 	wide x[3], v[3], a[3]; /* at t_ns; Q32 mm, Q20 mm/s, Q16 mm/s² */
-	/* When it arrived, less what the filter says then. */
+	/* The shown value when a pose arrived, less the filter's then. */
 	wide x_shown[3]; /* Q24 mm */
 	wide v_shown[3];
 	wide a_shown[3];
@@ -44,12 +44,12 @@ struct T(predict) {
 void T(predict_init)(struct T(predict) *p);
 
 /*
- * Take a pose in. Any numbers are safe. One of a position beyond 10 m, or not newer than the last, is
- * passed over; a quaternion that is none leaves the attitude as it was. Returns whether it was taken.
+ * Take a pose in. Any numbers are safe. A pose beyond 10 m, or not newer than the last, is passed over; an invalid
+ * quaternion leaves the attitude as it was. Returns whether it was taken.
  *
- * After a gap of more than gap_ns velocity starts from 0. So it does when a pose is more than 20 mm
- * from where it should be: no hand did that, and it must not be dragged through the tissue, so there is
- * then no blend either; the force's limits do the rest.
+ * After a gap of more than gap_ns velocity starts from 0. The filter also starts again when a pose is more than 20
+ * mm from its expected place: no hand did that, and the tool must not be dragged through the tissue, so there is
+ * no blend, either; the force's limits do the rest.
  */
 bool T(predict_add)(struct T(predict) *p, const struct T(filter) *filter,
 		    const num position[3], const dir quaternion[4],
@@ -102,7 +102,7 @@ struct T(front) {
 	num rest;	  /* the elastic force is 0 here */
 	num cut;	  /* depth of the unloaded cut; ≥ 0 */
 	wide work2,
-		most2; /* twice the work put in, less what came back; the most so far */
+		most2; /* twice the work put in, less the work that came back; the most so far */
 	struct T(line) line;
 	struct {
 		struct T(line) line;
@@ -149,7 +149,7 @@ struct T(tears) {
 
 /* --- incision.proto.c --------------------------------------------------------------------- */
 
-/* Of a scene; lengths 0 … 1000. */
+/* Numbers of a scene; lengths 0 … 1000. */
 struct T(incision_setup) {
 	int32_t cuts_most; /* 0: the blade leaves no cut */
 	num cut_from;	   /* the blade cuts where it is deeper */
@@ -192,9 +192,9 @@ void T(incision_find)(const struct T(incision) *incision,
 		      const num at[3], struct T(opening) *opening) INCISE_REALTIME;
 
 /*
- * The share of a handle's width or a tube's diameter that an opening must still give, 0 … 1: of a
- * handle 1 where nothing has widened the cut, of a tube less, as the tissue stretches; 0 where it is as
- * wide as the tool less what the tissue stretches.
+ * The share of a handle's width or a tube's diameter that an opening must still give, 0 … 1: for a handle 1 where
+ * no tool has widened the cut, for a tube less, as the tissue stretches; 0 where it is as wide as the tool less
+ * the stretch of the tissue.
  */
 num T(incision_tightness)(const struct T(incision_setup) *setup,
 			  const struct T(opening) *opening,
@@ -202,7 +202,7 @@ num T(incision_tightness)(const struct T(incision_setup) *setup,
 
 /* --- tick.proto.c ------------------------------------------------------------------------- */
 
-/* A membrane over an airway; thickness 0: there is none. */
+/* A membrane over an airway; thickness 0: no membrane. */
 struct T(membrane) {
 	num point[3];
 	dir normal[3];
@@ -278,7 +278,7 @@ struct T(numbers) {
 	 * incise_model_input, once each. 0: depth, or depth and speed.
 	 */
 	int32_t inputs;
-	int32_t phases; /* models besides that of the cut: T_PUNCTURES, T_WITHDRAWS */
+	int32_t phases; /* models besides the model of the cut: T_PUNCTURES, T_WITHDRAWS */
 	num account; /* all springs together, in a plan whose work is on account; else 0 */
 	num upright; /* the membrane leans from the skin by no more: a cosine */
 #define FORCE(...)
@@ -326,7 +326,7 @@ struct T(average) {
 	dir last[3];
 };
 
-/* Work, twice, that was put in until the last tick, less what came back; the force then, and before. */
+/* Twice the work put in until the last tick, less the work that came back; the force then, and before. */
 struct T(fund) {
 	wide work2;
 	num last[3], before[3];
@@ -352,7 +352,7 @@ struct T(state) {
 	num p0[3];	    /* where the contact began */
 	dir entry[3];	    /* the normal there */
 	dir sn[3];	    /* the paper's Sn of this tick */
-	dir normal[3];	    /* the one that forces go along: Sn, or its average */
+	dir normal[3];	    /* direction of forces: Sn, or its average */
 	num depth;	    /* ≥ 0; of the tissue in front of a membrane */
 	int64_t touched_ns; /* when the contact began */
 	num deepest;	    /* of the blade since then */
@@ -373,8 +373,8 @@ struct T(state) {
 	struct T(tears) tears;
 	struct T(account) account;
 	num force[3];	       /* of the tissue, before limits … */
-	num late[3];	       /* … and what of it is late */
-	num last[3];	       /* what was rendered */
+	num late[3];	       /* … and its late part */
+	num last[3];	       /* rendered last */
 	num place[T_AXES_MAX]; /* of the handle along each axis, from its origin */
 	struct T(ends) OWNED ends;
 	struct T(average) OWNED average;
@@ -399,7 +399,7 @@ struct T(tick) {
 
 struct T(plan);
 
-/* --- what a kind of plan has beside this: its surface and its model --- */
+/* --- of each kind of plan besides: its surface and its model --- */
 
 /* Follow the tool: touching, began; with those the touch, and the first one. */
 void T(surface_move)(const struct T(plan) *plan, struct T(proxy) *proxy,
@@ -434,7 +434,7 @@ num T(input_time)(int64_t t_ns, int64_t from_ns) INCISE_REALTIME;
 void T(plan_begin)(const struct T(plan) *plan, struct T(state) *state);
 
 /*
- * Take a pose in, before the tick; one from the future counts as of now. Any numbers are safe.
+ * Take a pose in, before the tick; a pose from the future counts as of now. Any numbers are safe.
  */
 enum incise_fixed_pose_answer T(plan_pose)(const struct T(plan) *plan,
 					   struct T(state) *state,

@@ -128,7 +128,7 @@ struct shape {
 	int from_px[2], to_px[2]; /* to_px is exclusive */
 };
 
-/* Visible changes: mm, and radii; those of a swelling of wet skin are so many times that. */
+/* Visible changes: mm, and radii; so many times that for a swelling of wet skin. */
 #define SEEN_MM 0.04
 #define SEEN 0.03
 #define SEEN_WET 30
@@ -210,7 +210,7 @@ static void drops_show(struct drops *drops, struct drop *drop,
 					drop->px[1] - drop->drawn_px[1]);
 	double fast = fmin(drop->speed_mm_s / 15, 1);
 	struct drop is = *drop;
-	/* Large changes of what is hardly seen are followed at once, small ones not at all. */
+	/* Large changes of hardly visible parts are followed at once, small changes not at all. */
 	double blurs = drop->source < 0 ? 1 + (SEEN_WET - 1) * drop->wet * drop->wet : 1;
 	double seen = SEEN * fmin(blurs, 4);
 	bool other = false;
@@ -524,8 +524,8 @@ static void drops_step(struct drops *drops)
  * and Lambert: a film is translucent, a drop opaque. Alpha is 1 - exp(-h / h0), the colour goes
  * from light to dark red, and with drying to brown, first at thin edges.
  *
- * The height of a drop is added to that of the film below it, and goes smoothly to zero: there is
- * no seam between a drop and its trail.
+ * The height of a drop is added to the height of the film below it, and goes smoothly to zero:
+ * there is no seam between a drop and its trail.
  */
 
 /* At this thickness, mm, a film hides two thirds of the skin. */
@@ -620,7 +620,7 @@ void blood_free(struct blood *blood)
 	free(blood);
 }
 
-/* The place of a new source: a free one, or the one with the least flow. */
+/* The place of a new source: a free place, or the source with the least flow. */
 static int place_of_source(const struct blood *blood)
 {
 	int least = 0;

@@ -46,7 +46,7 @@ struct blood_volumes {
 };
 void blood_volumes(const struct blood *blood, struct blood_volumes *volumes);
 
-/* Place of drop @index, texels, and its volume, µl; false: there is none. For tests. */
+/* Place of drop @index, texels, and its volume, µl; false: no such drop. For tests. */
 bool blood_drop(const struct blood *blood, int index, double px[2], double *ul);
 
 void blood_free(struct blood *blood);

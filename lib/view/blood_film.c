@@ -8,7 +8,7 @@
 #include "blood_film.h"
 #include "noise.h"
 
-/* Of blood: kg/mm³, and mm/s². */
+/* Numbers of blood: kg/mm³, and mm/s². */
 #define RHO 1.06e-6
 #define GRAVITY_MM_S2 9810.0
 /* No spot is wider, texels. */

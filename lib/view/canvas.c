@@ -202,7 +202,7 @@ static void blend(uint8_t *to, const uint8_t *over, int n)
 	}
 }
 
-/* Whether a row of a layer is clear; from calloc(), or painted with nothing. */
+/* Whether a row of a layer is clear: from calloc(), or not painted. */
 static bool is_clear(const uint8_t *row, int n)
 {
 	uint64_t any = 0, eight;

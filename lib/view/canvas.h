@@ -47,7 +47,7 @@ static inline void canvas_tiles_mark(struct canvas_tiles *tiles, int number)
 void canvas_tiles_mark_texels(struct canvas_tiles *tiles, int left, int top, int right,
 			      int bottom);
 
-/* The next dirty tile from @number on, marked clean; -1: there is none. */
+/* The next dirty tile from @number on, marked clean; -1: no dirty tile. */
 int canvas_tiles_next(struct canvas_tiles *tiles, int number);
 
 static inline struct incise_rect canvas_tile_rect(const struct canvas_tiles *tiles,

@@ -96,8 +96,8 @@ static void solid_instrument(struct solid *solid, const struct instrument_mesh *
 }
 
 /*
- * The target: a framebuffer object with several samples per pixel and depth, and the one of single
- * pixels to which it is resolved.
+ * The target: a framebuffer object with several samples per pixel and depth, and the object of
+ * single pixels to which it is resolved.
  */
 struct target {
 	int width, height;
@@ -350,7 +350,7 @@ static int clamp_index(int x, int side)
 	return x < 0 ? 0 : x >= side ? side - 1 : x;
 }
 
-/* A texel with the lean in its alpha; @next: the one that its wetness is compared with. */
+/* A texel with the lean in its alpha; @next: the texel to compare its wetness with. */
 static inline uint32_t leaning(uint32_t texel, uint32_t next, uint8_t slope)
 {
 	int wet = wetness(texel), step = wet - wetness(next);
@@ -738,7 +738,7 @@ static void set_casters(const struct incise_draw *draw,
 }
 
 /*
- * The dent under an instrument that presses: skin gives way more to what is blunt.
+ * The dent under an instrument that presses: skin gives way more to a blunt one.
  *
  *      ───╮  ║  ╭───
  *          ╲ ║ ╱   depth most_mm (1 - exp(-depth / soft_mm)), reach radius_mm

@@ -152,7 +152,7 @@ int instrument_scalpel(const struct incise_scene_scalpel *scalpel,
 		       struct instrument_mesh *mesh)
 {
 	/*
-	 * A blade with a belly in a handle, mm of one that is 120 mm long: height, left
+	 * A blade with a belly in a handle, mm for a scalpel 120 mm long: height, left
 	 * (back), right (edge), half of the thickness, roundness, edge, steel.
 	 */
 	static const double shape[][7] = {

@@ -34,7 +34,7 @@ struct instrument_mesh {
 int instrument_scalpel(const struct incise_scene_scalpel *scalpel,
 		       struct instrument_mesh *mesh);
 
-/* tube_mm: diameter of the inserted part, up to that of the connector, 15 mm. */
+/* tube_mm: diameter of the inserted part, up to the connector's, 15 mm. */
 int instrument_tube(double tube_mm, struct instrument_mesh *mesh);
 void instrument_free(struct instrument_mesh *mesh);
 

@@ -18,8 +18,8 @@
 struct noise;
 
 /*
- * @size of the texture; cells in texels. Cells below 3 texels fade, down to none at 1.5, which
- * costs nothing. NULL: no memory.
+ * @size of the texture; cells in texels. Cells below 3 texels fade, and vanish at 1.5, which costs
+ * nothing. NULL: no memory.
  */
 struct noise *noise_new(uint64_t seed, int size, double cell_x, double cell_y);
 void noise_free(struct noise *noise);
@@ -36,7 +36,7 @@ float noise_at(uint64_t seed, int x, int y);
  */
 struct cells;
 
-/* @cell_x, @cell_y: mean size in texels; below 2 there are none. NULL: no memory. */
+/* @cell_x, @cell_y: mean size in texels; below 2 there are no cells. NULL: no memory. */
 struct cells *cells_new(uint64_t seed, int size, double cell_x, double cell_y);
 void cells_free(struct cells *cells);
 

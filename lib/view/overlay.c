@@ -26,7 +26,7 @@ struct overlay_column {
 };
 
 struct overlay_graph {
-	int64_t last; /* column; INT64_MIN: none yet */
+	int64_t last; /* column; INT64_MIN: no column yet */
 	struct overlay_column column[OVERLAY_COLUMNS];
 };
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The shaders; see shaders.h. Those of the surface work as far as possible at the vertices, a
- * millimetre or two apart: light, half-way vector and up are rotated into the texture's frame
+ * The shaders; see shaders.h. The shaders of the surface work as far as possible at the vertices,
+ * a millimetre or two apart: light, half-way vector and up are rotated into the texture's frame
  * there, and the instrument's shadow is computed there.
  */
 #include <epoxy/gl.h>

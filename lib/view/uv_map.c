@@ -26,7 +26,7 @@ static bool on_texture(const struct uv_map *map, const double px[2])
  */
 #define SIDE_MAX_MM 120.0
 
-/* Of a ball's radius: at the corners of the texture its slope is then 58°. */
+/* Share of a ball's radius: at the corners of the texture its slope is then 58°. */
 #define BALL_SHARE 0.6
 
 /* Slopes steeper than 87° count as 87°. */
@@ -399,7 +399,7 @@ static void place_all(struct grid *grid)
 	}
 }
 
-/* The place of a neighbour, or of the vertex itself where there is none. */
+/* The place of a neighbour, or without one of the vertex itself. */
 static const double *beside(const struct grid *grid, int i, int dx, int dy)
 {
 	int other = neighbour(i, dx, dy);
@@ -420,7 +420,7 @@ static void drawn_normal(const struct grid *grid, int i, double normal[3])
 		v3_copy(normal, grid->node[i].normal);
 }
 
-/* Whether there is relief as far as its neighbours. */
+/* Whether the relief reaches its neighbours. */
 static bool raised(const struct uv_map *map, const double px[2])
 {
 	double cell = (double)map->size / CELLS;
@@ -610,7 +610,7 @@ void uv_map_metric(const struct uv_map *map, const double px[2], double right_mm
 }
 
 /*
- * The larynx in relief, as smooth hills. Sizes are those of an adult: the membrane of
+ * The larynx in relief, as smooth hills. Sizes fit an adult: the membrane of
  * about 10 mm between thyroid and cricoid cartilage is where a cricothyroidotomy cuts.
  *
  *   head      thyroid cartilage      membrane  cricoid  trachea    chest

@@ -4,7 +4,7 @@
  *
  *         px[0] ──►  size                     right (tangent)
  *       ┌──────────────┐               ────►
- * px[1] │ texel (0, 0) │             ▲ normal, towards who looks
+ * px[1] │ texel (0, 0) │             ▲ normal, to the viewer
  *   │   │ has its      │          down = right × normal
  *   ▼   │ centre at .5 │
  *       └──────────────┘  seen from outside the image is not mirrored
@@ -32,12 +32,12 @@
 
 struct uv_map_vertex {
 	float position_mm[3]; /* as drawn, with the relief */
-	float normal[3];      /* unit, of what is drawn */
+	float normal[3];      /* unit, of the drawn surface */
 	float tangent[4]; /* unit, towards +px[0]; [3] (normal × tangent) is +px[1] */
 	float px[2];	  /* texels */
 };
 
-/* Triangles of a mesh in texture space, to find the one of a texel. */
+/* Triangles of a mesh in texture space, to find the triangle of a texel. */
 struct uv_atlas;
 
 struct uv_map {
@@ -79,8 +79,8 @@ bool uv_map_point(const struct uv_map *map, const double px[2], double point_mm[
 		  double normal[3]);
 
 /*
- * The change of the surface's point per texel. Where there is no surface: that of the nearest texel
- * at the texture's border, or of flat ground.
+ * The change of the surface's point per texel. Outside the surface: as at the nearest texel at the
+ * texture's border, or as for flat ground.
  */
 void uv_map_metric(const struct uv_map *map, const double px[2], double right_mm[3],
 		   double down_mm[3]);

@@ -238,7 +238,7 @@ bool uv_atlas_px(const struct uv_map *map, const double point_mm[3], double px[2
 	return true;
 }
 
-/* The triangle of a texel; of several the one with the largest inside(). */
+/* The triangle of a texel; among several the one with the largest inside(). */
 static bool find(const struct uv_map *map, const double px[2], struct patch *found,
 		 uint32_t *triangle)
 {

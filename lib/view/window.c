@@ -28,8 +28,8 @@ static void set_hints(void)
 }
 
 /*
- * Without a screen SDL draws into memory by itself, and nobody sees it or ends it. Who names
- * that driver wants it.
+ * Without a screen SDL draws into memory by itself, and no user can see or end it. A user
+ * who names that driver wants it.
  */
 static bool is_seen(const char *driver)
 {

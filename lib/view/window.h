@@ -27,7 +27,7 @@ void incise_window_size(const struct incise_window *window, int *width, int *hei
 /* Show the frame; waits for the screen if supported. */
 void incise_window_show(struct incise_window *window);
 
-/* The next event, its ray empty. 1; 0: none. */
+/* The next event, its ray empty. 1; 0: no event. */
 int incise_window_event(struct incise_window *window, struct incise_view_event *event);
 
 void incise_window_free(struct incise_window *window);

@@ -86,7 +86,7 @@ static bool span(float low, float high, float reach, int size, int *from, int *t
 	return true;
 }
 
-/* Returns false when it touches none of size × size texels. */
+/* Returns false if it touches no texel of size × size. */
 static bool field_prepare(struct field_stretch *s, const struct field_end *a,
 			  const struct field_end *b, const struct ground_metric *m,
 			  const float lamp[2], int size)
@@ -253,7 +253,7 @@ static void colour_skin(const struct field_texel *texel, float inside, float gra
 #define WALL_STEEP 2.2f
 #define OPEN_FROM_MM 0.9f
 #define OPEN_MM 1.8f
-/* Deeper, and so far inside, is the airway. */
+/* The airway begins so deep, and so far inside. */
 #define AIRWAY_MM 6.0f
 #define AIRWAY_INSIDE_MM 1.6f
 
@@ -572,7 +572,7 @@ void wound_free(struct wound *wound)
 	free(wound);
 }
 
-/* The fields at a texel; none outside of the texture. */
+/* The fields at a texel; 0 outside of the texture. */
 static struct field_texel field_at(const struct wound *wound, int x, int y)
 {
 	size_t tile = (size_t)(y / CANVAS_TILE) * wound->tiles.side + x / CANVAS_TILE;
@@ -661,7 +661,7 @@ static bool lift(struct wound *wound, struct wound_stroke *stroke)
 	return added;
 }
 
-/* Skin is under tension: a cut gapes, the deeper the wider, as far as skin is loose from what is below. */
+/* Skin is under tension: a cut gapes, the deeper the wider, as far as skin is loose below. */
 #define GAPES_TO_MM 6.0
 
 static float half_mm(double depth_mm)
@@ -917,7 +917,7 @@ static double tool_off_mm(const struct wound *wound, const struct wound_point *p
 				wound->tool_px[1] - p->px[1]);
 }
 
-/* The opening of a point's cut that stays, mm; 0: the point is on none. */
+/* The lasting opening of a point's cut, mm; 0: the point is on no cut. */
 static float stays_mm(const struct wound *wound, uint64_t number, float end_mm)
 {
 	const struct wound_point *p = line_point(wound, number), *other;
@@ -1039,7 +1039,7 @@ static uint64_t together(const struct wound *wound, uint64_t from)
 	return to;
 }
 
-/* The texels of a clipped stretch: those of a rectangle around it, if they are fewer. */
+/* The texels of a clipped stretch, or of a rectangle around it, if they are fewer. */
 static void bound_stretch(struct field_stretch *s)
 {
 	const float along_mm = 1 / sqrtf(s->inverse_mm2), reach = s->reach_mm / along_mm;
@@ -1083,7 +1083,7 @@ static void clip_stretch(const struct wound *wound, const struct loose_walk *bef
 	if (walk->to + 1 < wound->settled && line_point(wound, walk->to + 1)->joined &&
 	    line_loose(line_point(wound, walk->to)))
 		s->last = 1;
-	/* Before it there is none that was drawn. */
+	/* No stretch before it was drawn. */
 	if (before->to != walk->from || before->from == before->to)
 		return;
 	way(wound, before->from, before->to, last);

@@ -25,7 +25,7 @@
  * Memory: the fields, 8 bytes a texel, only where there are wounds; and the newest WOUND_POINTS
  * points, WOUND_SPACING_MM apart or more. Cuts of older points stay, but no longer open.
  *
- * Lengths in mm on the surface, times those of the ticks.
+ * Lengths in mm on the surface, times of the ticks.
  */
 #ifndef INCISE_VIEW_WOUND_H
 #define INCISE_VIEW_WOUND_H
@@ -66,7 +66,7 @@ bool wound_tick(struct wound *wound, const struct incise_tick *tick,
 /* 10 ms of the ticks' time: lips open and close. */
 void wound_step(struct wound *wound);
 
-/* The place of a handle or tube in the tissue; false: there is none. */
+/* The place of a handle or tube in the tissue; false: no such tool there. */
 bool wound_inserted(const struct wound *wound, double px[2], double *depth_mm);
 
 /*

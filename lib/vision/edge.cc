@@ -9,8 +9,8 @@
  *         u                            4. means of the others, the curve fitted again
  *
  * The curve is a step, blurred by a Gaussian and by the pixel's own width, from a level to
- * one that may wander farther out. It is at half of its height at u whatever the blur. Of colours,
- * the sum that differs most between handle and background is used: for liver mostly red.
+ * one that may wander farther out. It is at half of its height at u whatever the blur. For
+ * colours, the sum that differs most between handle and background is used: for liver mostly red.
  * tests/unit/vision/edge.c compares its error with the theoretical bound.
  */
 #include <algorithm>
@@ -123,7 +123,7 @@ static double level_from(const curve &c)
 
 /*
  * Least squares from @c, which is nearly right: Levenberg-Marquardt. @noise: of a pixel.
- * @variance: of PLACE, over that of a mean of weight 1.
+ * @variance: of PLACE, over the variance of a mean of weight 1.
  */
 static bool fit_curve(const bin *bins, int n, double noise, curve &c, double *variance)
 {

@@ -20,8 +20,8 @@ namespace vision
 {
 
 /*
- * Regions: each run starts a region of its own, and those that touch a run of the row above are
- * joined with it.
+ * Regions: each run starts a region of its own, and regions that touch a run of the row above
+ * are joined with it.
  *
  *      row above   ·███····██·      two runs touch when neither ends before the
  *      row         ··██████···      other starts
@@ -233,7 +233,7 @@ static bool fit_sides(handle_search &s, double y0, double y1, line *side)
 	       fit_line(s, s.side[1], y0, y1, side[1]);
 }
 
-/* NULL for a handle; else the reason why it is none. */
+/* NULL for a handle; else the reason why it is no handle. */
 static const char *judge(handle_search &s, double area, handle &h)
 {
 	double y0, y1, slope, width, corner, length;

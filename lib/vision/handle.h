@@ -65,7 +65,7 @@ struct handle_search {
 	std::vector<cv::Vec2d> colour, sum; /* of rows: value and chroma, levels */
 };
 
-/* Whether there is one within @box of the image. If not, *@why is the main fault of the best
+/* Whether there is a handle within @box of the image. If not, *@why is the main fault of the best
  * candidate. */
 bool handle_find(handle_search &s, image &image, const struct incise_vision_setup &setup,
 		 const cv::Rect &box, handle &found, const char **why);

@@ -84,7 +84,7 @@ void image::hsv(const cv::Rect &box, int step, cv::Mat &out)
 	int bytes = pixels == INCISE_PIXELS_RGB	   ? 3
 		    : pixels == INCISE_PIXELS_YUYV ? 2
 						   : 1;
-	/* OpenCV has no const views; nothing writes to this one. */
+	/* OpenCV has no const views; no function writes to this one. */
 	uint8_t *from = const_cast<uint8_t *>(data) + stride * (box.y - area.y) +
 			(size_t)(box.x - left) * bytes;
 	cv::Mat view(rows, box.width, CV_8UC(bytes), from, stride * step);

@@ -11,7 +11,7 @@
 
 INCISE_BEGIN_DECLS
 
-/* Of struct incise_backend: a struct incise_vision. */
+/* For struct incise_backend: a struct incise_vision. */
 void *vision_opencv_open(const struct incise_backend_request *request,
 			 struct incise_error *err);
 

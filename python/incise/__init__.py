@@ -12,6 +12,7 @@ from . import calibrate
 from ._library import VERSION as __version__
 from ._library import Error, Invalid, NotFound
 from .arrow import Batch, Field, Table
+from .capture import capture
 from .model import CompiledModel, Model, TrainReport, Variable, load, train
 from .plan import Plan, Stability, Tick
 from .recording import Frame, Info, Recording, Stream, open
@@ -41,6 +42,7 @@ __all__ = [
     "Wall",
     "WallPoint",
     "calibrate",
+    "capture",
     "load",
     "open",
     "train",

@@ -1,15 +1,14 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Training from many sources, each read twice and never held in memory; see incise/corpus.h.
 
-C reads a source by a callback, once per pass: the callback opens the stream, and hands C's own
-function that takes a row to C's reader. No row passes through Python.
+C reads files itself, and tables by a callback that opens their stream: no row passes through Python.
 """
 
 from __future__ import annotations
 
 import ctypes
 import errno
-import hashlib
+import math
 import os
 import re
 from typing import Any, List, Optional, Sequence
@@ -18,9 +17,8 @@ from . import _library
 from ._library import ArrowArrayStream, Failure, Invalid, c_bool, c_char_p, c_double, c_int
 from ._library import c_uint64, c_void_p, function
 from ._producer import open_stream
-from .model import Model, PairsStruct, SideStruct, TrainOptionsStruct, TrainReport
-from .model import TrainReportStruct, VariableStruct, all_sums, baselines, name_array, start
-from .model import has_cuts, is_path, is_recording, report_of
+from .model import BaselinesStruct, INPUTS_MAX, Model, Stop, TrainOptionsStruct
+from .model import TrainReportStruct, has_cuts, is_path, is_recording, name_array, report_of
 from .recording import Recording
 
 TEXT_MAX = 1000  # INCISE_FACTOR_TEXT_MAX
@@ -28,9 +26,106 @@ ORIGINS = 480  # bytes of a recording's origins in its text, as in tools/train/s
 _ORIGIN = re.compile(
     rb"incise:([1-9]):([a-z]{1,15}:[0-9a-f]{64}:[0-9]+:[-0-9A-Za-z]+:[-0-9A-Za-z._~%]+;)"
 )
-SAMPLE = 20000  # INCISE_CORPUS_SAMPLE
 
-_Read = ctypes.CFUNCTYPE(c_int, c_void_p, c_void_p, c_void_p, c_void_p)
+_Stream = ctypes.CFUNCTYPE(c_int, c_void_p, ctypes.POINTER(ArrowArrayStream), c_void_p)
+
+
+class SourceStruct(ctypes.Structure):
+    """struct incise_train_source"""
+
+    _fields_ = [
+        ("name", c_char_p),
+        ("path", c_char_p),
+        ("stream", _Stream),
+        ("cuts", c_bool),
+        ("hashed", c_char_p),
+        ("text", c_char_p),
+        ("rig", c_char_p),
+        ("calibration", c_char_p),
+        ("open", c_void_p),
+        ("state", c_void_p),
+        ("user", c_void_p),
+    ]
+    c_name = "struct incise_train_source"
+
+
+class SourcesOptionsStruct(ctypes.Structure):
+    """struct incise_sources_options"""
+
+    _fields_ = [
+        ("columns", ctypes.POINTER(c_char_p)),
+        ("n_inputs", c_int),
+        ("parts", c_void_p),
+        ("n_parts", c_int),
+        ("group", c_char_p),
+        ("all_rows", c_bool),
+        ("averaged", c_bool),
+        ("check", c_double),
+        ("premises", c_void_p),
+        ("type", c_int),
+        ("n_mfs", c_int * INPUTS_MAX),
+        ("train", TrainOptionsStruct),
+        ("progress", c_char_p),
+        ("ranks", c_void_p),
+        ("end", c_int),
+    ]
+    c_name = "struct incise_sources_options"
+
+
+class PropagationReportStruct(ctypes.Structure):
+    """struct incise_propagation_report"""
+
+    _fields_ = [
+        ("own", c_double),
+        ("calibration", c_double),
+        ("rig", c_double),
+        ("weight", c_double),
+        ("recordings", c_int),
+        ("calibrations", c_int),
+    ]
+    c_name = "struct incise_propagation_report"
+
+
+class TrainedStruct(ctypes.Structure):
+    """struct incise_trained"""
+
+    _fields_ = [
+        ("model", c_void_p),
+        ("uncertainty", c_void_p),
+        ("notes", c_char_p),
+        ("report", TrainReportStruct),
+        ("baselines", BaselinesStruct),
+        ("pairs", c_uint64),
+        ("check_pairs", c_uint64),
+        ("left_out", c_uint64),
+        ("repeated", c_uint64),
+        ("check_outside", c_uint64),
+        ("group", c_char_p),
+        ("initial", c_void_p),
+        ("factor", c_void_p),
+        ("corpus", c_void_p),
+        ("noise", c_double),
+        ("coverage", c_double),
+        ("propagated", PropagationReportStruct),
+        ("shared", c_bool),
+    ]
+    c_name = "struct incise_trained"
+
+
+_library.declare(
+    "libincise-learn",
+    {
+        "incise_train_sources": (
+            c_int,
+            ctypes.POINTER(SourceStruct),
+            c_int,
+            ctypes.POINTER(SourcesOptionsStruct),
+            ctypes.POINTER(TrainedStruct),
+            c_void_p,
+        ),
+        "incise_trained_free": (None, ctypes.POINTER(TrainedStruct)),
+    },
+)
 
 
 def _without_choice(path: bytes) -> bytes:
@@ -41,79 +136,10 @@ def _without_choice(path: bytes) -> bytes:
     return os.path.join(folder, name.rpartition(b":")[0])
 
 
-class SourceStruct(ctypes.Structure):
-    """struct incise_corpus_source"""
-
-    _fields_ = [
-        ("name", c_char_p),
-        ("hash", c_char_p),
-        ("text", c_char_p),
-        ("group", c_char_p),
-        ("own_groups", c_bool),
-        ("read", _Read),
-        ("user", c_void_p),
-        ("calibration", c_char_p),
-    ]
-    c_name = "struct incise_corpus_source"
-
-
-class CorpusSideStruct(ctypes.Structure):
-    """struct incise_corpus_side"""
-
-    _fields_ = [
-        ("sample", SideStruct),
-        ("rows", c_uint64),
-        ("different", c_uint64),
-        ("n_groups", c_int),
-    ]
-    c_name = "struct incise_corpus_side"
-
-
-_source = ctypes.POINTER(SourceStruct)
-_rows = (  # the end of the arguments of both readers
-    ctypes.POINTER(c_char_p),
-    c_int,
-    c_char_p,
-    c_char_p,
-    c_void_p,
-    c_void_p,
-    ctypes.POINTER(c_uint64),
-    c_void_p,
-)
-_library.declare(
-    "libincise-learn",
-    {
-        "incise_dataset_each": (c_int, c_char_p, *_rows),
-        "incise_dataset_each_arrow": (c_int, ctypes.POINTER(ArrowArrayStream), *_rows),
-        "incise_file_sha256": (c_int, c_char_p, c_char_p, c_void_p),
-        "incise_corpus_new": (c_void_p, c_int, c_bool, c_uint64, ctypes.c_size_t),
-        "incise_corpus_free": (None, c_void_p),
-        "incise_corpus_set_stop": (None, c_void_p, ctypes.POINTER(c_int)),
-        "incise_corpus_survey": (c_int, c_void_p, _source, c_void_p),
-        "incise_corpus_settle": (c_int, c_void_p, c_double, c_void_p),
-        "incise_corpus_side": (ctypes.POINTER(CorpusSideStruct), c_void_p, c_bool),
-        "incise_corpus_ranges": (None, c_void_p, c_void_p, c_void_p),
-        "incise_corpus_fold": (
-            c_int, c_void_p, _source, c_void_p, c_void_p, c_void_p, c_void_p
-        ),
-        "incise_factor_new": (c_void_p, c_void_p, c_void_p),
-        "incise_factor_free": (None, c_void_p),
-        "incise_factor_set_options": (None, c_void_p, c_char_p),
-        "incise_factor_notes": (c_void_p, c_void_p),
-        "incise_factor_rmse": (c_double, c_void_p, c_void_p, c_void_p),
-    },
-)
-
-
-def _sha256(path: bytes) -> bytes:
-    failure, digest = Failure(), ctypes.create_string_buffer(65)
-    failure.check(function("incise_file_sha256")(path, digest, failure.ref))
-    return digest.value
-
-
-def _origins_of_file(path: bytes) -> List[bytes]:
-    """Those in the comments at the start of a CSV file, one deeper; see incise/origin.h."""
-    found: List[bytes] = []
+def _file_text(path: bytes) -> bytes:
+    """The name of a CSV file, with the origins in the comments at its start, one deeper; see
+    incise/origin.h."""
+    text, found = os.path.basename(path)[:300], []
     with open(path, "rb") as file:
         for line in file:
             if not line.startswith(b"#"):
@@ -122,260 +148,98 @@ def _origins_of_file(path: bytes) -> List[bytes]:
                 origin = b"incise:%d:%s" % (int(depth) + 1, rest)
                 if depth < b"9" and origin not in found:
                     found.append(origin)
-    return found
+    for place, origin in enumerate(found):
+        if len(text) + len(origin) + 2 >= TEXT_MAX:
+            break
+        text += (b" " if place else b", ") + origin
+    return text
 
 
 class Source:
-    """A CSV file, a recording, or a table, as incise_corpus_source; close() it."""
+    """A CSV file, a recording, or a table, as incise_train_source."""
 
     def __init__(self, given: Any, place: int):
-        self.name = f"source {place}"
+        name = f"source {place}"
         named = isinstance(given, tuple) and len(given) == 2 and isinstance(given[0], str)
         if named:
-            self.name, given = given
-            if not self.name or not self.name.isprintable():
-                raise Invalid(errno.EINVAL, f"name {self.name!r}: give a name of one line")
+            name, given = given
+            if not name or not name.isprintable():
+                raise Invalid(errno.EINVAL, f"name {name!r}: give a name of one line")
         if is_recording(given):
             given = Recording(os.fsdecode(given))
-        self.path: Optional[bytes] = None
-        self.recording = given if isinstance(given, Recording) else None
-        self.table = self.recording.pairs() if self.recording else given
-        if self.recording:
-            self.path = _library.path_bytes(self.recording.path)
+        path: Optional[bytes] = None
+        if isinstance(given, Recording):
+            path = _library.path_bytes(given.path)
         elif is_path(given):
-            self.path = _library.path_bytes(given)
-            if self.path == b"-" or (os.path.exists(self.path) and not os.path.isfile(self.path)):
+            path = _library.path_bytes(given)
+            if path == b"-" or (os.path.exists(path) and not os.path.isfile(path)):
                 raise Invalid(
                     errno.EINVAL,
-                    f"{os.fsdecode(self.path)}: is no file, and each source is read twice; "
+                    f"{os.fsdecode(path)}: is no file, and each source is read twice; "
                     "save it as a file, or read it into a table",
                 )
-        self.is_table = self.path is None
-        if self.path is not None:
-            if named:
-                raise Invalid(
-                    errno.EINVAL,
-                    f"{os.fsdecode(self.path)}: has the name {self.name!r}; leave the name out, "
-                    "files go by their content",
-                )
-            self.name = os.fsdecode(self.path)
-        self.failure: Optional[BaseException] = None
-        self.left_out = 0
-
-    def prepare(self, columns: Any, group: Optional[str], where: Optional[str]) -> None:
-        """Hash it, and fill in the struct; the text is that of incise train."""
-        rig = b""
-        if self.is_table:
-            text = self.name.encode()[:300]
-            digest = hashlib.sha256(self.name.encode()).hexdigest().encode()
-        elif self.recording:
-            info = self.recording.info
-            rig = info.rig.encode()
-            origins = self.recording._origins(ORIGINS)
-            text = (
-                b"%.100s, %s%srecorded %s, rig %.120s, force %.9g mV/N, zero %.9g mV, camera %.9g mm/px"
-                % (
-                    os.path.basename(self.path.rstrip(b"/")),
-                    origins,
-                    b", " if origins else b"",
-                    info.started.encode(),
-                    rig,
-                    info.force_mV_N,
-                    info.zero_mV,
-                    info.depth_mm_px,
-                )
+        if named and path is not None:
+            raise Invalid(
+                errno.EINVAL,
+                f"{os.fsdecode(path)}: has the name {name!r}; leave the name out, "
+                "files go by their content",
             )
-            if self.recording._calibration is not None:
-                text += b", read with another calibration"
-            digest = _sha256(os.path.join(_without_choice(self.path), b"recording.db"))
+        self.is_table = path is None
+        self.name = name if path is None else os.fsdecode(path)
+        self.failure: Optional[BaseException] = None
+        self.table, self.cuts = given, has_cuts(given)
+        self.struct = SourceStruct(name=os.fsencode(self.name), cuts=self.cuts)
+        if isinstance(given, Recording):
+            self._describe(given, path)
+        elif path is not None:
+            self.struct.path = path
+            if os.path.exists(path):
+                self.struct.text = _file_text(path)
         else:
-            text = os.path.basename(self.path)[:300]
-            digest = _sha256(self.path)
-            between = b", "
-            for origin in _origins_of_file(self.path):
-                if len(text) + len(origin) + 2 >= TEXT_MAX:
-                    break
-                text += between + origin
-                between = b" "
-        # A group of all rows; else the text of a column.
-        whole = {"recording": digest, "rig": rig if self.recording else None}.get(group or "")
-        self.rows = (
-            columns,
-            len(columns),
-            group.encode() if group and whole is None else None,
-            where.encode() if where else None,
-        )
-        self.struct: Optional[SourceStruct] = SourceStruct(
-            os.fsencode(self.name), digest, text, whole, group == "cut", _Read(self._read)
-        )
+            self.struct.text = self.name.encode()[:300]
+        if self.struct.path is None:
+            self.struct.stream = _Stream(self._stream)
 
-    def close(self) -> None:
-        """Break the cycle of the callback, which would keep the table."""
-        self.struct = None
+    def _describe(self, recording: Recording, path: bytes) -> None:
+        """The text is that of incise train."""
+        info, origins = recording.info, recording._origins(ORIGINS)
+        self.table = recording.pairs()
+        self.struct.hashed = os.path.join(_without_choice(path), b"recording.db")
+        self.struct.rig = info.rig.encode()
+        self.struct.text = (
+            b"%.100s, %s%srecorded %s, rig %.120s, force %.9g mV/N, zero %.9g mV, camera %.9g mm/px"
+            % (
+                os.path.basename(path.rstrip(b"/")),
+                origins,
+                b", " if origins else b"",
+                info.started.encode(),
+                self.struct.rig,
+                info.force_mV_N,
+                info.zero_mV,
+                info.depth_mm_px,
+            )
+        )
+        if recording._calibration is not None:
+            self.struct.text += b", read with another calibration"
 
-    def _read(self, _user: int, take: int, taker: int, _error: int) -> int:
+    def _stream(self, _source: int, out: Any, _error: int) -> int:
         try:
-            self._pass_rows(take, taker)
-            return 0
-        except BaseException as failure:  # raised again by check()
-            self.failure = failure
-            return -errno.EIO
-
-    def _pass_rows(self, take: int, taker: int) -> None:
-        failure, left_out = Failure(), c_uint64()
-        rest = (*self.rows, take, taker, ctypes.byref(left_out), failure.ref)
-        if self.path is not None and not self.recording:
-            rc = function("incise_dataset_each")(self.path, *rest)
-        else:
             table = self.table
             if callable(table) and not hasattr(table, "__arrow_c_stream__"):
                 table = table()
-            stream, keep = open_stream(table)
-            rc = function("incise_dataset_each_arrow")(ctypes.byref(stream), *rest)
-            del keep
-        self.left_out = left_out.value
-        if rc:
-            raise _library.make_error(-rc, self._line(str(failure.exception(-rc))))
-
-    def _line(self, line: str) -> str:
-        return line if line.startswith(self.name) else f"{self.name}: {line}"
-
-    def check(self, rc: int, failure: Failure) -> None:
-        """Raise what ended its reading, or the error of C."""
-        raised, self.failure = self.failure, None
-        if raised is not None:
-            raise raised
-        failure.check(rc)
-
-
-class Corpus:
-    """A training from sources; frees what it holds."""
-
-    def __init__(
-        self, given: Sequence[Any], columns: List[str], group: Optional[str], all_rows: bool
-    ):
-        self.sources = [Source(source, place) for place, source in enumerate(given, 1)]
-        names = [source.name for source in self.sources if source.is_table]
-        for name in names:
-            if names.count(name) > 1:
-                raise Invalid(
-                    errno.EINVAL, f"name {name!r}: is given twice; give each table its own"
-                )
-        if group is None and self.sources and all(
-            source.recording or has_cuts(source.path or source.table) for source in self.sources
-        ):
-            group = "cut"
-        group = None if group == "none" else group
-        self.columns, self.group, self.all_rows = columns, group, all_rows
-        self.stop = c_int(0)
-        self.failure = Failure()
-        self.raised: Optional[BaseException] = None
-        self.corpus = self.sums = self.held = None
+            stream, self.keep = open_stream(table)
+            ctypes.memmove(out, ctypes.byref(stream), ctypes.sizeof(stream))
+            # It is C's now.
+            release = ArrowArrayStream.release
+            ctypes.memset(ctypes.addressof(stream) + release.offset, 0, release.size)
+            return 0
+        except BaseException as failure:  # raised again by train_sources()
+            self.failure = failure
+            return -errno.EIO
 
     def close(self) -> None:
-        for source in self.sources:
-            source.close()
-        self.corpus = self.sums = self.held = None
-
-    def survey(self, share: float, seed: int) -> None:
-        self.corpus = _library.Handle(
-            self.failure.require(
-                function("incise_corpus_new")(
-                    len(self.columns) - 1, bool(self.group), seed, SAMPLE
-                )
-            ),
-            "incise_corpus_free",
-        )
-        function("incise_corpus_set_stop")(self.corpus, ctypes.pointer(self.stop))
-        names, where = name_array(self.columns), None if self.all_rows else "advancing"
-        for source in self.sources:
-            source.prepare(names, self.group, where)
-            source.check(
-                function("incise_corpus_survey")(
-                    self.corpus, ctypes.byref(source.struct), self.failure.ref
-                ),
-                self.failure,
-            )
-        self.failure.check(
-            function("incise_corpus_settle")(self.corpus, share, self.failure.ref)
-        )
-        self.share = share
-        self.how = f"groups: {self.group or 'none'}" + ", all rows" * self.all_rows
-        if share:
-            self.how += f", {share:g} held out with seed {seed}"
-        side = function("incise_corpus_side")
-        self.fit, self.check = (side(self.corpus, check).contents for check in (False, True))
-
-    def start(self, mf_type: int, counts: Any, options: TrainOptionsStruct) -> Model:
-        n = len(self.columns)
-        ends = (c_double * n)(), (c_double * n)()
-        function("incise_corpus_ranges")(self.corpus, *ends)
-        options.ranges = (VariableStruct * n)(*((b"", *range_) for range_ in zip(*ends)))
-        options.groups = self.fit.sample.groups
-        return Model._of(start(self.fit.sample.pairs, self.columns, mf_type, counts, options))
-
-    def _factor(self, premises: int) -> _library.Handle:
-        factor = self.failure.require(
-            function("incise_factor_new")(premises, self.failure.ref)
-        )
-        function("incise_factor_set_options")(factor, self.how.encode())
-        return _library.Handle(factor, "incise_factor_free")
-
-    def _sums(self, _user: int, premises: int) -> Optional[int]:
-        """The second pass."""
-        try:
-            self.sums = self._factor(premises)
-            self.held = self._factor(premises) if self.share else None
-            for source in self.sources:
-                source.check(
-                    function("incise_corpus_fold")(
-                        self.corpus,
-                        ctypes.byref(source.struct),
-                        self.sums,
-                        self.held,
-                        None,
-                        self.failure.ref,
-                    ),
-                    self.failure,
-                )
-            return self.sums._as_parameter_
-        except BaseException as failure:  # raised again by run()
-            self.raised = failure
-            return None
-
-    def run(self, model: Model, options: TrainOptionsStruct) -> TrainReport:
-        report, uncertainty = TrainReportStruct(), c_void_p()
-        options.uncertainty = ctypes.pointer(uncertainty)
-        options.all = all_sums(self._sums)
-        has_check = self.check.sample.pairs.n > 0
-        rc = function("incise_train")(
-            model._pointer,
-            ctypes.byref(self.fit.sample.pairs),
-            ctypes.byref(self.check.sample.pairs) if has_check else None,
-            ctypes.byref(options),
-            ctypes.byref(report),
-            self.failure.ref,
-        )
-        options.all = all_sums()
-        raised, self.raised = self.raised, None
-        if raised is not None:
-            raise raised
-        self.failure.check(rc)
-        model._set_uncertainty(uncertainty.value)
-        if self.held:
-            report.check_rmse = function("incise_factor_rmse")(
-                self.held,
-                model._pointer,
-                ctypes.byref(report, TrainReportStruct.check_r2.offset),
-            )
-        model._notes = _library.owned_bytes(function("incise_factor_notes")(self.sums))
-        return report_of(
-            report,
-            self.fit.rows,
-            self.check.rows,
-            sum(source.left_out for source in self.sources),
-            baselines(self.fit.sample, self.check.sample) if has_check else {},
-        )
+        """Break the cycle of the callback, which would keep the table."""
+        self.struct = self.keep = None
 
 
 def train_sources(
@@ -393,19 +257,49 @@ def train_sources(
         raise Invalid(
             errno.EINVAL, "classic keeps all pairs in memory; give one table, or leave classic out"
         )
-    corpus = Corpus(given, columns, group, all_rows)
-    options.stop = ctypes.pointer(corpus.stop)
+    sources = [Source(source, place) for place, source in enumerate(given, 1)]
+    names = [source.name for source in sources if source.is_table]
+    for name in names:
+        if names.count(name) > 1:
+            raise Invalid(errno.EINVAL, f"name {name!r}: is given twice; give each table its own")
+    how = SourcesOptionsStruct(
+        columns=name_array(columns),
+        n_inputs=len(columns) - 1,
+        group=group.encode() if group else None,
+        all_rows=all_rows,
+        check=check,
+        type=mf_type,
+        n_mfs=counts,
+        train=options,
+    )
+    stop, trained, failure = Stop(how.train), TrainedStruct(), Failure()
+    structs = (SourceStruct * len(sources))(*(source.struct for source in sources))
 
     def learn() -> Model:
-        corpus.survey(check, options.seed)
-        model = corpus.start(mf_type, counts, options)
-        model.report = corpus.run(model, options)
+        rc = function("incise_train_sources")(
+            structs, len(sources), ctypes.byref(how), ctypes.byref(trained), failure.ref
+        )
+        for source in sources:
+            if source.failure:
+                raise source.failure
+        failure.check(rc)
+        model = Model._of(trained.model)
+        model._set_uncertainty(trained.uncertainty)
+        model._notes = trained.notes
+        trained.model = trained.uncertainty = None
+        known = not math.isnan(trained.coverage)
+        model.report = report_of(
+            trained.report,
+            trained.pairs,
+            trained.check_pairs,
+            trained.left_out,
+            trained.baselines if known else None,
+        )
         return model
 
-    def cancel() -> None:
-        corpus.stop.value = 1
-
     try:
-        return _library.call_interruptible(learn, cancel)
+        return _library.call_interruptible(learn, stop.cancel)
     finally:
-        corpus.close()
+        function("incise_trained_free")(ctypes.byref(trained))
+        for source in sources:
+            source.close()

@@ -401,18 +401,6 @@ def text(value):
     return value.decode("utf-8", "replace")
 
 
-def owned_bytes(address):
-    """A text that C made for its caller; it is freed."""
-    if not address:
-        raise MemoryError("no memory for a text")
-    free = ctypes.CDLL(None).free
-    free.argtypes, free.restype = [c_void_p], None
-    try:
-        return ctypes.string_at(address)
-    finally:
-        free(address)
-
-
 def call_interruptible(call, cancel):
     """Run a long C call in a thread, so that Ctrl-C works: it calls cancel(), and the call ends.
 

@@ -5,13 +5,16 @@ A :class:`Table` names rows; each reading of it starts anew, so it may be read a
 
     pyarrow.table(rec.force)            polars.DataFrame(rec.force)
     rec.force.numpy()["force_N"]        rec.force.pandas()
+    rec.force.parquet("force.parquet")
 """
 
 from __future__ import annotations
 
 import ctypes
 import errno
-from typing import Any, Callable, Dict, Iterator, List, NamedTuple, Optional
+import itertools
+import os
+from typing import Any, Callable, Dict, Iterator, List, NamedTuple, Optional, Union
 
 from . import _library
 from ._library import ArrowArray, ArrowArrayStream, ArrowSchema, Invalid, function, make_error
@@ -314,3 +317,23 @@ class Table:
         frame.attrs["units"] = {field.name: field.unit for field in self.fields}
         frame.attrs["provenance"] = self.metadata
         return frame
+
+    def parquet(self, path: Union[str, os.PathLike]) -> None:
+        """Write all rows to a Parquet file, with units and provenance, in bounded memory; needs pyarrow.
+
+        The file appears when it is complete."""
+        try:
+            import pyarrow.parquet
+        except ImportError:
+            raise ImportError("Parquet needs pyarrow; pip install pyarrow") from None
+        part = os.fspath(path) + ".part"
+        try:
+            reader = pyarrow.RecordBatchReader.from_stream(self)
+            batches = iter(reader)
+            with pyarrow.parquet.ParquetWriter(part, reader.schema) as writer:
+                for group in iter(lambda: list(itertools.islice(batches, 64)), []):
+                    writer.write_table(pyarrow.Table.from_batches(group))
+            os.replace(part, path)
+        finally:
+            if os.path.exists(part):
+                os.remove(part)

@@ -51,18 +51,25 @@ class ForceSetupStruct(ctypes.Structure):
     c_name = "struct incise_calibrate_force_setup"
 
 
-class ForcePartStruct(ctypes.Structure):
-    """struct incise_calibrate_force_part"""
+class PartStruct(ctypes.Structure):
+    """struct incise_calibration_part"""
 
     _fields_ = [
-        ("source", c_char * 48),
+        ("source", ctypes.c_char_p),
         ("type", c_char),
         ("u", c_double),
-        ("unit", c_char * 8),
+        ("unit", ctypes.c_char_p),
         ("sensitivity", c_double),
-        ("u_mV_N", c_double),
+        ("contribution", c_double),
     ]
-    c_name = "struct incise_calibrate_force_part"
+    c_name = "struct incise_calibration_part"
+
+
+class BudgetStruct(ctypes.Structure):
+    """struct incise_calibration_budget"""
+
+    _fields_ = [("n", c_int), ("part", PartStruct * 6)]
+    c_name = "struct incise_calibration_budget"
 
 
 class ForceStruct(ctypes.Structure):
@@ -93,24 +100,10 @@ class ForceStruct(ctypes.Structure):
         ("loads", c_int),
         ("series", c_int),
         ("passed", c_bool),
-        ("parts", c_int),
-        ("part", ForcePartStruct * 6),
+        ("budget", BudgetStruct),
     ]
     c_name = "struct incise_calibrate_force"
     c_fields = {"passed": "pass"}  # a word of Python
-
-
-class DepthPartStruct(ctypes.Structure):
-    """struct incise_depth_part"""
-
-    _fields_ = [
-        ("name", ctypes.c_char_p),
-        ("type", c_char),
-        ("u", c_double),
-        ("unit", ctypes.c_char_p),
-        ("sensitivity", c_double),
-    ]
-    c_name = "struct incise_depth_part"
 
 
 class DepthFitStruct(ctypes.Structure):
@@ -131,8 +124,7 @@ class DepthFitStruct(ctypes.Structure):
         ("high_px", c_double),
         ("bend_mm", c_double),
         ("bend_sd_mm", c_double),
-        ("n_parts", c_int),
-        ("part", DepthPartStruct * 6),
+        ("budget", BudgetStruct),
     ]
     c_name = "struct incise_depth_fit"
 
@@ -224,6 +216,13 @@ class Part(NamedTuple):
     sensitivity: float  #: change of the result per unit
 
 
+def _parts(budget: BudgetStruct) -> Tuple[Part, ...]:
+    return tuple(
+        Part(text(p.source), text(p.type), p.u, text(p.unit), p.sensitivity)
+        for p in budget.part[: budget.n]
+    )
+
+
 class Force(NamedTuple):
     """The line through loads and readings, with its uncertainty."""
 
@@ -306,11 +305,7 @@ def force(
             pairs, n, ctypes.byref(given), ctypes.byref(result), None, failure.ref
         )
     )
-    budget = tuple(
-        Part(text(p.source), text(p.type), p.u, text(p.unit), p.sensitivity)
-        for p in result.part[: result.parts]
-    )
-    return Force(*(getattr(result, name) for name in Force._fields[:-1]), budget)
+    return Force(*(getattr(result, name) for name in Force._fields[:-1]), _parts(result.budget))
 
 
 class Depth(NamedTuple):
@@ -345,11 +340,7 @@ def depth(
             ctypes.byref(pairs), None, ctypes.byref(fit), failure.ref
         )
     )
-    budget = tuple(
-        Part(text(p.name), text(p.type), p.u, text(p.unit), p.sensitivity)
-        for p in fit.part[: fit.n_parts]
-    )
-    return Depth(*(getattr(fit, name) for name in Depth._fields[:-1]), budget)
+    return Depth(*(getattr(fit, name) for name in Depth._fields[:-1]), _parts(fit.budget))
 
 
 class Tip(NamedTuple):

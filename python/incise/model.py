@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import csv
 import ctypes
 import errno
 import math
@@ -59,8 +58,7 @@ class SideStruct(ctypes.Structure):
     c_name = "struct incise_train_side"
 
 
-_Progress = ctypes.CFUNCTYPE(None, c_void_p, c_int, c_double, c_double)
-all_sums = ctypes.CFUNCTYPE(c_void_p, c_void_p, c_void_p)
+_Progress = ctypes.CFUNCTYPE(c_int, c_void_p, c_void_p)
 
 
 class TrainOptionsStruct(ctypes.Structure):
@@ -77,13 +75,21 @@ class TrainOptionsStruct(ctypes.Structure):
         ("user", c_void_p),
         ("starts", c_int),
         ("tuned", ctypes.c_size_t),
-        ("stop", ctypes.POINTER(c_int)),
         ("uncertainty", ctypes.POINTER(c_void_p)),
         ("ranges", ctypes.POINTER(VariableStruct)),
-        ("all", all_sums),
-        ("weighted", c_bool),
     ]
     c_name = "struct incise_train_options"
+
+
+class Stop:
+    """The progress of a training, by which another thread ends it."""
+
+    def __init__(self, options: TrainOptionsStruct):
+        self.set = False
+        options.progress = _Progress(lambda _user, _step: self.set)
+
+    def cancel(self) -> None:
+        self.set = True
 
 
 class TrainReportStruct(ctypes.Structure):
@@ -240,6 +246,7 @@ _library.declare(
             ctypes.POINTER(ctypes.c_size_t),
             c_void_p,
         ),
+        "incise_dataset_has": (c_bool, _path, ctypes.c_char_p, c_void_p),
         "incise_dataset_free": (None, c_void_p),
         "incise_dataset_rows": (ctypes.c_size_t, c_void_p),
         "incise_train_options_init": (None, ctypes.POINTER(TrainOptionsStruct)),
@@ -276,6 +283,8 @@ _library.declare(
             ctypes.POINTER(PairsStruct),
             ctypes.POINTER(c_int),
             ctypes.POINTER(PairsStruct),
+            _Progress,
+            c_void_p,
             ctypes.POINTER(BaselinesStruct),
             c_void_p,
         ),
@@ -745,11 +754,8 @@ def has_cuts(data: Any) -> bool:
     if not is_path(data):
         names = getattr(data, "column_names", getattr(data, "columns", data))
         return isinstance(names, Iterable) and "cut" in list(names)
-    if not os.path.isfile(data):
-        return False
-    with open(data, newline="", encoding="utf-8-sig", errors="replace") as lines:
-        rows = (line for line in lines if line.strip() and not line.startswith("#"))
-        return "cut" in (field.strip() for field in next(csv.reader(rows), []))
+    path = _library.path_bytes(data)
+    return os.path.isfile(path) and function("incise_dataset_has")(path, b"cut", None)
 
 
 def _read_dataset(
@@ -792,7 +798,7 @@ def start(
     )
 
 
-def baselines(fit: SideStruct, check: SideStruct) -> Dict[str, float]:
+def baselines(fit: SideStruct, check: SideStruct, progress: Any) -> BaselinesStruct:
     """Errors of simpler predictors on the pairs kept back."""
     failure, result = Failure(), BaselinesStruct()
     failure.check(
@@ -800,11 +806,13 @@ def baselines(fit: SideStruct, check: SideStruct) -> Dict[str, float]:
             ctypes.byref(fit.pairs),
             fit.groups,
             ctypes.byref(check.pairs),
+            progress,
+            None,
             ctypes.byref(result),
             failure.ref,
         )
     )
-    return {"mean": result.mean, "linear": result.linear, "knn": result.knn}
+    return result
 
 
 def report_of(
@@ -812,7 +820,7 @@ def report_of(
     pairs: int,
     check_pairs: int,
     left_out: int,
-    others: Dict[str, float],
+    others: Optional[BaselinesStruct],
 ) -> TrainReport:
     return TrainReport(
         pairs,
@@ -828,7 +836,7 @@ def report_of(
         report.rules_unfired,
         report.train_r2,
         report.check_r2,
-        others,
+        {"mean": others.mean, "linear": others.linear, "knn": others.knn} if others else {},
     )
 
 
@@ -838,10 +846,9 @@ class _Training:
     def __init__(self, dataset: int, share: float, options: TrainOptionsStruct):
         self.dataset, self.options = dataset, options
         self.fit, self.check = SideStruct(), SideStruct()
-        self.stop = c_int(0)
+        self.stop = Stop(options)
         self.failure = Failure()
         self.has_check = share != 0
-        options.stop = ctypes.pointer(self.stop)
         self.failure.check(
             function("incise_train_split")(
                 dataset,
@@ -978,15 +985,12 @@ def train(
             training.fit.pairs.n,
             training.check.pairs.n,
             left_out,
-            baselines(training.fit, training.check) if training.has_check else {},
+            baselines(training.fit, training.check, options.progress) if training.has_check else None,
         )
         return model
 
-    def cancel() -> None:
-        training.stop.value = 1
-
     try:
-        return _library.call_interruptible(learn, cancel)
+        return _library.call_interruptible(learn, training.stop.cancel)
     finally:
         training.close()
 

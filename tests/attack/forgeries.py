@@ -592,7 +592,7 @@ def remove_seal(recording, chance):
 
 
 def downgrade(recording, chance):
-    """Made to look like a recording of format 3, which has no seal."""
+    """Made to look like a recording of format 3, which has no seal: it is not read."""
     with open(os.path.join(os.path.dirname(__file__), "../forms/3.sql"), encoding="utf-8") as file:
         made = [line for line in file if line.startswith("CREATE TABLE ") and
                 line[13:].split("(")[0] in ("force", "tracker", "depth", "frames", "wall")]
@@ -603,7 +603,7 @@ def downgrade(recording, chance):
         db.executemany(f"INSERT INTO {table} VALUES({','.join('?' * n)})", [row[:n] for row in rows])
     db.commit()
     db.close()
-    return {"seal"}, None
+    return {"older incise"}, None
 
 
 def other_seal(recording, chance):

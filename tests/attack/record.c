@@ -4,20 +4,16 @@
  */
 #include <stdio.h>
 #include <stdlib.h>
-#include <incise/recorder.h>
-
-#define STEP_NS 10000000LL
+#include <incise/capture.h>
 
 int main(int argc, char **argv)
 {
 	struct incise_calibration calibration;
-	struct incise_recorder_setup setup = {.calibration = &calibration};
-	struct incise_recorder *recorder;
+	struct incise_capture_options options = {.recorder.calibration = &calibration};
+	struct incise_capture_result result;
 	struct incise_error err = {0};
-	struct incise_clock *clock;
 	struct incise_rig *rig;
-	int64_t end_ns;
-	int rc = 0;
+	int rc;
 
 	if (argc != 3) {
 		fprintf(stderr, "usage: record NAME.rec MS\n");
@@ -27,19 +23,8 @@ int main(int argc, char **argv)
 	rig = incise_rig_open("sim:clock=simulated",
 			      INCISE_RIG_TRACKER | INCISE_RIG_FORCE | INCISE_RIG_CAMERA,
 			      &err);
-	recorder = rig ? incise_recorder_new(argv[1], rig, &setup, &err) : NULL;
-	if (!recorder) {
-		fprintf(stderr, "%s\n", err.text);
-		return 1;
-	}
-	clock = incise_rig_clock(rig);
-	end_ns = incise_clock_now(clock) + atoll(argv[2]) * 1000000;
-	while (!rc && incise_clock_now(clock) < end_ns) {
-		incise_clock_wait_until(clock, incise_clock_now(clock) + STEP_NS);
-		rc = incise_recorder_poll(recorder, &err);
-	}
-	if (!rc)
-		rc = incise_recorder_close(recorder, &err);
+	options.duration_s = atof(argv[2]) * 1e-3;
+	rc = rig ? incise_capture_run(argv[1], rig, &options, &result, &err) : -1;
 	if (rc)
 		fprintf(stderr, "%s\n", err.text);
 	incise_rig_close(rig);

@@ -447,7 +447,7 @@ static double seal_percent(void)
 	const int rows[] = {1000, 24, CAMERA_HZ / 10, 0}; /* of a commit, each 100 ms */
 	const size_t sizes[] = {24, 97, 112, 160};
 	const struct incise_ledger_block block = {.count = 1};
-	struct incise_ledger_row row = {0};
+	const uint8_t row[20 * 8] = {0};
 	uint8_t digest[INCISE_SEAL_BYTES] = {0};
 	struct incise_seal seal;
 	double start;
@@ -458,12 +458,11 @@ static double seal_percent(void)
 	start = stopwatch_of(CLOCK_PROCESS_CPUTIME_ID);
 	for (int commit = 0; commit < SEAL_SECONDS * 10; commit++) {
 		for (int i = 0; i < INCISE_LEDGER_FORMS; i++) {
-			row.n = sizes[i];
 			for (int k = 0;
 			     k < rows[i] + (i == INCISE_LEDGER_WALL && commit % 10 == 0);
 			     k++)
-				incise_seal_row(&seal, i, &row);
-			incise_seal_block(&seal, i, &block);
+				incise_seal_row(&seal, i, row, sizes[i]);
+			incise_seal_block(&seal, i, &block, digest);
 		}
 		for (int k = 0; k < rows[INCISE_LEDGER_CAMERA]; k++) {
 			const int n = (commit * rows[INCISE_LEDGER_CAMERA] + k) % FRAMES;

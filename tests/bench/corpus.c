@@ -13,8 +13,8 @@
 #include <stdlib.h>
 #include <sys/resource.h>
 #include <time.h>
-#include <incise/corpus.h>
 #include "../../lib/base/random.h"
+#include "../../lib/learn/corpus.h"
 
 struct stream {
 	uint64_t pairs;
@@ -76,6 +76,7 @@ int main(int argc, char **argv)
 	const struct incise_corpus_source source = {.name = "made",
 						    .hash = hash,
 						    .text = "made",
+						    .group = "",
 						    .read = each,
 						    .user = &stream};
 	struct incise_corpus *corpus =
@@ -98,12 +99,12 @@ int main(int argc, char **argv)
 		goto failed;
 	t[2] = now();
 	stream.copy = argc > 3 ? fopen(argv[2], "w") : NULL;
-	if (incise_corpus_fold(corpus, &source, factor, NULL, NULL, &err))
+	if (incise_corpus_fold(corpus, &source, factor, NULL, &err))
 		goto failed;
 	t[3] = now();
 	if (stream.copy)
 		fclose(stream.copy);
-	model = incise_factor_solve(factor, &none, &report, NULL, &err);
+	model = incise_factor_solve(factor, &none, &report, NULL, NULL, &err);
 	if (!model || (argc > 3 && incise_model_save(model, argv[3], &err)))
 		goto failed;
 	t[4] = now();

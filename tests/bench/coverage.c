@@ -20,7 +20,7 @@
 #include <incise/calibrate_delay.h>
 #include <incise/calibrate_force.h>
 #include <incise/calibrate_tip.h>
-#include <incise/recorder.h>
+#include <incise/capture.h>
 #include <incise/rig.h>
 #include "../../lib/base/random.h"
 #include "../../lib/base/vector.h"
@@ -261,12 +261,11 @@ static int64_t record(struct rig *rig, const char *name, double time_s, char pat
 		      struct incise_sim_config *config)
 {
 	struct incise_calibration calibration;
-	struct incise_recorder_setup setup = {.calibration = &calibration,
-					      .calibration_path = rig->calibration};
+	struct incise_capture_options options = {.duration_s = time_s};
+	struct incise_capture_result result;
 	struct incise_rig *opened;
-	struct incise_recorder *recorder = NULL;
-	int64_t start_ns = -1, end_ns;
-	int rc = -1;
+	int64_t start_ns;
+	int rc;
 
 	snprintf(path, 300, "%s/%s.rec", rig->folder, name);
 	if (incise_calibration_load(rig->calibration, &calibration, &rig->err))
@@ -276,18 +275,10 @@ static int64_t record(struct rig *rig, const char *name, double time_s, char pat
 	if (!opened)
 		return -1;
 	start_ns = incise_clock_now(incise_rig_clock(opened));
-	end_ns = start_ns + (int64_t)(time_s * 1e9);
 	*config = *incise_sim_config(incise_rig_sim(opened));
-	recorder = incise_recorder_new(path, opened, &setup, &rig->err);
-	for (rc = recorder ? 0 : -1;
-	     !rc && incise_clock_now(incise_rig_clock(opened)) < end_ns;) {
-		struct incise_clock *clock = incise_rig_clock(opened);
-
-		incise_clock_wait_until(clock, incise_clock_now(clock) + POLL_NS);
-		rc = incise_recorder_poll(recorder, &rig->err);
-	}
-	if (recorder && incise_recorder_close(recorder, rc ? NULL : &rig->err))
-		rc = -1;
+	options.recorder.calibration = &calibration;
+	options.recorder.calibration_path = rig->calibration;
+	rc = incise_capture_run(path, opened, &options, &result, &rig->err);
 	incise_rig_close(opened);
 	return rc ? -1 : start_ns;
 }

@@ -12,8 +12,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <incise/corpus.h>
 #include <incise/sim.h>
+#include "../../lib/learn/corpus.h"
+#include "../../lib/learn/train.h"
 #include "program.h"
 #include "noise.h"
 #include "../../tools/cli/stopwatch.h"
@@ -137,6 +138,7 @@ struct learning {
 	struct incise_corpus_source source[RIGS_MAX];
 	int n;
 	struct incise_propagation *propagation; /* NULL: without uncertainties */
+	struct incise_factor *all;
 	double scatter;
 };
 
@@ -148,35 +150,34 @@ static struct incise_factor *sums(const struct learning *l,
 		cli_require(incise_factor_new(premises, &err), &err);
 
 	for (int i = 0; i < l->n; i++)
-		if (incise_corpus_fold(l->corpus, &l->source[i], factor, NULL, NULL,
-				       &err))
+		if (incise_corpus_fold(l->corpus, &l->source[i], factor, NULL, &err))
 			cli_fail_with(&err);
 	return factor;
 }
 
 /* As incise train does it. */
-static struct incise_factor *all_sums(void *user, const struct incise_model *premises)
+static int all_sums(void *user, const struct incise_model *premises,
+		    struct incise_factor **factor)
 {
 	const struct incise_factor_ridge ridge = {1e-3, 1, 1};
 	struct learning *l = user;
-	struct incise_factor *factor = NULL;
 	struct incise_model *model = NULL, *next;
 	struct incise_uncertainty *uncertainty;
 	struct incise_error err = {0};
 
 	if (!l->propagation)
-		return sums(l, premises);
-	for (int pass = 0; pass < PASSES; pass++) {
+		l->all = sums(l, premises);
+	for (int pass = 0; pass < PASSES && l->propagation; pass++) {
 		if (incise_propagation_start(l->propagation, model ? model : premises,
 					     l->scatter, &err))
 			cli_fail_with(&err);
-		incise_factor_free(factor);
-		factor = sums(l, premises);
-		next = cli_require(incise_factor_solve(factor, &ridge, NULL, &uncertainty,
-						       &err),
+		incise_factor_free(l->all);
+		l->all = sums(l, premises);
+		next = cli_require(incise_factor_solve(l->all, &ridge, NULL, &uncertainty,
+						       NULL, &err),
 				   &err);
 		if (incise_propagation_end(l->propagation, next, uncertainty,
-					   incise_factor_rmse(factor, next, NULL),
+					   incise_factor_rmse(l->all, next, NULL),
 					   &l->scatter, &err))
 			cli_fail_with(&err);
 		incise_uncertainty_free(uncertainty);
@@ -184,7 +185,8 @@ static struct incise_factor *all_sums(void *user, const struct incise_model *pre
 		model = next;
 	}
 	incise_model_free(model);
-	return factor;
+	*factor = l->all;
+	return 0;
 }
 
 static struct incise_model *learn(struct rig *rigs, int n, bool with,
@@ -198,6 +200,7 @@ static struct incise_model *learn(struct rig *rigs, int n, bool with,
 				     incise_corpus_new(2, true, 1, INCISE_CORPUS_SAMPLE),
 			     .n = n,
 			     .scatter = 0.1};
+	const struct incise_train_sums all = {all_sums, &l, with};
 	struct incise_train_report report;
 	struct incise_error err = {0};
 	const struct incise_corpus_side *fit;
@@ -213,6 +216,7 @@ static struct incise_model *learn(struct rig *rigs, int n, bool with,
 		l.source[i] = (struct incise_corpus_source){.name = "rig",
 							    .hash = rigs[i].hash,
 							    .text = "rig",
+							    .group = "",
 							    .own_groups = true,
 							    .read = read_rig,
 							    .user = &rigs[i]};
@@ -234,15 +238,14 @@ static struct incise_model *learn(struct rig *rigs, int n, bool with,
 			    &err);
 	options.ranges = NULL;
 	options.uncertainty = uncertainty;
-	options.all = all_sums;
-	options.user = &l;
-	options.weighted = with;
-	if (incise_train(model, &fit->sample.pairs, NULL, &options, &report, &err))
+	if (incise_train_sample(model, &fit->sample.pairs, NULL, &options, &all, &report,
+				&err))
 		cli_fail_with(&err);
 	if (with && (incise_propagation_end(l.propagation, model, *uncertainty,
 					    report.train_rmse, &l.scatter, &err) ||
 		     incise_propagation_finish(l.propagation, *uncertainty, NULL, &err)))
 		cli_fail_with(&err);
+	incise_factor_free(l.all);
 	incise_propagation_free(l.propagation);
 	incise_corpus_free(l.corpus);
 	return model;

@@ -18,8 +18,8 @@
 #include <sys/socket.h>
 #include <time.h>
 #include <unistd.h>
-#include <incise/igtl.h>
 #include <incise/state.h>
+#include "../../lib/device/igtl/igtl_message.h"
 #include "../../tools/cli/child.h"
 #include "../../tools/cli/folder.h"
 #include "../../tools/cli/stopwatch.h"

@@ -397,7 +397,7 @@ static double fill(double width, double at, double a[UNKNOWNS])
 
 static int solve(const struct square_row *row, double *x, double *condition)
 {
-	struct incise_lsq *lsq = incise_lsq_new(UNKNOWNS);
+	struct incise_lsq *lsq = incise_lsq_new(UNKNOWNS, NULL);
 	struct incise_gram *gram = incise_gram_new(UNKNOWNS + 2);
 	bool by_gram = row->by_gram && !condition;
 	int rc = 0;

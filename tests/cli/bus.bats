@@ -197,8 +197,6 @@ rig() { # ARGUMENTS
 	failed_with 'nosuch:can0: no such backend "nosuch"; there are: sim, kernel, bench'
 	run --separate-stderr incise info kernel:/dev/incise-stepper0
 	failed_with "kernel:/dev/incise-stepper0:"
-	run --separate-stderr incise info bench:bus0 --plot p
-	bad_usage "--plot"
 }
 
 @test "a file with a colon in its name is a file by its ending, or by its path" {
@@ -327,7 +325,7 @@ rig() { # ARGUMENTS
 		sed 's|^stepper = "[^"]*"|stepper = "bench:bus0"|' "$example" >rig.conf
 		incise stepper status
 	done
-	example_in "$root/man/rig.conf.5" can:can0 | sed 's|"can:can0:0x10"|"bench:bus0"|' >rig.conf
+	example_in "$INCISE_BUILD/man/rig.conf.5" can:can0 | sed 's|"can:can0:0x10"|"bench:bus0"|' >rig.conf
 	grep -q 'can = {' rig.conf
 	incise stepper status
 	grep '^actuator = .*can = ' "$root/doc/can.md" >rig.conf

@@ -31,7 +31,7 @@ sorted() {
 # bats test_tags=check
 @test "commands are completed, and topics of help" {
 	complete_words incise ""
-	for verb in $(incise --help | awk '/^  [a-z]/ { print $1 }') help --help --version; do
+	for verb in $({ incise --help && incise help advanced; } | awk '/^  [a-z]/ { print $1 }') help --help --version; do
 		[[ " ${COMPREPLY[*]} " == *" $verb "* ]] || complain "no $verb"
 	done
 	complete_words incise tr
@@ -39,7 +39,7 @@ sorted() {
 	complete_words incise help ev
 	[ "${COMPREPLY[*]}" = eval ]
 	complete_words incise help rig
-	[ "${COMPREPLY[*]}" = "rig rig.conf" ]
+	[ "${COMPREPLY[*]}" = "rig.conf" ]
 	complete_words incise nosuch
 	[ "${#COMPREPLY[@]}" -eq 0 ]
 	complete_words incise nosuch --

@@ -8,11 +8,16 @@ setup() {
 }
 
 # bats test_tags=check
-@test "--help and help list the verbs" {
+@test "--help and help list the verbs, in groups, twenty at most" {
+	run -0 --separate-stderr incise help advanced
+	for verb in bench feed join tool; do
+		grep -q "^  $verb  *[a-z]" <<<"$output"
+	done
 	run -0 --separate-stderr incise --help
+	[ "$(grep -c '^  [a-z]' <<<"$output")" -le 20 ]
 	[ -z "$stderr" ]
 	help=$output
-	for verb in capture export train eval info haptic bench demo; do
+	for verb in capture export train eval info haptic demo; do
 		grep -q "^  $verb  *[a-z]" <<<"$help"
 		[ -x "$INCISE_BUILD/bin/incise-$verb" ]
 	done
@@ -31,7 +36,7 @@ setup() {
 			run -0 incise "${name%%-*}" "${name#*-}" --help
 			[[ "${lines[0]}" == "Usage: incise ${name/-/ } "* ]]
 		else
-			incise --help | grep -q "^  $name "
+			{ incise --help && incise help advanced; } | grep -q "^  $name "
 		fi
 	done
 }
@@ -87,6 +92,8 @@ setup() {
 		[ "${#stderr_lines[@]}" -eq 1 ]
 		[[ "$stderr" == *"incise --help"* || "$stderr" == *"did you mean"* ]]
 	done
+	run -2 --separate-stderr incise rig
+	[ "$stderr" = "incise: 'rig': is now 'incise info rig'" ]
 	run -2 --separate-stderr incise record
 	[[ "$stderr" == *"did you mean 'incise capture'?" ]]
 }
@@ -186,4 +193,11 @@ setup() {
 	)
 	[ "$(cat code)" = 1 ]
 	[ ! -s err ] || complain "$(cat err)"
+}
+
+@test "a command that was left out of the build is said" {
+	mkdir bin
+	cp "$INCISE_BUILD/bin/incise" bin
+	PATH=/usr/bin:/bin LD_LIBRARY_PATH=$INCISE_BUILD/lib run -2 --separate-stderr bin/incise serve
+	[ "$stderr" = "incise: 'serve': this incise was built without it; 'make' prints what it needs" ] || complain "$stderr"
 }

@@ -222,6 +222,8 @@ well_formed() {
 	failed_with "no module export_hdf5.so"
 	[ ! -e a.h5 ]
 	[ -e "$INCISE_BUILD/lib/incise/export_hdf5.so" ] || skip "the module of HDF5 is not built"
+	incise export liver.rec --rate 100 -o a.hdf5
+	[[ "$(head -c 4 a.hdf5)" == $'\x89HDF' ]]
 	ln -s /dev/null null.h5
 	run --separate-stderr incise export liver.rec -o null.h5
 	failed_with "cannot be written to a pipe"

@@ -105,22 +105,23 @@ finds() {
 }
 
 @test "the style can be changed, and stays" {
-	incise info m.fis --plot a >/dev/null
+	incise capture -o a.rec --rig sim:clock=simulated,times=1,pause_s=0.1 --duration 2s >/dev/null
+	incise replay a.rec wall --plot a >/dev/null
 	sed -i "s/^blue = .*/blue = '#123456'/" plot/style.gp
-	incise info m.fis --plot b >/dev/null
+	incise replay a.rec wall --plot b >/dev/null
 	grep -qi 'rgb( *18, *52, *86)' b.svg
-	incise info m.fis --plot b --overwrite >/dev/null
+	incise replay a.rec wall --plot b --overwrite >/dev/null
 	cmp plot/style.gp "$root/tools/cli/style.gp"
 	(cd plot && gnuplot -e "ext='pdf'" a.gp)
 	[ "$(head -c 5 a.pdf)" = %PDF- ]
 }
 
 @test "figures of a model, with few and many functions" {
-	incise info m.fis --plot model >/dev/null
+	incise plot m.fis -o model.svg >/dev/null
 	incise train pairs.csv --group none -o many.fis --mf 9,7 --epochs 1 2>/dev/null
-	incise info many.fis --plot many >/dev/null
+	incise plot many.fis -o many.svg >/dev/null
 	sed "s/'very_shallow'/'a name that is far too long for its place'/" m.fis >named.fis
-	incise info named.fis --plot named >/dev/null
+	incise plot named.fis -o named.svg >/dev/null
 	measured model.svg many.svg named.svg
 	grep -q ">a name that is f…<" named.svg
 }

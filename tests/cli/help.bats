@@ -5,7 +5,7 @@ load cli
 
 setup() {
 	work_folder
-	verbs=$(incise --help | awk '/^Commands:/ { on = 1; next } on && !NF { exit } on && /^  [a-z]/ { print $1 }')
+	verbs=$({ incise --help && incise help advanced; } | awk '/^  [a-z]/ { print $1 }')
 	[ "$(wc -w <<<"$verbs")" -ge 8 ]
 	# "calibrate force": incise-calibrate-force
 	words=$(cd "$INCISE_BUILD/bin" && printf '%s\n' incise-*-* | sed 's/^incise-//; s/-/ /')

@@ -131,26 +131,6 @@ setup() {
 	failed_with short.fx
 }
 
-@test "info draws a model" {
-	command -v gnuplot >/dev/null || skip "gnuplot is not installed, it draws the picture"
-	run -0 --separate-stderr incise info m.fis --plot "my pictures/m"
-	[ -z "$stderr" ]
-	[[ "${lines[0]}" == "model incise: "* ]]
-	[ "$(head -c 8 "my pictures/m.png" | od -An -tx1 | tr -d ' \n')" = 89504e470d0a1a0a ]
-	for text in "depth / mm" "velocity / (mm/s)" "force / N" shallow medium slow fast; do
-		grep -qF ">$text<" "my pictures/m.svg"
-	done
-	# another kind, and names that gnuplot could take amiss
-	sed "s/Name='depth_mm'/Name='a \"b\" \`touch c\` \\\\ \$x'/; s/'very_shallow'/'x \"y'/" bell.fis >odd.fis
-	run -0 --separate-stderr incise info odd.fis --plot odd
-	[ -z "$stderr" ]
-	[ -s odd.png ] && [ -s odd.svg ] && [ ! -e c ] && [ ! -e plot/c ]
-	run --separate-stderr incise info a.rec --plot a
-	bad_usage "--plot"
-	run --separate-stderr incise info m.fis --plot "a'b"
-	bad_usage "--plot"
-}
-
 @test "names that are not UTF-8 leave JSON valid" {
 	sed "s/Name='incise'/Name='li\xffver'/" m.fis >odd.fis
 	incise info --json odd.fis >r.json

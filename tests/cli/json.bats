@@ -98,8 +98,9 @@ running_loop() {
 }
 
 devices() {
-	report rig rig --rig "$short"
-	report rig.show rig --show --rig "$short"
+	printf 'tracker = "sim:";\n' >rig.conf
+	report info.here info rig --all
+	rm rig.conf
 	report doctor doctor --rig "$short"
 	for action in status disable clear "move 2mm" "enable --duration 1s"; do
 		# shellcheck disable=SC2086 # "move 2mm" is two words

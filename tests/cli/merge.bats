@@ -192,7 +192,7 @@ train_killed_at() {
 	done
 	incise train l?.csv --group cut --check 0.3 --mf 3,3 -o whole.fis >/dev/null 2>&1
 	# killed when the surveys are there, and when a part of the sums is
-	for like in 'incise progress 1 [0-9]* [0-9]* [0-9]* 0 ' 'incise progress 1 [0-9]* [0-9]* [0-9]* [1-9]'; do
+	for like in 'incise progress 1 [0-9a-f]* [0-9]* 0 ' 'incise progress 1 [0-9a-f]* [0-9]* [1-9]'; do
 		train_killed_at "$like"
 		if [ ! -e m.fis ]; then
 			incise train l?.csv --group cut --check 0.3 --mf 3,3 -o m.fis >out 2>err
@@ -214,7 +214,7 @@ train_killed_at() {
 		cuts l$i.csv $((20 * i - 19)) $((20 * i)) 2000
 	done
 	incise train l?.csv --group cut --mf 3,3 -o m.fis >/dev/null 2>err 3>&- &
-	until grep -qa "incise progress 1 [0-9]* [1-9]" m.fis.progress 2>/dev/null; do
+	until grep -qa "incise progress 1 [0-9a-f]* [1-9]" m.fis.progress 2>/dev/null; do
 		kill -0 $! || break
 		sleep 0.01
 	done

@@ -43,7 +43,7 @@ table() {
 		2|stepper|missing subcommand
 		2|tool neck blad|blad|blade
 		2|tool|LOOP
-		2|train pairs.csv|-o MODEL.fis
+		2|train pairs.csv pairs.csv|-o MODEL.fis
 		2|train|DATA.csv
 		2|train pairs.csv --epochs many -o x.fis|--epochs:|'many'
 		2|train pairs.csv --check 2 -o x.fis|--check:|'2'

@@ -202,11 +202,7 @@ replaces_when_told() {
 
 @test "pictures are replaced with --overwrite only" {
 	command -v gnuplot >/dev/null || skip "gnuplot is not installed"
-	for suffix in .png .svg; do
-		replaces_when_told i$suffix info m.fis --plot i
-		rm -f i.png i.svg plot/*
-	done
-	replaces_when_told plot/i.gp info m.fis --plot i
+	replaces_when_told i.png plot m.fis -o i.png
 	replaces_when_told r.png replay d.rec wall --plot r
 	replaces_when_told p.png plot d.rec -o p.png
 	replaces_when_told r3/fit.png calibrate force --from forces.csv -c k.conf --report r3
@@ -354,7 +350,7 @@ full() {
 		recalibrate d.rec -c calibration.conf
 		recover d.rec -o r.rec
 		replay d.rec wall
-		rig --rig sim:
+		info --all sim:
 		serve --rig sim: --igtl 0 --duration 50ms
 		stepper status --rig sim:
 		stepper enable --duration 1s --rig sim:clock=simulated
@@ -375,8 +371,8 @@ full() {
 		bad_usage "$said"
 		[ ! -e out ] && [ ! -e out.odd ]
 	done <<-'END'
-		export d.rec -o out.odd|--output: out.odd: unknown extension .odd; give .csv, .h5 or .mcap
-		export d.rec -o out.CSV|--output: out.CSV: unknown extension .CSV; give .csv, .h5 or .mcap
+		export d.rec -o out.odd|--output: out.odd: unknown extension .odd; give .csv, .h5, .hdf5 or .mcap
+		export d.rec -o out.CSV|--output: out.CSV: unknown extension .CSV; give .csv, .h5, .hdf5 or .mcap
 		train pairs.csv -o out.odd|--output: out.odd: unknown extension .odd; give .fis
 		train pairs.csv -o out.fis --initial out.odd|--initial: out.odd: unknown extension .odd; give .fis
 		train pairs.csv -o out.fis --history out.odd|--history: out.odd: unknown extension .odd; give .csv
@@ -387,7 +383,6 @@ full() {
 		replay d.rec m.scene --log out.odd|--log: out.odd: unknown extension .odd; give .csv
 		haptic m.scene --log out.odd|--log: out.odd: unknown extension .odd; give .csv
 		haptic m.scene --session out.odd|--session: out.odd: unknown extension .odd; give .session
-		info m.fis --plot out.odd|--plot: out.odd: unknown extension .odd; give .png or .svg
 		plot d.rec -o out.odd|--output: out.odd: unknown extension .odd; give .png, .svg or .pdf
 		calibrate tip --from none.csv --keep out.odd|--keep: out.odd: unknown extension .odd; give .csv
 		capture -o out.odd|expected a name that ends in .rec
@@ -424,7 +419,6 @@ full() {
 		--series 3 --duration 200ms -c k.conf --keep k.csv
 	grep -q '^wrote k.conf: active from now on$' out
 	if command -v gnuplot >/dev/null; then
-		ends "wrote i.png and i.svg" info m.fis --plot i
 		ends "wrote f.png" plot d.rec -o f.png
 		# more than a few files of a folder are one name
 		ends "wrote deep/r/ (6 files)" calibrate force --from forces.csv -c k.conf --report deep/r

@@ -222,7 +222,7 @@ not_vouched() {
 	incise verify r.rec --signers signers
 	incise capture -o r.rec --rig rig.conf --duration 1s --overwrite --json | jq -e '.signed_by | startswith("ED25519 ")'
 	[ "$(find r.rec/seal -type f | wc -l)" = 2 ]
-	incise rig --show --rig rig.conf | grep "sign_key.*kim"
+	incise info rig.conf | grep "sign_key.*kim"
 	sed -i "s|$kim|$PWD/none|" rig.conf
 	run -1 --separate-stderr incise capture -o r2.rec --rig rig.conf --duration 1s -c none
 	[ "${#stderr_lines[@]}" = 1 ]

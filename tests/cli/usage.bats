@@ -62,9 +62,9 @@ table() {
 		export a.rec --resample --rate 0.5|--rate
 		export a.rec --average 3x3 --tai|--tai
 		export a.rec --uncertainty parts --profile ros2 -o a.mcap|--uncertainty
-		export a.rec --profile ros2 -o a.csv|--profile needs -o FILE.mcap
-		export a.rec --profile ros2 -o a.h5|--profile needs -o FILE.mcap
-		export a.rec --profile ros2 -o -|--profile needs -o FILE.mcap
+		export a.rec --profile ros2 -o a.csv|--profile needs -o FILE with .mcap
+		export a.rec --profile ros2 -o a.h5|--profile needs -o FILE with .mcap
+		export a.rec --profile ros2 -o -|--profile needs -o FILE with .mcap
 		haptic|missing SCENE (
 		haptic neck more.scene|; give one SCENE at a time
 		haptic neck --rig $rig --log l.csv|--duration
@@ -76,14 +76,12 @@ table() {
 		info|missing FILE (
 		info m.fis a.rec|; give one FILE at a time
 		info a.csv --group cut|--dataset
-		info stepper --plot p|--plot
 		plan a b|b
 		replay a.rec|missing SCENE (
 		replay a.rec liver more|; give one SCENE at a time
 		replay a.rec liver --log - --json|standard output
 		serve --rig sim: --speed 2|--speed: only for a recording
 		serve --rig sim: a.rec|--rig: 'a.rec' is a source, too
-		rig rig.conf|--rig
 		sign a.rec|--key
 		status a b|; give one NAME or FILE at a time
 		status --prometheus --follow|--prometheus cannot be combined with --follow or --json

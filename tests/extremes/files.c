@@ -12,7 +12,7 @@
 #include <incise/fixed.h>
 #include <incise/model.h>
 #include <incise/plan.h>
-#include <incise/recorder.h>
+#include <incise/capture.h>
 #include <incise/recording.h>
 #include <incise/rig.h>
 #include "../../lib/base/vector.h"
@@ -369,32 +369,21 @@ static int write_whole(const char *path, const void *bytes, size_t n,
 static int record(const char *path, const char *calibration_path,
 		  struct incise_error *err)
 {
-	struct incise_recorder_setup setup = {.planned_s = 1,
-					      .calibration_path = calibration_path};
 	struct incise_calibration calibration;
+	struct incise_capture_options options = {.duration_s = 1};
+	struct incise_capture_result result;
 	struct incise_rig *rig =
 		incise_rig_open("sim:clock=simulated,times=1,cut_s=0.5,pause_s=0.6,"
 				"force_hz=1000",
 				INCISE_RIG_TRACKER | INCISE_RIG_FORCE, err);
-	struct incise_recorder *recorder;
-	struct incise_clock *clock;
-	int rc = 0;
+	int rc = -1;
 
-	if (!rig)
-		return -1;
-	if (incise_calibration_load(calibration_path, &calibration, err))
-		return -1;
-	setup.calibration = &calibration;
-	recorder = incise_recorder_new(path, rig, &setup, err);
-	clock = incise_rig_clock(rig);
-	for (int i = 0; recorder && rc >= 0 && i < 20; i++) {
-		incise_clock_wait_until(clock, incise_clock_now(clock) + 50000000);
-		rc = incise_recorder_poll(recorder, err);
-	}
-	if (!recorder || rc < 0 || incise_recorder_close(recorder, err))
-		rc = -1;
+	options.recorder.calibration = &calibration;
+	options.recorder.calibration_path = calibration_path;
+	if (rig && !incise_calibration_load(calibration_path, &calibration, err))
+		rc = incise_capture_run(path, rig, &options, &result, err);
 	incise_rig_close(rig);
-	return rc < 0 ? -1 : 0;
+	return rc ? -1 : 0;
 }
 
 /* 0: each part is a number or not stated, and own ones are not negative; else as @load. */

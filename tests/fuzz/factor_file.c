@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <endian.h>
-#include <incise/factor.h>
+#include "../../lib/learn/factor.h"
 #include "../../lib/base/crc32c.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
@@ -43,7 +43,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 		if (again != size || memcmp(written, bytes, size))
 			abort();
 		free(written);
-		model = incise_factor_solve(factor, &ridge, &report, NULL, &err);
+		model = incise_factor_solve(factor, &ridge, &report, NULL, NULL, &err);
 		incise_model_free(model);
 	}
 	incise_factor_free(factor);

@@ -8,16 +8,17 @@ compiles and runs it. A struct whose fields are fewer in Python is found by its 
 """
 
 import ctypes
+import importlib
 import os
 import subprocess
 import sys
 import tempfile
 
 import incise
-from incise import _corpus, _library, arrow, calibrate, model, plan, recording, verify, wall
 
+MODULES = "_corpus _library arrow calibrate capture model plan recording verify wall".split()
 HEADERS = (
-    "arrow camera calibrate_depth calibrate_force calibrate_tip calibration corpus fixed model plan prove recording "
+    "arrow camera capture calibrate_depth calibrate_force calibrate_tip calibration corpus fixed model plan prove recording "
     "stability tracker train uncertainty verify wall"
 ).split()
 
@@ -25,8 +26,9 @@ HEADERS = (
 def structs():
     """All structs with a name in C, once each."""
     found = {}
-    for module in (_corpus, _library, arrow, calibrate, model, plan, recording, verify, wall):
-        for value in vars(module).values():
+    for module in MODULES:
+        # Not `from incise import verify`, which is a function.
+        for value in vars(importlib.import_module(f"incise.{module}")).values():
             if (
                 isinstance(value, type)
                 and issubclass(value, ctypes.Structure)

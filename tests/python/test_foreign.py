@@ -44,11 +44,14 @@ class Foreign(Case):
             self.same({c: read[c].to_numpy() for c in read.column_names}, table.numpy(), name)
             self.assertEqual(read.schema.field(0).metadata[b"unit"] != b"", True)
             path = self.path(name + ".parquet")
-            pyarrow.parquet.write_table(read, path)
+            table.parquet(path)
             again = pyarrow.parquet.read_table(path)
             self.assertEqual(again.schema.types, read.schema.types)
             self.same({c: again[c].to_numpy() for c in again.column_names}, table.numpy(), name)
-            self.assertEqual(again.schema.metadata[b"source"], read.schema.metadata[b"source"])
+            self.assertTrue(again.schema.equals(read.schema, check_metadata=True), name)
+        none = self.rec.pairs(from_s=0.001, to_s=0.002)
+        self.says(Exception, "no cut", none.parquet, self.path("none.parquet"))
+        self.assertNotIn("none.parquet", " ".join(os.listdir(self.folder)))
 
     def test_polars(self):
         for name, table in self.tables.items():
@@ -97,7 +100,7 @@ class Foreign(Case):
         import pyarrow.parquet
 
         table = self.tables["bins"]
-        pyarrow.parquet.write_table(pyarrow.table(table), self.path("bins.parquet"))
+        table.parquet(self.path("bins.parquet"))
 
         def read():
             file = pyarrow.parquet.ParquetFile(self.path("bins.parquet"))

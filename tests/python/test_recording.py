@@ -5,12 +5,15 @@ import gc
 import hashlib
 import math
 import os
+import signal
 import sqlite3
 import struct
 import subprocess
 import sys
 import threading
+import time
 import unittest
+import unittest.mock
 
 import incise
 import read_blocks
@@ -50,6 +53,12 @@ class Recordings(Case):
         self.assertEqual([s.name for s in info.streams], ["force", "tracker"])
         self.assertEqual(info.streams[1].lost, 0)
         self.assertEqual(info.surface_normal, (0, 0, 1))
+
+    def test_parquet_needs_pyarrow(self):
+        with unittest.mock.patch.dict(sys.modules, {"pyarrow": None}):
+            path = self.path("force.parquet")
+            self.says(ImportError, "pip install pyarrow", self.rec.force.parquet, path)
+        self.assertEqual(os.listdir(self.folder), [])
 
     def test_streams_are_the_blocks(self):
         stored = {}
@@ -471,6 +480,47 @@ class Blocks(Case):
             self.assertFalse(incise.verify(self.rec).intact)
             self.change(f"UPDATE blocks SET data = ? {at}", data, stream)
         self.assertTrue(incise.verify(self.rec).intact)
+
+
+class Capture(Case):
+    def test_records_what_the_command_records(self):
+        path, other = self.path("python.rec"), self.path("command.rec")
+        with incise.capture(SHORT, path, duration_s=3, cuts=True) as recording:
+            self.assertTrue(incise.verify(path).complete)
+            here = rows(recording.force), rows(recording.tracker)
+        run("incise", "capture", "-o", other, "--rig", SHORT, "--duration", "3s", "--cuts")
+        with incise.open(other) as recording:
+            self.assertEqual(here, (rows(recording.force), rows(recording.tracker)))
+
+    def test_a_trigger_starts_a_second_before(self):
+        with incise.capture(SHORT, self.path("a.rec"), duration_s=1, trigger_force_N=0.2) as recording:
+            info = recording.info
+        self.assertLess(abs(info.end_ns - info.start_ns - 2e9), 5e7)
+
+    def test_refusals(self):
+        path = self.path("b.rec")
+        self.says(incise.Error, "never triggered", incise.capture, SHORT, path, trigger_force_N=100)
+        self.assertFalse(os.path.exists(path))
+        self.says(incise.NotFound, "none.conf", incise.capture, "none.conf", path)
+        self.says(incise.Invalid, "duration_s", incise.capture, SHORT, path, duration_s=-1)
+        self.says(incise.Invalid, "clock source", incise.capture, SHORT, path, clock_source="moon")
+
+    def test_interrupt_keeps_the_recording(self):
+        path = self.path("c.rec")
+        program = f"import incise; incise.capture('sim:', {path!r})"
+        child = subprocess.Popen([sys.executable, "-c", program], stderr=subprocess.PIPE, text=True)
+        n = 0
+        while n < 1000:
+            self.assertIsNone(child.poll())
+            time.sleep(0.05)
+            try:
+                with incise.open(path) as recording:
+                    n = recording.info.force
+            except incise.Error:  # not there yet, or before its first commit
+                pass
+        child.send_signal(signal.SIGINT)
+        self.assertIn("KeyboardInterrupt", child.communicate()[1])
+        self.assertTrue(incise.verify(path).intact)
 
 
 class WallTime(Case):

@@ -120,6 +120,35 @@ static void run(const char *sql, int64_t a, int64_t b, int64_t c)
 	need(sqlite3_finalize(stmt) == SQLITE_OK, sql);
 }
 
+/* When the cuts of all repetitions ended. */
+static void repeat_cut_ends(int64_t times, int64_t span_ns)
+{
+	sqlite3_stmt *stmt;
+	int64_t *all;
+	size_t n;
+
+	need(sqlite3_prepare_v2(db, "SELECT value FROM meta WHERE key = 'cut_ends_ns'",
+				-1, &stmt, NULL) == SQLITE_OK &&
+		     sqlite3_step(stmt) == SQLITE_ROW,
+	     "cut_ends_ns");
+	n = (size_t)sqlite3_column_bytes(stmt, 0) / sizeof(*all);
+	all = malloc((size_t)times * n * sizeof(*all));
+	need(all, "out of memory");
+	memcpy(all, sqlite3_column_blob(stmt, 0), n * sizeof(*all));
+	for (size_t i = n; i < n * (size_t)times; i++)
+		all[i] = all[i - n] + span_ns;
+	need(sqlite3_finalize(stmt) == SQLITE_OK &&
+		     sqlite3_prepare_v2(
+			     db, "UPDATE meta SET value = ? WHERE key = 'cut_ends_ns'",
+			     -1, &stmt, NULL) == SQLITE_OK,
+	     "cut_ends_ns");
+	sqlite3_bind_blob64(stmt, 1, all, (size_t)times * n * sizeof(*all),
+			    SQLITE_STATIC);
+	sqlite3_step(stmt);
+	need(sqlite3_finalize(stmt) == SQLITE_OK, "cut_ends_ns");
+	free(all);
+}
+
 int main(int argc, char **argv)
 {
 	static struct rows streams[2];
@@ -163,9 +192,10 @@ int main(int argc, char **argv)
 	    "name = 'tracker')) WHERE key IN ('force_rows', 'tracker_rows', 'depth_rows')",
 	    0, 0, 0);
 	run("UPDATE meta SET value = value * ?1 WHERE key = 'cuts'", times, 0, 0);
+	repeat_cut_ends(times, span_ns);
 	run("UPDATE events SET t_ns = t_ns + (?1 - 1) * ?2 WHERE kind = 'end'", times,
 	    span_ns, 0);
-	need(!incise_seal_init(&writer.seal, INCISE_SCHEMA_VERSION), "SHA-256");
+	need(!incise_seal_init(&writer.seal), "SHA-256");
 	need(incise_block_writer_start(&writer, db) == SQLITE_OK, "start");
 	for (int64_t k = 0; k < times; k++)
 		for (size_t i = 0; i < streams[0].n_blocks || i < streams[1].n_blocks;

@@ -15,7 +15,7 @@
 
 /* --- members of a row --- */
 
-/* NaN where there is none, and of text. */
+/* NaN without a value, and for text. */
 static double number_of(const struct bench_column *c, const void *row)
 {
 	const char *member = (const char *)row + c->offset;
@@ -45,7 +45,7 @@ static double number_of(const struct bench_column *c, const void *row)
 	return value * (c->scale != 0 ? c->scale : 1);
 }
 
-/* NULL where there is none, and of numbers. */
+/* NULL without a text, and for numbers. */
 static const char *text_of(const struct bench_column *c, const void *row)
 {
 	const char *member = (const char *)row + c->offset, *text = NULL;
@@ -400,7 +400,7 @@ void bench_table(struct bench_run *run, const struct bench_table *table, const v
 
 /* --- plots --- */
 
-/* px: of a title; and so all figures are at about the same scale on a page. */
+/* px, for a title; so all figures have about the same scale on a page. */
 #define WIDTH_LEAST 900
 
 const struct bench_table bench_points = {

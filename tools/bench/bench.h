@@ -24,14 +24,14 @@
 /* --- declaration --- */
 
 enum bench_type {
-	BENCH_NUMBER, /* double; NaN is none */
+	BENCH_NUMBER, /* double; NaN: no value */
 	BENCH_INT,
 	BENCH_INT64,
 	BENCH_UINT64,
 	BENCH_BOOL,
-	BENCH_TEXT,  /* const char *; NULL and "" are none */
+	BENCH_TEXT,  /* const char *; NULL and "": no value */
 	BENCH_CHARS, /* char[], the same */
-	BENCH_JSON,  /* json_t *, borrowed; NULL is none */
+	BENCH_JSON,  /* json_t *, borrowed; NULL: no value */
 };
 
 struct bench_column {
@@ -43,7 +43,7 @@ struct bench_column {
 	double scale;	     /* of the number; 0: 1 */
 	double text_scale;   /* in the text on top of that; 0: 1 */
 	bool optional;	     /* 0 is none */
-	bool blank;	     /* none is nothing in the text; else "-" */
+	bool blank;	     /* no value is empty in the text; else "-" */
 	bool whole;	     /* in the JSON a whole number is an integer */
 	bool data; /* neither in the text nor in the JSON: for plots and metrics */
 };
@@ -93,7 +93,7 @@ struct bench_metric {
 /* A column "failed" has the reason why a row failed; with @failed_after a line of the text
  * ends with it behind so many columns. */
 struct bench_table {
-	const char *key; /* of the list in the JSON, "a.b" leads inwards; NULL: none */
+	const char *key; /* of the list in the JSON, "a.b" leads inwards; NULL: no list */
 	size_t row_bytes;
 	int failed_after;
 	struct bench_column columns[BENCH_COLUMNS];
@@ -141,7 +141,7 @@ struct bench {
 	int n_operands;		     /* at most */
 	bool takes_duration, takes_load, takes_profile, takes_seed;
 	void (*run)(struct bench_run *run);
-	struct bench_plot plots[5]; /* end with {0}; none: --plot is bad usage */
+	struct bench_plot plots[5]; /* end with {0}; without plots --plot is bad usage */
 };
 
 extern const struct bench bench_loop, bench_precision, bench_scenes, bench_stability,
@@ -179,7 +179,7 @@ struct bench_run {
  * bench_fail() was given. */
 void bench_measure(struct bench_run *run);
 
-/* Of machine and build: "cpu", "kernel", "compiler", "vectors"; "cpu; kernel; compiler" for NULL. */
+/* Machine and build: "cpu", "kernel", "compiler", "vectors"; "cpu; kernel; compiler" for NULL. */
 const char *bench_machine(const struct bench_run *run, const char *key);
 
 /* Members of the JSON, an object of json_pack(). */
@@ -194,8 +194,8 @@ void bench_value(struct bench_run *run, const char *key, json_t *value);
 /* printf() of the text; nothing with --json. */
 void bench_text(const struct bench_run *run, const char *fmt, ...) INCISE_PRINTF(2, 3);
 
-/* Report rows: as JSON and metrics, for plots, and as a text table. The rows, and what they
- * point to, live until the end of the run. */
+/* Report rows: as JSON and metrics, for plots, and as a text table. The rows, and their texts
+ * and lists, live until the end of the run. */
 void bench_table(struct bench_run *run, const struct bench_table *table, const void *rows,
 		 int n);
 
@@ -205,8 +205,8 @@ void bench_rows(struct bench_run *run, const struct bench_table *table, const vo
 void bench_lines(const struct bench_run *run, const struct bench_table *table,
 		 const void *rows, int n);
 
-/* Time rows in turns: run() does so many units. The time is that of the table's first metric; rows
- * that failed are left out. */
+/* Time rows in turns: run() does so many units. The time is the table's first metric; failed
+ * rows are left out. */
 void bench_times(const struct bench_table *table, void *rows, int n,
 		 void (*run)(void *row), double units, int turns);
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise bench loop: what a tick of the haptic loop costs, and how late the machine wakes it
- * (wakeup.h).
+ * incise bench loop: the cost of a tick of the haptic loop, and how late the machine wakes
+ * it (wakeup.h).
  */
 #include <stdio.h>
 #include <incise/loop.h>
@@ -10,13 +10,13 @@
 #include "../cli/file.h"
 #include "../cli/json.h"
 #include "../cli/stopwatch.h"
-#include "../cli/tick_cost.h"
 #include "sheet.h"
+#include "tick_cost.h"
 #include "wakeup.h"
 
 /* --- the cost of a tick: scenes with every force and limits, or the user's --- */
 
-/* Of the stroke's time, which goes by faster. */
+/* Pace of the stroke's time, which goes by faster. */
 #define MEASURED_S 60
 #define QUICK_MEASURED_S 4
 #define TURN_TICKS 2000
@@ -74,7 +74,7 @@ static double turn_ns(void *context)
 	static double buffer[TURN_TICKS];
 	const struct tick_row *row = context;
 
-	/* Caches and branches are those of the variants before. */
+	/* Caches and branches are as the variants before left them. */
 	tick_stroke_ns(row->timed, TURN_TICKS / 4, buffer);
 	return tick_stroke_ns(row->timed, TURN_TICKS, buffer);
 }

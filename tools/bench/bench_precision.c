@@ -15,8 +15,8 @@
 #include "noise.h"
 #include "reference.h"
 
-/* Points for the errors. Times are of the first of them, so few that inputs and outputs
- * stay in the cache and the arithmetic is what is measured. */
+/* Points for the errors. Times are for the first of them, so few that inputs and outputs stay
+ * in the cache and only the arithmetic is measured. */
 #define POINTS 20000
 #define TIMED_POINTS 2000
 #define REPEATS 101

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * incise bench scenes: a scene's plan, with the stages that it needs only, compared with the full
- * pipeline, which is the same scene with every stage kept and those neutral that it does not need
- * (incise_scene_set_full()): time and memory of both, and whether their forces are
- * the same to the bit.
+ * pipeline, which is the same scene with every stage kept and the needless ones neutral
+ * (incise_scene_set_full()): time and memory of both, and whether their forces are the same to the bit.
  */
 #include <dirent.h>
 #include <stdio.h>
@@ -27,8 +26,8 @@
 #define SCENES_MAX 64
 
 /*
- * --- a loop's process: the cost of a haptic loop that no clock measures: what its process maps,
- * opens and holds in memory, from /proc ---
+ * --- a loop's process: the cost of a haptic loop that no clock measures: the mappings, files and
+ * memory of its process, from /proc ---
  */
 
 /* incise haptic on the virtual rig for a moment of real time. */
@@ -78,7 +77,7 @@ static long number(pid_t pid, const char *file, const char *word)
 
 #define TARGET_BYTES 4096
 
-/* Where a descriptor of a process leads; "" if it is none. */
+/* Where a descriptor of a process leads; "" if it is not open. */
 static void read_descriptor(pid_t pid, const char *name, char target[TARGET_BYTES])
 {
 	char path[320];
@@ -89,7 +88,7 @@ static void read_descriptor(pid_t pid, const char *name, char target[TARGET_BYTE
 	target[length > 0 ? length : 0] = 0;
 }
 
-/* Beyond standard input and output, and what it was started with, which we have too. */
+/* Beyond standard input and output, and the inherited ones, which we have too. */
 static json_t *open_files(pid_t pid)
 {
 	json_t *list = json_array();
@@ -118,10 +117,10 @@ static void look_at_process(struct loop_process *process)
 	json_t *libraries = mapped_libraries(process->pid);
 	json_t *files = open_files(process->pid);
 	long own_KiB = number(process->pid, "smaps_rollup", "Private_");
-	/* Last: of a process that has ended meanwhile it is none. */
+	/* Last: a process that has ended meanwhile has no memory. */
 	long peak_KiB = number(process->pid, "status", "VmHWM");
 
-	/* Before it is the loop it is what starts it, and has less. */
+	/* Before exec the process is the starter's copy, and has less. */
 	if (!peak_KiB || !json_array_size(libraries) ||
 	    json_array_size(libraries) < json_array_size(process->libraries)) {
 		json_decref(libraries);
@@ -214,17 +213,17 @@ struct variant {
 
 struct scene {
 	const char *name;
-	const char *path; /* NULL: there is none of that name */
+	const char *path; /* NULL: no such stage */
 	bool kept;	  /* the full pipeline is its own */
 	bool measured;	  /* its plans can be */
 	struct variant few, full;
 	struct trajectory trajectory; /* that is timed */
 	long ticks_compared, ticks_in_contact;
-	long first_difference; /* number of the tick; -1: none */
+	long first_difference; /* number of the tick; -1: no tick */
 	double times_cheaper;
 	struct loop_process process;
 	int libraries_mapped; /* 0: not seen */
-	/* Of the report; texts with ", " between names, or NULL. */
+	/* Columns of the report; texts with ", " between names, or NULL. */
 	json_t *stages, *left_out, *libraries, *not_mapped, *devices, *files;
 	json_t *difference, *identical;
 	const char *forces; /* "same" */
@@ -289,7 +288,7 @@ static void add_shipped(struct scenes *s)
 	"  thickness_mm = 5.0; puncture_N = 0.8; back_wall_mm = 14.0; };\n"
 #define MESH "surface = { kind = \"mesh\"; file = \"%s\"; };\n"
 
-/* From the plainest to one with all that there is. */
+/* From the plainest scene to a scene with all stages. */
 static const struct {
 	const char *name, *text; /* %s: a sheet of 20 000 triangles */
 	bool all, kept;		 /* every force */
@@ -324,12 +323,12 @@ static void add_made(struct scenes *s)
 
 /* --- plans and forces --- */
 
-/* Blade, handle and tube once each: what is timed. */
+/* Blade, handle and tube once each: the timed strokes. */
 #define TIMED_STROKES 3
 #define COMPARED_TICKS 120000
 #define COMPARED_STROKES_MAX 1000 /* of a scene with few ticks a second */
 
-/* Number of a stage of a plan; -1: it has none of that name. */
+/* Number of a stage of a plan; -1: no stage of that name. */
 static int stage_of(const struct incise_plan *plan, const char *stage)
 {
 	const char *name;
@@ -511,7 +510,7 @@ static void profile(const char *name, bool full)
 
 	if (!scene_argument_find(&argument, name))
 		scene_argument_missing(name);
-	/* Both plans are made, as the trajectory of the one depends on the other's needs. */
+	/* Both plans are made, as the trajectory depends on the needs of both. */
 	scene.path = argument.path;
 	open_scene(&scene);
 	if (!scene.measured)
@@ -652,7 +651,7 @@ static void print_list(const struct bench_run *run, const char *title, json_t *t
 	bench_text(run, "  %-9s %s\n", title, names && *names ? names : "none");
 }
 
-/* Its stages, those that it leaves out, and what these cost a plan that keeps them. */
+/* Its stages, the stages that it leaves out, and their cost in a plan that keeps them. */
 static void print_details(const struct bench_run *run, const struct scene *s,
 			  const struct left_out *left, int n)
 {

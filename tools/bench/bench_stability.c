@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise bench stability: how stiff a virtual wall may be, simulated in time next to what
- * theory says; scenes under a leaning hand; error against run time of integrators of
- * a stiff spring. The device is light, in a loop of 1 kHz.
+ * incise bench stability: how stiff a virtual wall may be, simulated in time next to
+ * theory; scenes under a leaning hand; error against run time of integrators of a stiff
+ * spring. The device is light, in a loop of 1 kHz.
  */
 #include <stdio.h>
 #include <string.h>
@@ -21,7 +21,7 @@ struct ratio {
 	double simulated, theory; /* theory: the expected value, or the least allowed */
 	bool at_least;
 
-	double ratio; /* 1 where both find that there is none */
+	double ratio; /* 1 where both find no limit */
 	bool ok;
 	const char *verdict;
 };
@@ -78,7 +78,7 @@ struct sampled_wall {
 	int delay;
 };
 
-/* A run: some time for what fades at once, then two windows apart.
+/* A run: some time for fast fading, then two windows apart.
  *
  *   0      skip       window              gap              window
  *   ├────────────┼──╱‾‾‾‾‾‾‾╲──┼──────────────────────┼──╱‾‾‾‾‾‾‾╲──┤

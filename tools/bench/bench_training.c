@@ -227,7 +227,7 @@ static int fit_k(const struct data *data)
 	struct incise_baselines found;
 	struct incise_error err = {0};
 
-	if (incise_baselines(&pairs, data->group, &pairs, &found, &err))
+	if (incise_baselines(&pairs, data->group, &pairs, NULL, NULL, &found, &err))
 		cli_fail_with(&err);
 	return found.k;
 }
@@ -391,7 +391,7 @@ static json_t *ask_all(const struct training *t, char *why, size_t size)
 	memory_file_written(&question);
 	for (int i = 0; i < N(pythons) && !answer; i++)
 		answer = ask(pythons[i], script, question.path, why, size);
-	/* One that could not is no failure where another one could. */
+	/* A Python that failed is no failure if another one answered. */
 	if (answer)
 		*why = 0;
 	json_decref(all);

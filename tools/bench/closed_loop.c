@@ -64,7 +64,7 @@ static void take_pose(struct running *r, double t_s)
 	r->next_pose_s += 1 / r->loop->tracker_hz;
 }
 
-/* Feed what has arrived, and tick; then force_N acts, along the axes. */
+/* Feed the poses that have arrived, and tick; then force_N acts, along the axes. */
 static void tick(struct running *r, double t_s, double force_N[3])
 {
 	int late = r->loop->late_ticks;

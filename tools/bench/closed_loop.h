@@ -27,7 +27,7 @@ struct closed_loop_hand {
 struct closed_loop {
 	double mass_kg, damping_N_s_mm; /* of the device, which has no dry friction */
 	double tracker_hz, latency_s;
-	double noise_mm; /* sd of a pose's height, for the first 3/8 of a run; then none */
+	double noise_mm; /* sd of a pose's height, for the first 3/8 of a run; then 0 */
 	int late_ticks;	 /* of the actuator, 0 … 16 */
 	double lean_N, along_mm_s; /* along the skin: of a guided one */
 	double run_s;
@@ -38,14 +38,14 @@ struct closed_loop {
 };
 
 struct closed_loop_end {
-	/* Over the last quarter: the way to and fro, which is none of a device that only sinks
-	 * or creeps, the range of places and that of forces. */
+	/* Over the last quarter: the way to and fro, which is 0 for a device that only sinks or
+	 * creeps, and the ranges of places and forces. */
 	double swing_mm, moved_mm, swing_N;
 	double earlier_mm;	      /* the range of places over the second quarter */
 	double largest_mm, largest_N; /* of all, to either side */
 	double shaken_mm; /* to and fro in the last eighth before the noise ends */
 	double depth_mm, force_N; /* at the end */
-	bool left; /* of a free one: it is far from where it leaned, as one that slid off a ball */
+	bool left; /* of a free device: far from where it leaned, as after sliding off a ball */
 };
 
 /* As the plan is to be told of it. */

@@ -130,7 +130,7 @@ static void interval_of_stretches(const double *values, int n,
 		    to = (long long)n * (i + 1) / STRETCHES;
 
 		memcpy(part, values + from, (to - from) * sizeof(*part));
-		/* Of few: a quantile, the upper one of two, would lean to one side. */
+		/* For few values a quantile, the upper one of two, would lean to one side. */
 		medians[i] = median(part, to - from);
 	}
 	free(part);

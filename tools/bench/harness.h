@@ -6,8 +6,8 @@
  *     turn 1               turn 2               turn 3
  *     references A B C     references A B C     references A B C   …
  *
- * A moment in which the machine is busy affects all of them. A time as a multiple of a
- * reference workload's in the same turn can be compared with that of another day.
+ * A moment in which the machine is busy affects all of them. A time as a multiple of a reference
+ * workload's in the same turn can be compared with another day's.
  */
 #ifndef INCISE_HARNESS_H
 #define INCISE_HARNESS_H
@@ -34,7 +34,7 @@ struct harness_variant {
 	struct harness_time *time; /* the result */
 };
 
-/* Of measured values in the order in which they came. */
+/* Statistics of measured values in the order in which they came. */
 struct harness_spread {
 	double median, p5, p95; /* the percentiles from 20 values on, else NaN */
 	double low, high;	/* 95 % interval of the median */
@@ -56,9 +56,10 @@ void harness_times(const struct harness_variant *variants, int n, int turns);
  * reference workloads are timed now. NaN of none. */
 void harness_time_of(const double *ns, int n, struct harness_time *time);
 
-/* Of n values in the order in which they came; NaN of none. The interval is by ranks. From 24
- * values on it is that of the medians of 12 stretches of them, so that a slow minute, which makes
- * neighbours alike, does not make it narrow. Below 6 values it is the smallest and the largest. */
+/* Statistics of n values in the order in which they came; NaN without values. The interval is by
+ * ranks. From 24 values on it comes from the medians of 12 stretches of them, so that a slow
+ * minute, which makes neighbours alike, does not narrow it. Below 6 values: the smallest, the
+ * largest. */
 void harness_spread(const double *values, int n, struct harness_spread *spread);
 
 /* The processor that variants are timed on: the last one, as interrupts are more often the

@@ -18,7 +18,7 @@
 #include <cpuid.h>
 #endif
 
-/* The first line of a small file that begins with @key, without it; as it was if there is none. */
+/* The first line of a small file that begins with @key, without it; else unchanged. */
 static void read_line(const char *path, const char *key, char *line, int size)
 {
 	FILE *in = fopen(path, "re");
@@ -71,7 +71,7 @@ static void set_kernel(json_t *machine)
 					 strstr(name.version, "PREEMPT_RT")));
 }
 
-/* Those that are granted to this process, and the governor of the one that is timed on. */
+/* Processors that are granted to this process, and the governor of the timed one. */
 static void set_processors(json_t *machine)
 {
 	int cpu = harness_cpu(), n = (int)sysconf(_SC_NPROCESSORS_ONLN);

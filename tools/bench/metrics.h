@@ -33,18 +33,18 @@ void metrics_more_is_better(json_t *metric);
 /* --- comparison ---
  *
  * Two reports of incise bench compared with each other, metric by metric: which
- * changed beyond noise, are gone, or new. A report is that of one benchmark, an object with
- * `figures`, or of several, an object whose members are such objects.
+ * changed beyond noise, are gone, or new. A report covers one benchmark, an object with `figures`, or
+ * several, an object whose members are such objects.
  */
 
 /* Compare; messages call the reports by these names. Returns an object as in incise-bench(1) with
- * its "text", which the caller releases; NULL and the reason where one is no report, where they have no
- * metric in common, or where one is of --quick and the other is not. */
+ * its "text", which the caller releases; NULL and the reason if one is no report, if they have no
+ * metric in common, or if only one is of --quick. */
 json_t *compare_reports(const json_t *old_report, const char *old_name,
 			const json_t *new_report, const char *new_name,
 			struct incise_error *err);
 
-/* A report of a file that can be compared; fails the program where there is none. */
+/* A report of a file that can be compared; fails the program without one. */
 json_t *compare_load(const char *path);
 
 /* The number of metrics that got worse or are gone. */

@@ -6,7 +6,7 @@
  *
  *   F = Kn d n - Kx ((P - P0)·s) s        P0: where the tool went in, s: the blade's side
  *
- * A mean of normals is late, and smooths what the facets of a mesh do to the force's direction:
+ * A mean of normals is late, and smooths the effect of a mesh's facets on the force's direction:
  *
  *   lag       the time by which directions e that are off are late of what turns: e = -lag dn/dt
  *   ripple    of e, from tick to tick

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * The parts of incise bench stability. They measure and report, and what they report is drawn.
+ * The parts of incise bench stability. They measure and report, and the reports are drawn.
  */
 #ifndef INCISE_STABILITY_PARTS_H
 #define INCISE_STABILITY_PARTS_H

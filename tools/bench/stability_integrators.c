@@ -18,12 +18,12 @@
 #define REPEATS 49
 #define QUICK_REPEATS 5
 #define ROWS_MAX 256
-/* Of a run that is timed, at least: short ones need no whole second of motion. */
+/* Least duration of a timed run: short ones need no whole second of motion. */
 #define TIMED_STEPS 4000
 /* Beyond so many times the truth it is not coming back. */
 #define DIVERGED 1e6
-/* An exact one is exact to the roundings of 1000 steps with the force held, and to those
- * of the angle that a tick has: 140 rad at 1e9 N/m. */
+/* An exact integrator is exact to the roundings of 1000 steps with the force held, and to the
+ * roundings of a tick's angle: 140 rad at 1e9 N/m. */
 #define EXACT 1e-9
 
 /* Times in s, x in mm. */
@@ -120,7 +120,7 @@ struct row {
 	const char *name;
 	const struct integrator *integrator;
 	double K_N_m, step_s;
-	/* Of the places at whole milliseconds, as part of the largest true one. */
+	/* Error of the places at whole milliseconds, as part of the largest true one. */
 	double max_error, rms_error;
 	struct harness_time time; /* for a ms of motion */
 	double ns_per_step;
@@ -311,7 +311,7 @@ const struct bench_table stability_integrator_table = {
 		    COLUMN(row, "ns_per_ms_p5", time.ns.p5),
 		    COLUMN(row, "ns_per_ms_p95", time.ns.p95),
 		    COLUMN(row, "failed", failed)},
-	/* A time of one spring is that of all. */
+	/* The time of one spring holds for all. */
 	.metrics = {METRIC(TIME, row, time, "ns", "{integrator} step",
 			   "step_s=0.001,K_N_m=1000"),
 		    METRIC(EXACT, row, max_error, "1",

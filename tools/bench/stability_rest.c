@@ -8,7 +8,7 @@
  *   case ─▶ plan refuses, names ──┤
  *                                 └─ twice that ─▶ leans: swings or rests               asked: few would rest
  *
- * What is refused runs on a plan made for a device that is damped well enough: a plan's ticks do not
+ * A refused case runs on a plan made for a device that is damped well enough: a plan's ticks do not
  * depend on the device.
  */
 #include <pthread.h>
@@ -27,14 +27,14 @@
 
 #define CELLS 50
 #define RUN_S 8.0
-#define LONG_S 40.0	/* of one that swings in a run: it may only be slow to fade */
+#define LONG_S 40.0	/* for a run that swings: it may only be slow to fade */
 #define NOISE_MM 0.02	/* of a tracker, as predict.h has it */
 #define DAMPED_N_s_mm 1 /* a device on which no gain of these cases is refused */
 #define MUCH 10.0	/* a gain that no device of these bears */
 #define TWICE 2
 #define FORCE_N 4.0 /* the scene's limit */
 
-/* Of the whole group, or of its file's name. */
+/* The whole group, or its file's name. */
 static const char *const shapes[LEAN_SHAPES][2] = {
 	{"plane", ""},
 	{"sphere", "surface = { kind = \"sphere\"; centre_mm = [0.0, 0.0, -40.0]; "
@@ -45,7 +45,7 @@ static const char *const shapes[LEAN_SHAPES][2] = {
 	{"heights", NULL},
 };
 
-/* Of about 1 N/mm, or of the model's file. */
+/* A force of about 1 N/mm, or of the model's file. */
 static const struct force {
 	const char *name, *tissue, *rest;
 	bool inserts, model;
@@ -167,7 +167,7 @@ void lean_all(struct incise_plan *plan, const struct lean_case *lean, int sizes,
 			continue;
 		if (loop.noise_mm > 0)
 			most->shaken_mm = fmax(most->shaken_mm, shaken_mm);
-		/* Of none yet, too. */
+		/* Also for the first run. */
 		if (end.swing_mm <= most->swing_mm)
 			continue;
 		most->swing_mm = end.swing_mm;

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include "../../lib/base/vector.h"
 #include "../cli/cli.h"
-#include "../cli/stroke.h"
+#include "stroke.h"
 #include "trajectory.h"
 
 #define NS 1e-9

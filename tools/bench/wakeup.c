@@ -54,7 +54,7 @@ static const char *const stress[LOADS][4] = {
 };
 
 struct load_run {
-	pid_t pid;	       /* 0: none runs */
+	pid_t pid;	       /* 0: no stress-ng runs */
 	char folder[PATH_MAX]; /* where a disk is kept busy, or empty */
 	struct memory_file said;
 };
@@ -219,7 +219,7 @@ static void read_spikes(struct cyclictest *c)
 	}
 }
 
-/* "histogram": {"14": 96, …}; a wake-up above all bins is in none of them. */
+/* "histogram": {"14": 96, …}; a wake-up above all bins is in no bin. */
 static const char *read_histogram(struct cyclictest *c, json_t *thread)
 {
 	json_t *histogram = json_object_get(thread, "histogram"), *count;
@@ -244,7 +244,7 @@ static const char *read_histogram(struct cyclictest *c, json_t *thread)
 	return NULL;
 }
 
-/* Wait for its end and read its report. Returns NULL or why there is none. */
+/* Wait for its end and read its report. Returns NULL or the reason for no result. */
 static const char *cyclictest_end(struct cyclictest *c)
 {
 	int status = child_end(c->pid, END_S);
@@ -436,7 +436,7 @@ static struct lateness lateness_of(const uint64_t *bins, double max_us)
 	return l;
 }
 
-/* By ranks, as if wake-ups were independent of each other: those of one run alone. */
+/* By ranks, as if wake-ups were independent of each other, for one run alone. */
 static struct harness_spread quantile_of(const struct lateness *l, double q)
 {
 	double off = 1.96 * sqrt(q * (1 - q) / fmax((double)l->ticks, 1));

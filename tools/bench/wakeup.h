@@ -17,7 +17,7 @@
 enum load_kind { LOAD_IDLE, LOAD_CPU, LOAD_MEMORY, LOAD_DISK, LOAD_VIEW, LOADS };
 extern const char *const load_names[LOADS + 1]; /* end with NULL */
 
-/* Of the wake-ups of one program, us; NaN: not measured. Quantiles are upper edges of bins. */
+/* Wake-ups of one program, us; NaN: not measured. Quantiles are upper edges of bins. */
 struct lateness {
 	double min, median, p99, p999, p9999, max;
 	uint64_t ticks;
@@ -52,8 +52,8 @@ struct wakeups {
 	int cpu;	/* of both programs */
 };
 
-/* Measure a scene's file at its rate; with NULL those of @own, which makes one, at 1 and
- * 4 kHz. @only: a load, or LOADS for all, which with @quick are few. */
+/* Measure a scene's file at its rate; with NULL the scene that @own makes, at 1 and 4 kHz. @only: a
+ * load, or LOADS for all, which with @quick are few. */
 void wakeups_measure(const char *scene, struct memory_file (*own)(double rate_hz),
 		     enum load_kind only, bool quick, double seconds,
 		     struct wakeups *wakeups);

@@ -1,99 +1,49 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * The common part of all incise calibrate commands; see calibrate.h.
+ * The driver of the incise calibrate commands; see calibrate.h.
  */
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
+#include <time.h>
 #include <unistd.h>
+#include <incise/infile.h>
 #include "../cli/calibration.h"
-#include "../cli/file_kind.h"
+#include "../cli/file.h"
+#include "../cli/folder.h"
 #include "../cli/json.h"
 #include "../cli/plot.h"
 #include "../cli/uncertainty.h"
 #include "calibrate.h"
 
-/* Note the files of --report before anything is measured. */
-static void reserve_report(const char *folder)
+/* --- the record ---------------------------------------------------------------------- */
+
+void calibrate_value(struct calibrate *c, const char *key, const char *unit, double left,
+		     double u)
 {
-	static const char *const files[] = {"report.txt", "report.json"};
+	struct incise_calibration_value *value = &c->record.values[c->record.n++];
 
-	for (size_t i = 0; i < sizeof(files) / sizeof(*files); i++) {
-		char *path = cli_text("%s/%s", folder, files[i]);
-
-		cli_output(path);
-		free(path);
-	}
-	plot_reserve(folder, "fit");
-	plot_reserve(folder, "residuals");
+	*value = (struct incise_calibration_value){
+		.found = incise_calibration_get(&c->found, key), .left = left, .u = u};
+	calibrate_words(value->key, "%s", key);
+	calibrate_words(value->unit, "%s", unit);
 }
 
-void calibrate_find(struct calibrate_options *options)
+void calibrate_stated(struct calibrate *c, double given, const char *key,
+		      const char *unit, const char *question)
 {
-	struct incise_error err = {0};
-	int rc;
-
-	if (!options->calibration)
-		options->calibration = calibration_default();
-	if (!options->calibration)
-		options->calibration = "calibration.conf";
-	/* It is written again if it is there, and else made. */
-	if (!access(options->calibration, F_OK))
-		cli_input(options->calibration);
-	else if (!options->dry_run)
-		cli_output_part(options->calibration); /* calibrate_result() names it */
-	if (options->report)
-		reserve_report(options->report);
-	rc = incise_calibration_load(options->calibration, &options->found, &err);
-	if (rc == -ENOENT)
-		incise_calibration_nominal(&options->found);
-	else if (rc)
-		cli_fail_with(&err);
-	if (!rc)
-		options->n_history = incise_calibration_history(options->calibration,
-								&options->history, &err);
-	if (options->n_history < 0)
-		cli_fail_with(&err);
-}
-
-void calibrate_begin(struct calibrate_options *options)
-{
-	if (options->from && options->rig)
-		cli_usage("--from and --rig exclude each other; give one of them");
-	if (options->from && options->keep)
-		cli_usage("--keep does not go with --from: the data are in that file "
-			  "already");
-	calibrate_find(options);
-	if (options->report && mkdir(options->report, 0777) && errno != EEXIST)
-		cli_fail("%s: %s", options->report, strerror(errno));
-}
-
-void calibrate_value(struct incise_calibration_record *record, const char *key,
-		     const char *unit, double found, double left, double u)
-{
-	struct incise_calibration_value *value = &record->values[record->n++];
-
-	*value = (struct incise_calibration_value){.found = found, .left = left, .u = u};
-	snprintf(value->key, sizeof(value->key), "%s", key);
-	snprintf(value->unit, sizeof(value->unit), "%s", unit);
-}
-
-void calibrate_stated(const struct calibrate_options *options,
-		      struct incise_calibration_record *record, double given,
-		      const char *key, const char *unit, const char *question)
-{
-	double found = incise_calibration_get(&options->found, key);
+	struct incise_calibration_record *record = &c->record;
+	double found = incise_calibration_get(&c->found, key);
 	char line[100], *end;
 
-	if (isnan(given) && isnan(found) && !options->json && isatty(STDIN_FILENO) &&
+	if (isnan(given) && isnan(found) && !c->json && isatty(STDIN_FILENO) &&
 	    isatty(STDERR_FILENO)) {
 		fprintf(stderr, "%s, in %s [not stated] ", question, unit);
 		*line = '\n';
 		/* The end of the input leaves it out, too. */
-		if (!fgets(line, sizeof(line), stdin) && cli_stop)
-			cli_fail("stopped; the previous calibration stays active");
+		if (!fgets(line, sizeof(line), stdin))
+			calibrate_check_stop();
 		if (*line != '\n') {
 			given = incise_decimal(line, &end);
 			if (end == line || *end != '\n' || !(given >= 0 && given <= 1000))
@@ -106,62 +56,7 @@ void calibrate_stated(const struct calibrate_options *options,
 		return;
 	for (int i = 0; i <= record->n && record->n_covariance; i++)
 		record->covariance[record->n_covariance++] = 0;
-	calibrate_value(record, key, unit, found, given, 0);
-}
-
-static FILE *begin_file(const char *folder, const char *name,
-			struct incise_outfile **file)
-{
-	char *path = cli_text("%s/%s", folder, name);
-	FILE *out = whole_file_begin(path, file);
-
-	free(path);
-	return out;
-}
-
-FILE *calibrate_report_text(const char *folder, struct incise_outfile **file)
-{
-	*file = NULL;
-	return folder ? begin_file(folder, "report.txt", file) : NULL;
-}
-
-void calibrate_report_json(const char *folder, json_t *object)
-{
-	struct incise_outfile *file;
-	FILE *out = begin_file(folder, "report.json", &file);
-
-	if (json_write(out, object, JSON_INDENT(2)))
-		cli_fail("%s/report.json: no memory", folder);
-	whole_file_end(file);
-	json_decref(object);
-}
-
-bool calibrate_can_plot(const char *folder)
-{
-	if (plot_possible()) {
-		plot_folder(folder);
-		return true;
-	}
-	cli_warn("gnuplot is not installed, so there are no plots; apt-get install "
-		 "gnuplot-nox");
-	return false;
-}
-
-static json_t *values_json(const struct incise_calibration_record *record)
-{
-	json_t *list = json_array();
-
-	for (int i = 0; i < record->n; i++) {
-		const struct incise_calibration_value *value = &record->values[i];
-
-		json_array_append_new(list, json_pack("{ss ss so so so so}", "key",
-						      value->key, "unit", value->unit,
-						      "found", json_number(value->found),
-						      "left", json_number(value->left),
-						      "u", json_number(value->u), "U",
-						      json_number(2 * value->u)));
-	}
-	return list;
+	calibrate_value(c, key, unit, given, 0);
 }
 
 /* --- the block at the end ---------------------------------------------------------------- */
@@ -171,25 +66,6 @@ enum { KEY, VALUE, PREVIOUS, CHANGE, COLUMNS };
 struct row {
 	char text[COLUMNS][UNCERTAINTY_TEXT];
 };
-
-/* Date of the calibration that gave the previous value; NULL: none did. */
-static const char *previous_date(const struct calibrate_options *options,
-				 const struct incise_calibration_value *value)
-{
-	const char *date = NULL;
-	double left = NAN;
-
-	for (int i = 0; i < options->n_history; i++) {
-		const struct incise_calibration_record *r = &options->history[i];
-
-		for (int k = 0; r->pass && k < r->n; k++)
-			if (!strcmp(r->values[k].key, value->key)) {
-				left = r->values[k].left;
-				date = r->date;
-			}
-	}
-	return left == value->found ? date : NULL;
-}
 
 /* A value with the digits of @U, which is not printed. */
 static void round_to(double value, double U, const char *unit,
@@ -204,10 +80,13 @@ static void round_to(double value, double U, const char *unit,
 			 unit);
 }
 
-static void fill_row(const struct calibrate_options *options,
+static void fill_row(const struct calibrate *c,
 		     const struct incise_calibration_value *value, struct row *row)
 {
-	const char *date = previous_date(options, value);
+	const struct incise_calibration_record *last;
+	const struct incise_calibration_value *previous =
+		incise_calibration_last(c->history, c->n_history, value->key, &last);
+	const char *date;
 	double change = value->left - value->found, U = 2 * value->u;
 	double percent = 100 * change / fabs(value->found);
 	char text[UNCERTAINTY_TEXT];
@@ -222,7 +101,9 @@ static void fill_row(const struct calibrate_options *options,
 		strcpy(row->text[CHANGE], "-");
 		return;
 	}
-	if (!date)
+	if (previous && previous->left == value->found)
+		date = last->date;
+	else
 		date = value->found == incise_calibration_get(&nominal, value->key)
 			       ? "nominal"
 			       : "by hand";
@@ -252,24 +133,24 @@ static bool is_of_another(const struct incise_calibration_value *value)
 	return cli_ends_with(value->key, "_delay_sd_ms"); /* U of that delay, halved */
 }
 
-void calibrate_result_text(const struct calibrate_options *options,
-			   const struct incise_calibration_record *record, FILE *out)
+static void print_result(const struct calibrate *c, FILE *out)
 {
+	const struct incise_calibration_record *record = &c->record;
 	struct row rows[INCISE_CALIBRATION_VALUES + 1] = {
 		{{"result", "value ± U (k = 2)", "previous", "change"}}};
 	int width[COLUMNS] = {0}, n = 1;
 
 	for (int i = 0; i < record->n; i++)
 		if (!is_of_another(&record->values[i]))
-			fill_row(options, &record->values[i], &rows[n++]);
+			fill_row(c, &record->values[i], &rows[n++]);
 	for (int i = 0; i < n; i++)
-		for (int c = 0; c < COLUMNS; c++)
-			width[c] = (int)fmax(width[c], width_of(rows[i].text[c]));
+		for (int k = 0; k < COLUMNS; k++)
+			width[k] = (int)fmax(width[k], width_of(rows[i].text[k]));
 	fputc('\n', out);
 	for (int i = 0; i < n; i++) {
-		for (int c = 0; c < CHANGE; c++)
-			fprintf(out, "%s%*s", rows[i].text[c],
-				width[c] - width_of(rows[i].text[c]) + 2, "");
+		for (int k = 0; k < CHANGE; k++)
+			fprintf(out, "%s%*s", rows[i].text[k],
+				width[k] - width_of(rows[i].text[k]) + 2, "");
 		fprintf(out, "%s\n", rows[i].text[CHANGE]);
 	}
 	fprintf(out, "%s%s%s: %s\n", cli_colour(out, record->pass ? CLI_GREEN : CLI_RED),
@@ -277,126 +158,255 @@ void calibrate_result_text(const struct calibrate_options *options,
 		record->verdict);
 }
 
-void calibrate_result(const struct calibrate_options *options,
-		      const struct incise_calibration_record *record)
+static void print_written(const struct calibrate *c)
 {
-	calibrate_result_text(options, record, stdout);
-	if (options->dry_run)
-		printf("%s: not written (--dry-run)\n", options->calibration);
-	else if (record->pass)
-		printf("wrote %s: active from now on\n", options->calibration);
+	if (c->dry_run)
+		printf("%s: not written (--dry-run)\n", c->calibration);
+	else if (c->record.pass)
+		printf("wrote %s: active from now on\n", c->calibration);
 	else
 		printf("wrote %s: in its history only, the previous values stay active\n",
-		       options->calibration);
+		       c->calibration);
 	cli_written();
 }
 
-void calibrate_append(const struct calibrate_options *options,
-		      const struct incise_calibration_record *record)
+json_t *calibrate_budget(const struct incise_calibration_budget *budget,
+			 bool sensitivities, const char *contribution)
+{
+	json_t *list = json_array();
+
+	for (int i = 0; i < budget->n; i++) {
+		const struct incise_calibration_part *part = &budget->part[i];
+		json_t *line = json_pack("{ss ss# so ss}", "source", part->source, "type",
+					 &part->type, 1, "u", json_number(part->u),
+					 "unit", part->unit);
+
+		if (sensitivities)
+			json_set_number(line, "sensitivity", part->sensitivity);
+		json_set_number(line, contribution, part->contribution);
+		json_array_append_new(list, line);
+	}
+	return list;
+}
+
+json_t *calibrate_json(const struct calibrate *c, json_t *details)
+{
+	json_t *list = json_array();
+
+	for (int i = 0; i < c->record.n; i++) {
+		const struct incise_calibration_value *value = &c->record.values[i];
+
+		json_array_append_new(list, json_pack("{ss ss so so so so}", "key",
+						      value->key, "unit", value->unit,
+						      "found", json_number(value->found),
+						      "left", json_number(value->left),
+						      "u", json_number(value->u), "U",
+						      json_number(2 * value->u)));
+	}
+	return json_pack("{ss ss sb sb so so}", "kind", c->record.kind, "method",
+			 c->record.method, "pass", c->record.pass, "written", !c->dry_run,
+			 "values", list, "details", details);
+}
+
+/* --- the report's folder ------------------------------------------------------------- */
+
+static const char *const report_files[] = {"report.txt", "report.json"};
+
+/* Note the files before anything is measured. */
+static void reserve_report(const char *folder)
+{
+	for (int i = 0; i < 2; i++) {
+		char *path = cli_text("%s/%s", folder, report_files[i]);
+
+		cli_output(path);
+		free(path);
+	}
+	plot_reserve(folder, "fit");
+	plot_reserve(folder, "residuals");
+}
+
+/* Each file appears whole. */
+static FILE *begin_report(const char *folder, int i, struct incise_outfile **file)
+{
+	char *path = cli_text("%s/%s", folder, report_files[i]);
+	FILE *out = whole_file_begin(path, file);
+
+	free(path);
+	return out;
+}
+
+void calibrate_draw(FILE *script, const char *folder, const char *name)
+{
+	if (!plot_draw(script, folder, name))
+		cli_warn("%s.png: could not be drawn; see whether gnuplot works", name);
+}
+
+static void write_report(const struct calibrate_kind *kind, const struct calibrate *c)
+{
+	struct incise_outfile *file;
+	json_t *object = kind->json(c);
+	FILE *out;
+
+	folder_make_all(c->report);
+	if (!plot_possible()) {
+		cli_warn("gnuplot is not installed, so there are no plots; apt-get "
+			 "install gnuplot-nox");
+	} else {
+		plot_folder(c->report);
+		if (!c->refused)
+			kind->draw(c, c->report);
+	}
+	out = begin_report(c->report, 0, &file);
+	kind->text(c, out);
+	if (!c->refused)
+		print_result(c, out);
+	whole_file_end(file);
+	out = begin_report(c->report, 1, &file);
+	if (json_write(out, object, JSON_INDENT(2)))
+		cli_fail("%s/report.json: no memory", c->report);
+	whole_file_end(file);
+	json_decref(object);
+}
+
+/* --- the whole ----------------------------------------------------------------------- */
+
+void calibrate_check_source(const struct calibrate *c, double time_s, const char *source)
+{
+	if (c->from && time_s > 0)
+		cli_usage("--duration does not go with --from: %s has its own", source);
+	if (!c->from && !(time_s > 0) && !isatty(STDIN_FILENO))
+		cli_usage("missing --duration or --from (needed without a terminal)");
+	if (c->from && c->rig)
+		cli_usage("--from and --rig exclude each other; give one of them");
+	if (c->from && c->keep)
+		cli_usage("--keep does not go with --from: the data are in that file "
+			  "already");
+}
+
+void calibrate_check_stop(void)
+{
+	if (cli_stop)
+		cli_fail("stopped; the previous calibration stays active");
+}
+
+void calibrate_await_enter(void)
+{
+	int c;
+
+	while ((c = getchar()) != '\n')
+		if (c == EOF || cli_stop)
+			cli_fail("stopped; the previous calibration stays active");
+}
+
+void calibrate_find(struct calibrate *c, bool required)
+{
+	struct incise_error err = {0};
+	int rc;
+
+	if (!c->calibration)
+		c->calibration = calibration_default();
+	if (!c->calibration)
+		c->calibration = "calibration.conf";
+	/* It is written again if it is there, and else made. */
+	if (!access(c->calibration, F_OK))
+		cli_input(c->calibration);
+	else if (!c->dry_run)
+		cli_output_part(c->calibration); /* print_written() names it */
+	if (c->report)
+		reserve_report(c->report);
+	rc = incise_calibration_load(c->calibration, &c->found, &err);
+	if (rc == -ENOENT && !required)
+		incise_calibration_nominal(&c->found);
+	else if (rc)
+		cli_fail_with(&err);
+	if (!rc)
+		c->n_history =
+			incise_calibration_history(c->calibration, &c->history, &err);
+	if (c->n_history < 0)
+		cli_fail_with(&err);
+}
+
+static void gather_data(const struct calibrate_kind *kind, struct calibrate *c)
+{
+	struct incise_outfile *file;
+	FILE *out;
+
+	c->raw = c->keep ? c->keep : c->from;
+	if (c->from) {
+		kind->read(c, c->from);
+	} else {
+		/* A folder that cannot be made is found out before the measurement. */
+		if (c->report)
+			folder_make_all(c->report);
+		kind->measure(c);
+	}
+	if (c->keep && kind->write) {
+		out = whole_file_begin(c->keep, &file);
+		kind->write(c, out);
+		whole_file_end(file);
+	}
+}
+
+static void begin_record(const struct calibrate_kind *kind, struct calibrate *c)
+{
+	const time_t now = time(NULL);
+	struct tm utc;
+
+	c->record.low = c->record.high = NAN;
+	c->record.pass = true;
+	calibrate_words(c->record.kind, "%s", kind->name);
+	strftime(c->record.date, sizeof(c->record.date), "%Y-%m-%dT%H:%M:%SZ",
+		 gmtime_r(&now, &utc));
+	/* A recording is a folder, and has its own checksums. */
+	if (c->raw && incise_calibration_raw(&c->record, c->raw, NULL))
+		calibrate_words(c->record.raw, "%s", c->raw);
+}
+
+static void append_record(const struct calibrate *c)
 {
 	struct incise_error err = {0};
 
 	if (cli_stop)
 		cli_fail("stopped; %s is not written, the previous calibration stays "
 			 "active",
-			 options->calibration);
-	if (!options->dry_run &&
-	    incise_calibration_append(options->calibration, record, &err))
+			 c->calibration);
+	if (!c->dry_run && incise_calibration_append(c->calibration, &c->record, &err))
 		cli_fail_with(&err);
 }
 
-void calibrate_require_pass(const struct incise_calibration_record *record)
+int calibrate_run(const struct calibrate_kind *kind, int argc, char **argv, void *run)
 {
+	struct incise_error err = {0};
+	struct calibrate *c = run;
+
+	cli_parse(kind->command, argc, argv, run);
+	kind->check(run, argc, argv);
+	calibrate_find(c, false);
+	gather_data(kind, c);
+	begin_record(kind, c);
+	if (kind->fit(run, &err)) {
+		if (!kind->reports_refusal)
+			cli_fail_with(&err);
+		c->refused = err.text;
+	}
+	/* Everything that can fail comes before the calibration changes. */
+	if (c->report)
+		write_report(kind, c);
+	if (!c->refused)
+		append_record(c);
+	if (c->json) {
+		json_print(kind->json(run));
+	} else if (!c->refused) {
+		if (kind->summary)
+			kind->summary(run, stdout);
+		print_result(c, stdout);
+		print_written(c);
+	}
+	if (c->refused)
+		cli_fail("refused: %s; %s stays as it was", c->refused, c->calibration);
 	cli_finish();
-	if (!record->pass)
+	if (!c->record.pass)
 		cli_fail("refused, the previous calibration stays active: %s",
-			 record->verdict);
-}
-
-void calibrate_end(const struct calibrate_options *options,
-		   const struct incise_calibration_record *record, json_t *details)
-{
-	json_t *all = json_pack("{ss ss sb sb so so}", "kind", record->kind, "method",
-				record->method, "pass", record->pass, "written",
-				!options->dry_run, "values", values_json(record),
-				"details", details);
-
-	/* The report first: a calibration in force must have one. */
-	if (options->report)
-		calibrate_report_json(options->report, json_incref(all));
-	calibrate_append(options, record);
-	if (options->json) {
-		json_print(all);
-		return;
-	}
-	calibrate_result(options, record);
-	json_decref(all);
-	cli_finish();
-}
-
-struct incise_infile *calibrate_open(const char *path)
-{
-	static const struct incise_infile_kind csv = {
-		.name = "a CSV file of a calibration",
-		.advice = "give a CSV file with a line of column names",
-		.size_max = 1 << 30,
-	};
-	struct incise_error err = {0};
-
-	file_expect(path, FILE_TABLE);
-	return cli_require(incise_infile_open(path, &csv, &err), &err);
-}
-
-bool calibrate_line(struct incise_infile *file, char **line)
-{
-	struct incise_error err = {0};
-	int rc = incise_infile_line(file, line, &err);
-
-	if (rc < 0)
-		cli_fail_with(&err);
-	return rc;
-}
-
-int calibrate_cut(const char *path, int number, char *line, char **fields, int max,
-		  const char *before, const char *after)
-{
-	int n = 0;
-
-	line[strcspn(line, "\r\n")] = 0;
-	for (char *field; (field = strsep(&line, ","));) {
-		char *end;
-
-		if (n == max)
-			cli_fail("%s:%d: more than %d columns; leave out those that are "
-				 "not needed",
-				 path, number, max);
-		field += strspn(field, before);
-		for (end = field + strlen(field); end > field && strchr(after, end[-1]);)
-			*--end = 0;
-		fields[n++] = field;
-	}
-	return n;
-}
-
-int calibrate_column(const char *path, int line, char **fields, int n, const char *name)
-{
-	int at = -1;
-
-	for (int i = 0; i < n; i++) {
-		if (strcmp(fields[i], name))
-			continue;
-		if (at >= 0)
-			cli_fail("%s:%d: two columns are called %s; rename one", path,
-				 line, name);
-		at = i;
-	}
-	return at;
-}
-
-void calibrate_width(const char *path, int line, int n, int columns)
-{
-	if (n != columns)
-		cli_fail("%s:%d: %d fields, but the first line names %d columns; "
-			 "correct the line, or remove it",
-			 path, line, n, columns);
+			 c->record.verdict);
+	return 0;
 }

@@ -1,7 +1,10 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * The common part of all incise calibrate commands: options, the calibration before, the
- * files of --report DIR, and the end with a result. Every failure ends the program.
+ * The driver of the incise calibrate commands: what all of them do alike. A command brings its
+ * options, and a table of what is its own. Every failure ends the program.
+ *
+ *   options ─▶ read | measure ─▶ fit ─▶ text, JSON, plots ─▶ calibration.conf ─▶ verdict
+ *                      └─▶ write (--keep)
  */
 #ifndef INCISE_CALIBRATE_H
 #define INCISE_CALIBRATE_H
@@ -10,95 +13,111 @@
 #include <stdio.h>
 #include <jansson.h>
 #include <incise/calibration.h>
-#include <incise/infile.h>
 #include "../cli/cli.h"
-#include "../cli/file.h"
 
-/* -r, -c, --from, --keep, --report, --dry-run and --json of a command. */
-struct calibrate_options {
+/* A calibration under way; a command's struct begins with it, as `common`. */
+struct calibrate {
 	const char *rig, *calibration, *from, *keep, *report;
 	bool dry_run, json;
+	const char *raw;     /* file of the data, for the record; NULL: none */
+	const char *refused; /* reason why there is no result; NULL: there is one */
 	struct incise_calibration found; /* active before */
 	struct incise_calibration_record *history;
 	int n_history;
+	struct incise_calibration_record record; /* the result */
 };
 
-/* The option -c of a command, whose options begin with these as `common`. */
-#define CALIBRATE_FILE_OPTION(type)                                            \
-	'c', "calibration", "FILE",                                            \
-		"calibration to read and write (default: ./calibration.conf, " \
-		"else /etc/incise/calibration.conf where that is)",            \
-		CLI_INPUT(type, common.calibration)
+/* Rows of the table of options: the first ones, and the last. */
+#define CALIBRATE_RIG_OPTIONS(type)                                                    \
+	{CLI_RIG_OPTION(type, common.rig)},                                            \
+	{                                                                              \
+		'c', "calibration", "FILE",                                            \
+			"calibration to read and write (default: ./calibration.conf, " \
+			"else /etc/incise/calibration.conf where that is)",            \
+			CLI_INPUT(type, common.calibration)                            \
+	}
+#define CALIBRATE_REPORT_OPTIONS(type)                                                   \
+	{0, "report", "DIR", "write report.txt, report.json and plots into this folder", \
+	 CLI_OUTPUTS(type, common.report)},                                              \
+		{0, "dry-run", NULL, "do everything except writing calibration.conf",    \
+		 CLI_FLAG(type, common.dry_run)},                                        \
+	{                                                                                \
+		0, "json", NULL, "report as JSON", CLI_FLAG(type, common.json)           \
+	}
 
-/* Read the active calibration and its history; a missing file is the nominal one. */
-void calibrate_find(struct calibrate_options *options);
+/* What is a calibration's own; @run is the command's struct. */
+struct calibrate_kind {
+	const char *name; /* of the record */
+	const struct cli_command *command;
+	/* Options that do not go together, and operands, are bad usage. */
+	void (*check)(void *run, int argc, char **argv);
+	/* Data from --from, or without it from a rig; and as a file for --keep, or NULL. */
+	void (*read)(void *run, const char *path);
+	void (*measure)(void *run);
+	void (*write)(const void *run, FILE *out);
+	/* Fit, and fill in the record. Returns 0, or a negative errno and the reason. */
+	int (*fit)(void *run, struct incise_error *err);
+	/* Whether a fit without a result has a report, too. */
+	bool reports_refusal;
+	void (*text)(const void *run, FILE *out);    /* of report.txt */
+	void (*summary)(const void *run, FILE *out); /* on standard output; or NULL */
+	json_t *(*json)(const void *run);
+	/* Data and plots of the report's folder. */
+	void (*draw)(const void *run, const char *folder);
+};
 
-/* Reject options that exclude each other, read the calibration, make the report's folder. */
-void calibrate_begin(struct calibrate_options *options);
+/* The commands. */
+int calibrate_force(int argc, char **argv);
+int calibrate_depth(int argc, char **argv);
+int calibrate_tip(int argc, char **argv);
+int calibrate_delay(int argc, char **argv);
+int calibrate_stepper(int argc, char **argv);
+int calibrate_check(int argc, char **argv);
 
-/* Add a coefficient to the record. */
-void calibrate_value(struct incise_calibration_record *record, const char *key,
-		     const char *unit, double found, double left, double u);
+/*
+ * Read the active calibration and its history; a missing file is the nominal one, if it need not
+ * be there.
+ */
+void calibrate_find(struct calibrate *calibrate, bool required);
+
+/*
+ * Reject --from with --rig, --keep or --duration, of which @source ("the file") has its own; and
+ * neither of --from and --duration (0: not given) without a terminal.
+ */
+void calibrate_check_source(const struct calibrate *calibrate, double time_s,
+			    const char *source);
+
+/* All of it; @run has the defaults of the options. Returns 0: it passed. */
+int calibrate_run(const struct calibrate_kind *kind, int argc, char **argv, void *run);
+
+/* Add a coefficient to the record, by its key; its previous value is the active one. */
+void calibrate_value(struct calibrate *calibrate, const char *key, const char *unit,
+		     double left, double u);
 
 /*
  * Add a standard uncertainty that is not measured here, but known to who calibrates: @given, or, if
  * that is NAN and the file does not state it, the answer on a terminal, where an empty line leaves it out.
  */
-void calibrate_stated(const struct calibrate_options *options,
-		      struct incise_calibration_record *record, double given,
-		      const char *key, const char *unit, const char *question);
+void calibrate_stated(struct calibrate *calibrate, double given, const char *key,
+		      const char *unit, const char *question);
 
-/* DIR/report.txt, for whole_file_end(); both NULL without a DIR. Each file appears whole. */
-FILE *calibrate_report_text(const char *folder, struct incise_outfile **file);
+/* Set words of the record. */
+#define calibrate_words(field, ...) snprintf(field, sizeof(field), __VA_ARGS__)
 
-/* DIR/report.json; releases @object. */
-void calibrate_report_json(const char *folder, json_t *object);
+/* A budget as JSON, with its sensitivities or without, its contributions under a key of their own. */
+json_t *calibrate_budget(const struct incise_calibration_budget *budget,
+			 bool sensitivities, const char *contribution);
 
-/* Make DIR/plot; false with a warning: gnuplot is not installed. */
-bool calibrate_can_plot(const char *folder);
+/* The whole report as JSON, with @details, of a calibration that has no other keys. */
+json_t *calibrate_json(const struct calibrate *calibrate, json_t *details);
 
-/*
- * The block that ends each report: per value of the record its U, the previous value with its
- * date, and the change; pass or FAIL with the limits of the verdict.
- */
-void calibrate_result_text(const struct calibrate_options *options,
-			   const struct incise_calibration_record *record, FILE *out);
+/* Fail after a signal. */
+void calibrate_check_stop(void);
 
-/* The same on standard output, with the file written, or why it was not. */
-void calibrate_result(const struct calibrate_options *options,
-		      const struct incise_calibration_record *record);
+/* Wait for Enter; fail at a signal and at the end of the input. */
+void calibrate_await_enter(void);
 
-/* Append the record unless it is a dry run; fails after a signal. */
-void calibrate_append(const struct calibrate_options *options,
-		      const struct incise_calibration_record *record);
-
-/* Flush the report, and fail if the calibration did not pass. */
-void calibrate_require_pass(const struct incise_calibration_record *record);
-
-/*
- * End with a result that passed: append it unless it is a dry run, write report.json, and print it as
- * text or JSON, with @details in the JSON.
- */
-void calibrate_end(const struct calibrate_options *options,
-		   const struct incise_calibration_record *record, json_t *details);
-
-/* A CSV file of the data of a calibration; ends the program where it cannot be read. */
-struct incise_infile *calibrate_open(const char *path);
-
-/* Read its next line; false at its end. Ends the program on an error. */
-bool calibrate_line(struct incise_infile *file, char **line);
-
-/*
- * Cut a line of CSV at its commas, in place, and strip the characters of @before and @after
- * around each field. Returns the number of fields; more than @max end the program.
- */
-int calibrate_cut(const char *path, int number, char *line, char **fields, int max,
-		  const char *before, const char *after);
-
-/* The place of a column among the names of a header, or -1; ends the program if it is there twice. */
-int calibrate_column(const char *path, int line, char **fields, int n, const char *name);
-
-/* End the program unless a row has a field for each column. */
-void calibrate_width(const char *path, int line, int n, int columns);
+/* Close a plot's script and draw it; warns if that fails. */
+void calibrate_draw(FILE *script, const char *folder, const char *name);
 
 #endif

@@ -4,31 +4,28 @@
  */
 #include <errno.h>
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <incise/board.h>
-#include <incise/calibrate_depth.h>
 #include <incise/dataset.h>
 #include <incise/recording.h>
-#include "../cli/cli.h"
-#include "../cli/file.h"
+#include <incise/rig.h>
 #include "../cli/file_kind.h"
 #include "../cli/image.h"
 #include "../cli/recording.h"
 #include "depth.h"
 
-/* --- pictures ------------------------------------------------------------------------- */
+/* --- frames --------------------------------------------------------------------------- */
 
-/* Returns false if the picture is of no use; @name: "3", or the file's. */
-typedef bool handle_picture(void *context, const struct incise_camera_frame *frame,
-			    const char *name);
+/* Returns false if the frame is of no use; @name: "3", or the file's. */
+typedef bool handle_frame(struct depth *depth, const struct incise_camera_frame *frame,
+			  const char *name);
 
 #define WAIT_NS 2000000	       /* between two reads of the camera */
-#define PATIENCE_NS 5000000000 /* until a picture comes */
+#define PATIENCE_NS 5000000000 /* until a frame comes */
 
-static void wait_for(struct incise_clock *clock, int64_t ns)
+static void wait_ns(struct incise_clock *clock, int64_t ns)
 {
 	incise_clock_wait_until(clock, incise_clock_now(clock) + ns);
 }
@@ -42,11 +39,10 @@ static void next_frame(struct incise_rig *rig, struct incise_camera_frame *frame
 	int rc;
 
 	while (!(rc = incise_camera_read(camera, frame))) {
-		if (cli_stop)
-			cli_fail("stopped; the previous calibration stays active");
+		calibrate_check_stop();
 		if (incise_clock_now(clock) > until)
 			cli_fail("no frames arrive from the camera; check its cable");
-		wait_for(clock, WAIT_NS);
+		wait_ns(clock, WAIT_NS);
 	}
 	if (rc > 0)
 		return;
@@ -54,70 +50,64 @@ static void next_frame(struct incise_rig *rig, struct incise_camera_frame *frame
 	cli_fail("camera: %s", *cause ? cause : strerror(-rc));
 }
 
-/* Drop the picture from before the user was asked. */
-static void drop_old(struct incise_rig *rig)
+/* Drop the frame from before the user was asked. */
+static void drop_old_frame(struct incise_rig *rig)
 {
 	struct incise_camera_frame frame;
 
 	incise_camera_newest(incise_rig_camera(rig), &frame);
 }
 
-static void ask(const char *prompt, int n)
+static void take_frames(struct depth *depth, int frames, const char *prompt,
+			handle_frame *handle)
 {
-	char line[100];
-
-	fprintf(stderr, prompt, n);
-	fprintf(stderr, " [Enter] ");
-	if (!fgets(line, sizeof(line), stdin) || cli_stop)
-		cli_fail("stopped; the previous calibration stays active");
-}
-
-static void from_camera(struct depth_source *source, int pictures, const char *prompt,
-			handle_picture *handle, void *context)
-{
-	struct incise_rig *rig = cli_open_rig(source->rig, INCISE_RIG_CAMERA);
+	const bool is_board = depth->method == DEPTH_BOARD;
+	struct incise_rig *rig = cli_open_rig(depth->common.rig, INCISE_RIG_CAMERA);
 	struct incise_camera_info info;
 	int tries = 0;
 
 	incise_camera_info(incise_rig_camera(rig), &info);
-	snprintf(source->device, sizeof(source->device), "%.63s", info.name);
-	for (int taken = 0; taken < pictures;) {
+	calibrate_words(depth->common.record.device, "%.63s", info.name);
+	for (int taken = 0; taken < frames;) {
 		struct incise_camera_frame frame;
 		char name[20];
 
-		if (source->guided && (source->each || !taken)) {
-			ask(prompt, taken + 1);
-			drop_old(rig);
-		} else if (taken && source->every_s > 0) {
-			wait_for(incise_rig_clock(rig), (int64_t)(source->every_s * 1e9));
-			drop_old(rig);
+		/* A board moves between two frames. */
+		if (depth->guided && (is_board || !taken)) {
+			fprintf(stderr, prompt, taken + 1);
+			fprintf(stderr, " [Enter] ");
+			calibrate_await_enter();
+			drop_old_frame(rig);
+		} else if (is_board && taken && depth->every_s > 0) {
+			wait_ns(incise_rig_clock(rig), (int64_t)(depth->every_s * 1e9));
+			drop_old_frame(rig);
 		}
 		next_frame(rig, &frame);
-		snprintf(name, sizeof(name), "%d", taken + 1);
-		/* On a terminal ask again for a picture of no use. */
-		if (handle(context, &frame, name) || !source->guided || ++tries > 100)
+		calibrate_words(name, "%d", taken + 1);
+		/* On a terminal ask again for a frame of no use. */
+		if (handle(depth, &frame, name) || !depth->guided || ++tries > 100)
 			taken++;
-		cli_progress("%d of %d frames", taken, pictures);
+		cli_progress("%d of %d frames", taken, frames);
 	}
 	cli_progress_end();
 	incise_rig_close(rig);
 }
 
-static void for_each_picture(struct depth_source *source, int pictures,
-			     const char *prompt, handle_picture *handle, void *context)
+static void handle_frames(struct depth *depth, int frames, const char *prompt,
+			  handle_frame *handle)
 {
-	if (!source->n_paths) {
-		from_camera(source, pictures, prompt, handle, context);
+	if (!depth->n_paths) {
+		take_frames(depth, depth->pictures ? depth->pictures : frames, prompt,
+			    handle);
 		return;
 	}
-	snprintf(source->device, sizeof(source->device), "pictures");
-	for (int i = 0; i < source->n_paths; i++) {
+	calibrate_words(depth->common.record.device, "pictures");
+	for (int i = 0; i < depth->n_paths; i++) {
 		struct incise_camera_frame frame;
 
-		if (cli_stop)
-			cli_fail("stopped; the previous calibration stays active");
-		image_read(source->path[i], &frame);
-		handle(context, &frame, source->path[i]);
+		calibrate_check_stop();
+		image_read(depth->path[i], &frame);
+		handle(depth, &frame, depth->path[i]);
 		free((void *)frame.data);
 	}
 }
@@ -126,7 +116,8 @@ static void for_each_picture(struct depth_source *source, int pictures,
 
 #define AIR_MM 0.5 /* beyond it the blade is surely above or below the surface */
 #define VISION_PX 0.03
-#define LENGTH_PICTURES 50
+#define U_CLICKS_PX 0.7 /* two ends, half a pixel each */
+#define LENGTH_FRAMES 50
 
 bool depth_is_recording(const char *path)
 {
@@ -141,26 +132,38 @@ bool depth_is_csv(const char *path)
 	return !strcmp(path, "-") || cli_ends_with(path, ".csv");
 }
 
-void depth_lengths_add(struct depth_lengths *l, double px, double mm, const char *name)
+static void add_length(struct depth_lengths *l, double px, double mm, const char *name)
 {
-	if (l->n == l->capacity) {
-		l->capacity = l->capacity ? 2 * l->capacity : 64;
-		l->px = cli_resize(l->px, l->capacity, sizeof(*l->px));
-		l->mm = cli_resize(l->mm, l->capacity, sizeof(*l->mm));
-		l->name = cli_resize(l->name, l->capacity, sizeof(*l->name));
-	}
+	l->px = cli_grow(l->px, l->n, sizeof(*l->px));
+	l->mm = cli_grow(l->mm, l->n, sizeof(*l->mm));
+	l->name = cli_grow(l->name, l->n, sizeof(*l->name));
 	l->px[l->n] = px;
 	l->mm[l->n] = mm;
 	l->name[l->n++] = cli_text("%s", name);
 }
 
-void depth_lengths_read(struct depth_lengths *lengths, const char *path, bool line)
+static void add_given_lengths(struct depth *depth)
+{
+	char *items[DEPTH_FILES_MAX], name[30];
+	int n = cli_list("pixels", (char *)depth->pixels, items, DEPTH_FILES_MAX);
+
+	for (int i = 0; i < n; i++) {
+		calibrate_words(name, "--pixels %d", i + 1);
+		add_length(&depth->lengths, cli_number("pixels", items[i], 1e-3, 1e5),
+			   NAN, name);
+	}
+	depth->lengths.vision_px = U_CLICKS_PX;
+	calibrate_words(depth->common.record.device, "given");
+}
+
+static void read_lengths(struct depth_lengths *lengths, const char *path, bool line)
 {
 	static const char *const columns[] = {"length_px", "depth_mm"};
 	struct incise_error err = {0};
 	struct incise_dataset *data;
 	char name[40];
 
+	lengths->vision_px = U_CLICKS_PX;
 	file_expect(path, FILE_TABLE);
 	data = cli_require(incise_dataset_read(path, columns, line ? 2 : 1, NULL, &err),
 			   &err);
@@ -170,12 +173,12 @@ void depth_lengths_read(struct depth_lengths *lengths, const char *path, bool li
 		const double *row = incise_dataset_row(data, i);
 
 		snprintf(name, sizeof(name), "row %zu", i + 1);
-		depth_lengths_add(lengths, row[0], line ? row[1] : NAN, name);
+		add_length(lengths, row[0], line ? row[1] : NAN, name);
 	}
 	incise_dataset_free(data);
 }
 
-void depth_lengths_recording(struct depth_lengths *lengths, const char *path, bool line)
+static void read_recording(struct depth_lengths *lengths, const char *path, bool line)
 {
 	struct incise_recording_length *rows;
 	struct incise_error err = {0};
@@ -195,7 +198,7 @@ void depth_lengths_recording(struct depth_lengths *lengths, const char *path, bo
 		if (line ? rows[i].depth_mm < AIR_MM : rows[i].depth_mm > -AIR_MM)
 			continue;
 		snprintf(name, sizeof(name), "picture %d", i);
-		depth_lengths_add(lengths, rows[i].length_px, rows[i].depth_mm, name);
+		add_length(lengths, rows[i].length_px, rows[i].depth_mm, name);
 	}
 	if (!lengths->n)
 		cli_fail("%s: no frame shows the blade in the %s; record one that does",
@@ -204,112 +207,93 @@ void depth_lengths_recording(struct depth_lengths *lengths, const char *path, bo
 	incise_recording_close(recording);
 }
 
-struct measuring {
-	struct depth_lengths *lengths;
-	struct depth_source *source;
-	struct incise_vision *vision;
-};
-
-static void learn(struct depth_source *source, const struct incise_camera_frame *frame)
+static void learn_colour(struct depth *depth, const struct incise_camera_frame *frame)
 {
 	struct incise_vision_box box = {.width = 1, .height = 1};
 	struct incise_error err = {0};
 	char rest;
 
-	if (sscanf(source->pick, "%d,%d%c", &box.x, &box.y, &rest) != 2)
+	if (sscanf(depth->pick, "%d,%d%c", &box.x, &box.y, &rest) != 2)
 		cli_usage("--pick: expected a pixel of the handle, X,Y, found '%s'",
-			  source->pick);
-	if (incise_vision_learn(frame, &box, &source->setup, &err))
+			  depth->pick);
+	if (incise_vision_learn(frame, &box, &depth->setup, &err))
 		cli_fail_with(&err);
-	source->found_setup = true;
+	depth->found_setup = true;
 }
 
-static bool measure(void *context, const struct incise_camera_frame *frame,
-		    const char *name)
+static bool measure_length(struct depth *depth, const struct incise_camera_frame *frame,
+			   const char *name)
 {
-	struct measuring *m = context;
 	struct incise_vision_result result;
 	struct incise_error err = {0};
 	int rc;
 
-	if (!m->vision) {
-		if (m->source->pick)
-			learn(m->source, frame);
-		m->vision = cli_require(incise_vision_new(&m->source->setup, &err), &err);
+	if (!depth->vision) {
+		if (depth->pick)
+			learn_colour(depth, frame);
+		depth->vision = cli_require(incise_vision_new(&depth->setup, &err), &err);
 	}
-	rc = incise_vision_measure(m->vision, frame, &result);
+	rc = incise_vision_measure(depth->vision, frame, &result);
 	if (rc)
 		cli_fail("image %s: %s", name, strerror(-rc));
 	if (!result.found) {
 		cli_warn("image %s: no scalpel: %s", name, result.why);
 		return false;
 	}
-	depth_lengths_add(m->lengths, result.length_px, NAN, name);
+	add_length(&depth->lengths, result.length_px, NAN, name);
 	return true;
 }
 
 /* The handle as of rig.conf, without the lengths, which are measured. */
-static void find_setup(struct depth_source *source)
+static void find_setup(struct depth *depth)
 {
 	struct incise_rig *rig;
 
-	if (source->n_paths && !source->rig && !source->pick)
+	if (depth->n_paths && !depth->common.rig && !depth->pick)
 		cli_usage("missing --pick X,Y (a pixel of the handle, for its colour), "
 			  "or --rig");
-	if (source->n_paths && !source->rig)
+	if (depth->n_paths && !depth->common.rig)
 		return;
-	rig = cli_open_rig(source->rig, 0);
-	if (incise_rig_vision(rig, &source->setup)) {
-		if (!source->pick)
+	rig = cli_open_rig(depth->common.rig, 0);
+	if (incise_rig_vision(rig, &depth->setup)) {
+		if (!depth->pick)
 			cli_fail("%s: it has no group vision; give --pick X,Y, a pixel "
 				 "of the handle",
 				 incise_rig_spec(rig));
 	} else {
-		source->found_setup = true;
+		depth->found_setup = true;
 	}
-	source->setup.full_px = source->setup.depth_mm_px = 0;
+	depth->setup.full_px = depth->setup.depth_mm_px = 0;
 	incise_rig_close(rig);
 }
 
-void depth_lengths_measure(struct depth_lengths *lengths, struct depth_source *source)
+static void measure_lengths(struct depth *depth)
 {
-	struct measuring m = {.lengths = lengths, .source = source};
-
-	find_setup(source);
-	source->every_s = 0;
-	lengths->vision_px = VISION_PX;
-	for_each_picture(
-		source, source->pictures ? source->pictures : LENGTH_PICTURES,
+	find_setup(depth);
+	depth->lengths.vision_px = VISION_PX;
+	handle_frames(
+		depth, LENGTH_FRAMES,
 		"Hold the scalpel where it cuts, with all of its handle in the frame",
-		measure, &m);
-	incise_vision_free(m.vision);
-	if (!lengths->n)
+		measure_length);
+	incise_vision_free(depth->vision);
+	if (!depth->lengths.n)
 		cli_fail("no scalpel was found in any image; give --pick X,Y, a pixel "
 			 "of its handle, to learn its colour");
 }
 
-void depth_lengths_write(const struct depth_lengths *lengths, const char *path, bool line)
+static void write_lengths(const struct depth_lengths *lengths, bool line, FILE *out)
 {
-	struct incise_outfile *file;
-	FILE *out = whole_file_begin(path, &file);
-
 	fprintf(out, line ? "depth_mm,length_px\n" : "length_px\n");
 	for (int i = 0; i < lengths->n; i++) {
 		if (line)
 			fprintf(out, "%.6f,", lengths->mm[i]);
 		fprintf(out, "%.5f\n", lengths->px[i]);
 	}
-	whole_file_end(file);
 }
 
 /* --- corners -------------------------------------------------------------------------- */
 
-#define CORNER_PICTURES 8
-
-struct finding {
-	struct depth_corners *corners;
-	bool again; /* a person can show the board again */
-};
+#define CORNER_FRAMES 8
 
 static double *add_view(struct depth_corners *c, const char *name)
 {
@@ -323,10 +307,10 @@ static double *add_view(struct depth_corners *c, const char *name)
 	return c->px + of_view * c->n++;
 }
 
-static bool find(void *context, const struct incise_camera_frame *frame, const char *name)
+static bool find_corners(struct depth *depth, const struct incise_camera_frame *frame,
+			 const char *name)
 {
-	struct finding *finding = context;
-	struct depth_corners *c = finding->corners;
+	struct depth_corners *c = &depth->corners;
 	size_t size = (size_t)2 * c->columns * c->rows * sizeof(*c->px);
 	struct incise_error err = {0};
 	double *px = cli_alloc(1, size);
@@ -336,7 +320,7 @@ static bool find(void *context, const struct incise_camera_frame *frame, const c
 	if (rc && rc != -ENODATA)
 		cli_fail_with(&err);
 	/* The first one must show the plane. */
-	if (rc && !c->n && !finding->again)
+	if (rc && !c->n && !depth->guided)
 		cli_fail("image %s, which must show the cutting plane: %s", name,
 			 err.text);
 	if (rc)
@@ -353,18 +337,7 @@ static bool find(void *context, const struct incise_camera_frame *frame, const c
 	return !rc;
 }
 
-void depth_corners_find(struct depth_corners *corners, struct depth_source *source)
-{
-	struct finding finding = {corners, source->guided};
-
-	for_each_picture(
-		source, source->pictures ? source->pictures : CORNER_PICTURES,
-		"View %d: hold the board in the cutting plane first, then tilted by 20 "
-		"to 45 degrees, each time in another direction",
-		find, &finding);
-}
-
-void depth_corners_read(struct depth_corners *c, const char *path)
+static void read_corners(struct depth_corners *c, const char *path)
 {
 	static const char *const names[] = {"view", "row",	"column",   "x_px",
 					    "y_px", "width_px", "height_px"};
@@ -407,15 +380,79 @@ void depth_corners_read(struct depth_corners *c, const char *path)
 	incise_dataset_free(data);
 }
 
-void depth_corners_write(const struct depth_corners *c, const char *path)
+static void write_corners(const struct depth_corners *c, FILE *out)
 {
-	struct incise_outfile *file;
-	FILE *out = whole_file_begin(path, &file);
-
 	fprintf(out, "view,row,column,x_px,y_px,width_px,height_px\n");
 	for (int i = 0; i < c->n * c->columns * c->rows; i++)
 		fprintf(out, "%d,%d,%d,%.5f,%.5f,%d,%d\n", i / c->columns / c->rows + 1,
 			i / c->columns % c->rows + 1, i % c->columns + 1, c->px[2 * i],
 			c->px[2 * i + 1], c->width, c->height);
-	whole_file_end(file);
+}
+
+/* --- the sources ---------------------------------------------------------------------- */
+
+static void use_frames(struct depth *depth)
+{
+	if (depth->method == DEPTH_LINE)
+		cli_usage("line: missing --from pairs.csv or --from NAME.rec");
+	if (depth->method == DEPTH_TWO_POINT)
+		measure_lengths(depth);
+	else
+		handle_frames(
+			depth, CORNER_FRAMES,
+			"View %d: hold the board in the cutting plane first, then tilted "
+			"by 20 to 45 degrees, each time in another direction",
+			find_corners);
+}
+
+void depth_read(void *run, const char *path)
+{
+	struct depth *depth = run;
+	bool line = depth->method == DEPTH_LINE, board = depth->method == DEPTH_BOARD;
+	bool single = depth->n_paths == 1, csv = single && depth_is_csv(path);
+
+	if (!csv || !strcmp(path, "-"))
+		depth->common.raw = depth->common.keep;
+	if (csv) {
+		if (board)
+			read_corners(&depth->corners, path);
+		else
+			read_lengths(&depth->lengths, path, line);
+		calibrate_words(depth->common.record.device, "CSV");
+	} else if (single && depth_is_recording(path)) {
+		if (board)
+			cli_usage("board: a recording does not show a board; give images "
+				  "or a CSV of corners with --from");
+		read_recording(&depth->lengths, path, line);
+		calibrate_words(depth->common.record.device, "recording");
+	} else {
+		use_frames(depth);
+	}
+}
+
+void depth_measure(void *run)
+{
+	struct depth *depth = run;
+	bool board = depth->method == DEPTH_BOARD;
+
+	if (depth->pixels) {
+		add_given_lengths(depth);
+		return;
+	}
+	if (depth->method != DEPTH_LINE && !depth->guided &&
+	    (!depth->pictures || (board && !(depth->every_s > 0))))
+		cli_usage("missing --from, or --images%s of the camera (needed without "
+			  "a terminal)",
+			  board ? " and --every" : "");
+	use_frames(depth);
+}
+
+void depth_write(const void *run, FILE *out)
+{
+	const struct depth *depth = run;
+
+	if (depth->method == DEPTH_BOARD)
+		write_corners(&depth->corners, out);
+	else
+		write_lengths(&depth->lengths, depth->method == DEPTH_LINE, out);
 }

@@ -6,21 +6,9 @@
 #ifndef INCISE_CALIBRATE_STEPPER_TOOL_H
 #define INCISE_CALIBRATE_STEPPER_TOOL_H
 
-#include <stdbool.h>
 #include <incise/calibrate_stepper.h>
-#include <incise/calibration.h>
 #include "../stepper/drive.h"
-
-struct stepper_series {
-	struct incise_calibrate_stepper_point *points;
-	enum incise_calibrate_stepper_state *states;
-	double *t_s; /* NAN: not known */
-	int n, capacity;
-	double step_mm; /* NAN: not known */
-};
-
-void stepper_series_add(struct stepper_series *series, double t_s, double position_mm,
-			double force_N);
+#include "calibrate.h"
 
 /* The largest rate. */
 struct stepper_rate {
@@ -35,37 +23,37 @@ struct stepper_rate {
 	double off_mm; /* of the count in the end: lost and not homed */
 };
 
+/* The motor against the force channel. */
 struct stepper_live {
 	struct stepper_drive drive;
 	struct incise_force *force;
 	struct incise_force_info channel;
 	struct incise_calibration calibration;
 	double zero_mV, low_N, high_N, code_N; /* of the channel */
-	double low_mm, high_mm, max_N;	       /* of the strokes */
+	double low_mm, high_mm, max_N; /* of the strokes; NAN: that fit the channel */
+	int strokes;		       /* 0: not given */
 	double creep_mm_s;
 	double off_mm;	 /* count less position of the nut */
 	double sum_N;	 /* of samples since the last reading, */
 	int samples;	 /* and their number */
 	bool retreating; /* from too much force */
 	int64_t begin_ns;
-	int strokes;
 };
 
-void stepper_live_open(struct stepper_live *live, const char *rig);
+/* Open it, check the strokes, ask on a terminal, power it, find its home, go to low_mm. */
+void stepper_begin(struct stepper_live *live, const struct calibrate *calibrate);
 
-/* Check low_mm, high_mm and max_N; NAN becomes the value that fits the channel. */
-void stepper_live_plan(struct stepper_live *live);
+/* A point of a stroke. */
+typedef void stepper_take(void *context, double t_s, double position_mm, double force_N);
 
-/* Ask on a terminal, power it, find its home, go to low_mm. */
-void stepper_live_start(struct stepper_live *live);
-void stepper_live_strokes(struct stepper_live *live, struct stepper_series *series);
-
-/* Move slowly to a position. */
-void stepper_live_creep(struct stepper_live *live, double to_mm);
+void stepper_strokes(struct stepper_live *live, stepper_take *take, void *context);
 
 /* Search the largest step rate that loses no step. */
-void stepper_live_rate(struct stepper_live *live,
+void stepper_find_rate(struct stepper_live *live,
 		       const struct incise_calibrate_stepper *fit,
 		       struct stepper_rate *rate);
+
+/* Move slowly to a position. */
+void stepper_creep(struct stepper_live *live, double to_mm);
 
 #endif

@@ -12,7 +12,6 @@
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
-#include "../cli/cli.h"
 #include "stepper.h"
 
 #define POINTS 70     /* of a stroke */
@@ -24,7 +23,7 @@
 #define SHARE_FORCE 0.8	  /* of what the channel reads, that strokes go up to */
 #define SHARE_RANGE 0.7	  /* and that is expected at the end of the range */
 
-void stepper_live_open(struct stepper_live *live, const char *rig)
+static void open_drive(struct stepper_live *live, const char *rig)
 {
 	const struct incise_stepper_info *info = &live->drive.info;
 
@@ -81,7 +80,7 @@ static void read_force(struct stepper_live *live)
 	live->retreating = true;
 	cli_progress_end();
 	cli_warn("%.2f N is more than %.2f N: going back", sum / all, live->max_N);
-	stepper_live_creep(live, live->low_mm);
+	stepper_creep(live, live->low_mm);
 	stepper_drive_rest(&live->drive);
 	stepper_drive_fail(&live->drive,
 			   "the force exceeded %.2f N; give a smaller --range, or a "
@@ -89,7 +88,7 @@ static void read_force(struct stepper_live *live)
 			   live->max_N);
 }
 
-static void watch(struct stepper_live *live)
+static void watch_force(struct stepper_live *live)
 {
 	if (cli_stop) {
 		stepper_drive_rest(&live->drive);
@@ -101,7 +100,7 @@ static void watch(struct stepper_live *live)
 	read_force(live);
 }
 
-void stepper_live_creep(struct stepper_live *live, double to_mm)
+void stepper_creep(struct stepper_live *live, double to_mm)
 {
 	struct stepper_drive *drive = &live->drive;
 	const double pass_s = (double)drive->period_ns / INCISE_NS_PER_S;
@@ -121,7 +120,7 @@ void stepper_live_creep(struct stepper_live *live, double to_mm)
 
 		at_mm += copysign(fmin(fabs(left), each_mm), left);
 		stepper_drive_to(drive, at_mm);
-		watch(live);
+		watch_force(live);
 		if (at_mm != to_mm)
 			continue;
 		if (stepper_drive_rests(drive) &&
@@ -137,7 +136,7 @@ void stepper_live_creep(struct stepper_live *live, double to_mm)
 		drive->info.name, drive->status.position_mm, to_mm);
 }
 
-static double mean_force(struct stepper_live *live, double seconds)
+static double read_mean_force(struct stepper_live *live, double seconds)
 {
 	struct stepper_drive *drive = &live->drive;
 	const double here_mm = drive->status.position_mm;
@@ -149,7 +148,7 @@ static double mean_force(struct stepper_live *live, double seconds)
 			   INCISE_NS_PER_S;
 
 		if (!settled && s >= SETTLE_S + drive->info.settle_s) {
-			watch(live);
+			watch_force(live);
 			live->sum_N = live->samples = 0;
 			begin = incise_clock_now(drive->clock);
 			settled = true;
@@ -161,11 +160,11 @@ static double mean_force(struct stepper_live *live, double seconds)
 					   "cable",
 					   live->channel.name);
 		stepper_drive_to(drive, here_mm);
-		watch(live);
+		watch_force(live);
 	}
 }
 
-void stepper_live_plan(struct stepper_live *live)
+static void plan_strokes(struct stepper_live *live)
 {
 	const struct incise_stepper_info *info = &live->drive.info;
 	const double top = (1 << live->channel.bits) - 1;
@@ -215,7 +214,7 @@ void stepper_live_plan(struct stepper_live *live)
 }
 
 /* On a terminal a person must confirm that nothing is in the way. */
-static void confirm(struct stepper_live *live)
+static void confirm_strokes(struct stepper_live *live)
 {
 	int c;
 
@@ -236,12 +235,12 @@ static void confirm(struct stepper_live *live)
 					   "not confirmed; nothing was moved");
 }
 
-void stepper_live_start(struct stepper_live *live)
+static void start_strokes(struct stepper_live *live)
 {
 	struct stepper_drive *drive = &live->drive;
 	struct incise_error err = {0};
 
-	confirm(live);
+	confirm_strokes(live);
 	stepper_drive_power(drive);
 	if (drive->info.can_home) {
 		cli_progress("home: Ctrl-C stops");
@@ -250,33 +249,22 @@ void stepper_live_start(struct stepper_live *live)
 		stepper_drive_look(drive);
 	}
 	live->begin_ns = incise_clock_now(drive->clock);
-	stepper_live_creep(live, live->low_mm);
+	stepper_creep(live, live->low_mm);
 }
 
-void stepper_series_add(struct stepper_series *series, double t_s, double position_mm,
-			double force_N)
+void stepper_begin(struct stepper_live *live, const struct calibrate *calibrate)
 {
-	if (series->n == series->capacity) {
-		series->capacity = series->capacity ? 2 * series->capacity : 512;
-		series->points = cli_resize(series->points, series->capacity,
-					    sizeof(*series->points));
-		series->t_s =
-			cli_resize(series->t_s, series->capacity, sizeof(*series->t_s));
-		series->states = cli_resize(series->states, series->capacity,
-					    sizeof(*series->states));
-	}
-	series->t_s[series->n] = t_s;
-	series->states[series->n] = INCISE_CALIBRATE_STEPPER_USED;
-	series->points[series->n++] =
-		(struct incise_calibrate_stepper_point){position_mm, force_N};
+	live->calibration = calibrate->found;
+	open_drive(live, calibrate->rig);
+	plan_strokes(live);
+	start_strokes(live);
 }
 
-void stepper_live_strokes(struct stepper_live *live, struct stepper_series *series)
+void stepper_strokes(struct stepper_live *live, stepper_take *take, void *context)
 {
 	const double step_mm = live->drive.info.step_mm;
 	const double range_mm = live->high_mm - live->low_mm;
 
-	series->step_mm = step_mm;
 	for (int k = 0; k < 2 * live->strokes; k++)
 		for (int i = k > 0; i < POINTS; i++) {
 			double share = (double)i / (POINTS - 1) * 7 / 4, mm, N;
@@ -284,13 +272,13 @@ void stepper_live_strokes(struct stepper_live *live, struct stepper_series *seri
 			share = share < 1 ? share / 4 : 0.25 + (share - 1);
 			mm = k % 2 ? live->high_mm - share * range_mm
 				   : live->low_mm + share * range_mm;
-			stepper_live_creep(live, round(mm / step_mm) * step_mm);
-			N = mean_force(live, READ_S);
-			stepper_series_add(series,
-					   (double)(incise_clock_now(live->drive.clock) -
-						    live->begin_ns) /
-						   INCISE_NS_PER_S,
-					   live->drive.status.position_mm, N);
+			stepper_creep(live, round(mm / step_mm) * step_mm);
+			N = read_mean_force(live, READ_S);
+			take(context,
+			     (double)(incise_clock_now(live->drive.clock) -
+				      live->begin_ns) /
+				     INCISE_NS_PER_S,
+			     live->drive.status.position_mm, N);
 			if (incise_clock_is_real(live->drive.clock))
 				cli_progress("stroke %d of %d, %s: %9.4f mm %8.4f N, "
 					     "Ctrl-C stops",
@@ -320,15 +308,15 @@ void stepper_live_strokes(struct stepper_live *live, struct stepper_series *seri
 #define RUN 0.6 /* of a stroke for speeding up and slowing down */
 
 /* The force at the middle, approached from below. */
-static double look(struct stepper_live *live)
+static double read_middle(struct stepper_live *live)
 {
-	stepper_live_creep(live, live->low_mm);
-	stepper_live_creep(live, (live->low_mm + live->high_mm) / 2);
-	return mean_force(live, LOOK_S);
+	stepper_creep(live, live->low_mm);
+	stepper_creep(live, (live->low_mm + live->high_mm) / 2);
+	return read_mean_force(live, LOOK_S);
 }
 
 /* One way at a speed; returns the largest speed. */
-static double stroke(struct stepper_live *live, int way, double mm_s)
+static double drive_stroke(struct stepper_live *live, int way, double mm_s)
 {
 	struct stepper_drive *drive = &live->drive;
 	const double a = drive->info.acceleration_mm_s2;
@@ -340,7 +328,7 @@ static double stroke(struct stepper_live *live, int way, double mm_s)
 	double fastest = 0, left_mm;
 	int64_t begin;
 
-	stepper_live_creep(live, way > 0 ? live->low_mm : live->high_mm);
+	stepper_creep(live, way > 0 ? live->low_mm : live->high_mm);
 	begin = incise_clock_now(drive->clock);
 	for (;;) {
 		left_mm = way * (to_mm - drive->status.position_mm);
@@ -349,7 +337,7 @@ static double stroke(struct stepper_live *live, int way, double mm_s)
 			break;
 		stepper_drive_at(drive, way * mm_s);
 		fastest = fmax(fastest, fabs(drive->status.velocity_mm_s));
-		watch(live);
+		watch_force(live);
 		if ((double)(incise_clock_now(drive->clock) - begin) >
 		    most_s * INCISE_NS_PER_S)
 			stepper_drive_fail(
@@ -361,7 +349,7 @@ static double stroke(struct stepper_live *live, int way, double mm_s)
 	do {
 		stepper_drive_at(drive, 0);
 		fastest = fmax(fastest, fabs(drive->status.velocity_mm_s));
-		watch(live);
+		watch_force(live);
 	} while (!stepper_drive_rests(drive) &&
 		 (double)(incise_clock_now(drive->clock) - begin) <
 			 most_s * INCISE_NS_PER_S);
@@ -384,22 +372,22 @@ static void correct_count(struct stepper_live *live, double lost_mm)
 }
 
 /* Loss since the last time, after a stroke this way, mm. */
-static double lost(struct stepper_live *live, int way, double was_N,
-		   const struct incise_calibrate_stepper *fit, double seen_mm)
+static double find_loss(struct stepper_live *live, int way, double was_N,
+			const struct incise_calibrate_stepper *fit, double seen_mm)
 {
 	double at_mm = live->drive.status.position_mm - live->off_mm;
 	double line_N = (way > 0 ? fit->up_N : fit->down_N) + fit->N_mm * at_mm;
-	double far_mm = (line_N - mean_force(live, LOOK_S)) / fit->N_mm, near_mm;
+	double far_mm = (line_N - read_mean_force(live, LOOK_S)) / fit->N_mm, near_mm;
 	bool far = fabs(far_mm) >
 		   fit->dead_mm + fit->rest_mm + seen_mm + 2 * fit->drift_N / fit->N_mm;
 
 	if (far)
 		correct_count(live, far_mm);
-	near_mm = (was_N - look(live)) / fit->N_mm;
+	near_mm = (was_N - read_middle(live)) / fit->N_mm;
 	if (fabs(near_mm) > seen_mm) {
 		correct_count(live, near_mm);
 		/* The correction may have been smaller than the dead travel. */
-		near_mm += (was_N - look(live)) / fit->N_mm;
+		near_mm += (was_N - read_middle(live)) / fit->N_mm;
 	}
 	if (far)
 		return far_mm;
@@ -407,9 +395,9 @@ static double lost(struct stepper_live *live, int way, double was_N,
 }
 
 /* Whether a speed loses steps; sets *mm_s to the speed reached. */
-static bool loses(struct stepper_live *live, double *mm_s, double was_N,
-		  const struct incise_calibrate_stepper *fit, struct stepper_rate *rate,
-		  double *lost_mm)
+static bool try_speed(struct stepper_live *live, double *mm_s, double was_N,
+		      const struct incise_calibrate_stepper *fit,
+		      struct stepper_rate *rate, double *lost_mm)
 {
 	double fastest = 0;
 
@@ -417,9 +405,9 @@ static bool loses(struct stepper_live *live, double *mm_s, double was_N,
 		for (int way = 1; way >= -1; way -= 2) {
 			double off;
 
-			fastest = fmax(fastest, stroke(live, way, *mm_s));
+			fastest = fmax(fastest, drive_stroke(live, way, *mm_s));
 			rate->strokes++;
-			off = lost(live, way, was_N, fit, rate->seen_mm);
+			off = find_loss(live, way, was_N, fit, rate->seen_mm);
 			if (incise_clock_is_real(live->drive.clock))
 				cli_progress("%.0f steps/s: %s, Ctrl-C stops",
 					     fastest / live->drive.info.step_mm,
@@ -434,7 +422,7 @@ static bool loses(struct stepper_live *live, double *mm_s, double was_N,
 	return false;
 }
 
-void stepper_live_rate(struct stepper_live *live,
+void stepper_find_rate(struct stepper_live *live,
 		       const struct incise_calibrate_stepper *fit,
 		       struct stepper_rate *rate)
 {
@@ -443,7 +431,6 @@ void stepper_live_rate(struct stepper_live *live,
 	/* Not slower than it creeps, as then the creeping loses steps as well. */
 	double most, at, kept = live->creep_mm_s, loss = NAN, was_N, lost_mm;
 
-	*rate = (struct stepper_rate){.lost_1_s = NAN};
 	if (incise_stepper_jog(live->drive.stepper, 0) == -EOPNOTSUPP) {
 		rate->why = "it takes positions only, no speeds";
 		return;
@@ -453,11 +440,11 @@ void stepper_live_rate(struct stepper_live *live,
 		fmax(4 * info->step_mm, 5 * M_SQRT2 * fit->residual_sd_N / fit->N_mm);
 	most = fmin(info->velocity_mm_s, sqrt(RUN * range_mm * info->acceleration_mm_s2));
 	rate->limit_1_s = most / info->step_mm;
-	was_N = look(live);
+	was_N = read_middle(live);
 	at = fmin(most, 2 * live->creep_mm_s);
 	while (rate->strokes < STROKES_MAX) {
 		double mm_s = at;
-		bool loses_steps = loses(live, &mm_s, was_N, fit, rate, &lost_mm);
+		bool loses_steps = try_speed(live, &mm_s, was_N, fit, rate, &lost_mm);
 
 		if (loses_steps) {
 			loss = at;
@@ -479,5 +466,5 @@ void stepper_live_rate(struct stepper_live *live,
 	}
 	cli_progress_end();
 	rate->off_mm = live->off_mm;
-	stepper_live_creep(live, live->low_mm);
+	stepper_creep(live, live->low_mm);
 }

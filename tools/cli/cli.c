@@ -691,6 +691,14 @@ void *cli_resize(void *memory, size_t n, size_t size)
 	return memory;
 }
 
+void *cli_grow(void *memory, size_t n, size_t size)
+{
+	/* Full at 64, 128, … */
+	if (n && (n < 64 || n & (n - 1)))
+		return memory;
+	return cli_resize(memory, n ? 2 * n : 64, size);
+}
+
 char *cli_text(const char *fmt, ...)
 {
 	va_list args;

@@ -164,9 +164,12 @@ void cli_written(void);
 
 /*
  * Bad usage if the name of a file to write ends with an extension that is not in the list, for
- * example ".csv .h5 .mcap". "-", a name without a dot, pipes and devices have none.
+ * example ".png .svg .pdf". "-", a name without a dot, pipes and devices have none.
  */
 void cli_extension(const char *option, const char *path, const char *list);
+
+/* Whether it ends with an extension of the list. */
+bool cli_extension_in(const char *path, const char *list);
 
 /* Whether --overwrite was given; and the same as if it was. */
 bool cli_overwrite(void);
@@ -251,6 +254,9 @@ const char *cli_folder(void);
 /* Memory that is zeroed, memory that grows, formatted text: free(3), or fail the program. */
 void *cli_alloc(size_t n, size_t size);
 void *cli_resize(void *memory, size_t n, size_t size);
+
+/* An array of n elements, which has grown by this alone, with capacity for one more. */
+void *cli_grow(void *memory, size_t n, size_t size);
 char *cli_text(const char *fmt, ...) INCISE_PRINTF(1, 2);
 
 /* "1 cut", "3 cuts"; it lasts for seven more calls. */

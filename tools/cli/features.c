@@ -9,6 +9,7 @@
 #include <string.h>
 #include <incise/backend.h>
 #include <incise/error.h>
+#include "../../lib/record/export/formats.h"
 #include "cli.h"
 #include "features.h"
 
@@ -75,14 +76,22 @@ void features_each(void (*found)(void *context, const struct feature *feature),
 
 /* --- a line for each kind --- */
 
+#define FORMAT_NAME(id, ...) ", " #id
+#define NO_FORMAT(...)
+
 static const struct {
 	const char *kind, *label, *built_in;
 } kinds[] = {
-	{"tracker", "trackers", ""},	   {"force", "force", ""},
-	{"camera", "cameras", ""},	   {"stepper", "steppers", "kernel"},
-	{"vision", "vision", ""},	   {"board", "chessboard", ""},
-	{"frames", "frames", ""},	   {"film", "video", ""},
-	{"export", "export", "csv, mcap"}, {"ranks", "parallel", ""},
+	{"tracker", "trackers", ""},
+	{"force", "force", ""},
+	{"camera", "cameras", ""},
+	{"stepper", "steppers", "kernel"},
+	{"vision", "vision", ""},
+	{"board", "chessboard", ""},
+	{"frames", "frames", ""},
+	{"film", "video", ""},
+	{"export", "export", &INCISE_FORMATS(FORMAT_NAME, NO_FORMAT)[2]},
+	{"ranks", "parallel", ""},
 };
 
 #define KINDS (sizeof(kinds) / sizeof(*kinds))

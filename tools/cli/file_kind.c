@@ -14,6 +14,7 @@
 #include <incise/calibration.h>
 #include <incise/rig.h>
 #include <incise/scene.h>
+#include "../../lib/record/export/formats.h"
 #include "cli.h"
 #include "file_kind.h"
 
@@ -46,7 +47,7 @@ static const struct {
 	{"an image", NULL,
 	 "'incise calibrate depth two-point --from %1$s' measures in images"},
 	{"a video", NULL, "give the recording that it belongs to"},
-	{"an export (HDF5 or MCAP)", NULL, "give the recording that it was made from"},
+	{"an export of a recording", NULL, "give the recording that it was made from"},
 	{"a database", NULL, "give the folder of the recording that it is in"},
 	{"a table separated by semicolons", ".csv",
 	 "convert it, and decimal commas with it: sed 's/,/./g; s/;/,/g' %1$s > NEW.csv"},
@@ -204,9 +205,8 @@ static enum file_kind kind_of_bytes(const char *head, size_t n)
 		{FILE_STATE, "INCSTATE"},
 		{FILE_FACTOR, "incise factor "},
 		{FILE_VIDEO, "\x1a\x45\xdf\xa3"},
-		{FILE_EXPORT, "\x89HDF\r\n\x1a\n"},
-		{FILE_EXPORT, "\x89MCAP0\r\n"},
-		{FILE_IMAGE, "\x89PNG"},
+#define EXPORT(id, name, extensions, magic, ...) {FILE_EXPORT, magic},
+		INCISE_FORMATS(EXPORT, EXPORT){FILE_IMAGE, "\x89PNG"},
 		{FILE_IMAGE, "\xff\xd8\xff"},
 		{FILE_IMAGE, "P5\n"},
 		{FILE_IMAGE, "P6\n"},
@@ -216,7 +216,7 @@ static enum file_kind kind_of_bytes(const char *head, size_t n)
 	for (size_t i = 0; i < sizeof(magics) / sizeof(*magics); i++) {
 		size_t length = strlen(magics[i].magic);
 
-		if (n >= length && !memcmp(head, magics[i].magic, length))
+		if (length && n >= length && !memcmp(head, magics[i].magic, length))
 			return magics[i].kind;
 	}
 	if (memchr(head, 0, n))

@@ -23,7 +23,7 @@ enum file_kind {
 	FILE_DEVIATION = 1 << 11,  /* .sd */
 	FILE_IMAGE = 1 << 12,	   /* PNG, JPEG, PGM or PPM */
 	FILE_VIDEO = 1 << 13,	   /* Matroska */
-	FILE_EXPORT = 1 << 14,	   /* HDF5 or MCAP */
+	FILE_EXPORT = 1 << 14,	   /* of a recording; one in CSV is a table */
 	FILE_DATABASE = 1 << 15,   /* SQLite */
 	FILE_SEMICOLONS = 1 << 16, /* a table that is no CSV: its separator */
 	FILE_TABS = 1 << 17,

@@ -278,8 +278,8 @@ void model_plot_contours(FILE *script, const struct model_surface *surface,
 {
 	struct contours contours = contours_of(surface);
 
-	fprintf(script, "set title '%s%sa contour at each tick of the colours'\n", title,
-		*title ? "; " : "");
+	fprintf(script, "set title '%s%scontours every %g'\n", title, *title ? "; " : "",
+		contours.step);
 	put_axis(script, "x", &surface->input[0]);
 	put_axis(script, "y", &surface->input[1]);
 	put_axis(script, "cb", &surface->output);

@@ -210,12 +210,12 @@ void cli_output_within(const char *path)
 
 /* --- extensions ------------------------------------------------------------------------- */
 
-/* ".csv .h5 .mcap" as ".csv, .h5 or .mcap": free(3) */
+/* ".png .svg .pdf" as ".png, .svg or .pdf": free(3) */
 static char *alternatives(const char *list)
 {
 	char *text = cli_text("%s", ""), *longer;
 
-	while (*list) {
+	for (list += strspn(list, " "); *list;) {
 		int n = (int)strcspn(list, " ");
 		bool last = !list[n], first = !*text;
 
@@ -231,11 +231,21 @@ static char *alternatives(const char *list)
 	return text;
 }
 
-static bool in_list(const char *extension, const char *list)
+/* The extension of a path with its dot; NULL: a name without one. */
+static const char *extension_of(const char *path)
 {
-	size_t length = strlen(extension);
+	const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path;
+	const char *dot = strrchr(name, '.');
 
-	for (size_t n; *list; list += n + strspn(list + n, " ")) {
+	return dot == name ? NULL : dot;
+}
+
+bool cli_extension_in(const char *path, const char *list)
+{
+	const char *extension = extension_of(path);
+	size_t length = extension ? strlen(extension) : 0;
+
+	for (size_t n; extension && *(list += strspn(list, " ")); list += n) {
 		n = strcspn(list, " ");
 		if (n == length && !strncmp(list, extension, n))
 			return true;
@@ -245,15 +255,13 @@ static bool in_list(const char *extension, const char *list)
 
 void cli_extension(const char *option, const char *path, const char *list)
 {
-	const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path;
-	const char *dot = strrchr(name, '.');
 	struct stat st;
 
-	if (!strcmp(path, "-") || !dot || dot == name || in_list(dot, list) ||
+	if (!strcmp(path, "-") || !extension_of(path) || cli_extension_in(path, list) ||
 	    (!stat(path, &st) && !S_ISREG(st.st_mode)))
 		return;
-	cli_usage("--%s: %s: unknown extension %s; give %s", option, path, dot,
-		  alternatives(list));
+	cli_usage("--%s: %s: unknown extension %s; give %s", option, path,
+		  extension_of(path), alternatives(list));
 }
 
 /* --- files written ---------------------------------------------------------------------- */

@@ -38,10 +38,6 @@ int recording_altered(const char *path, bool samples, struct incise_error *err)
 				 proof.altered);
 		rc = 1;
 	}
-	if (rc == -ENODATA) {
-		*err = (struct incise_error){0};
-		rc = 0;
-	}
 	incise_proof_free(&proof);
 	return rc;
 }

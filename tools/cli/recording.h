@@ -22,14 +22,14 @@ struct incise_recording *recording_open(const char *path);
 
 /*
  * Compare a recording with its ledger: all @samples, or the tables alone where its summary is enough. Returns
- * 0, also for one from before there was a ledger; 1 and the first difference; -errno and the reason.
+ * 0; 1 and the first difference; -errno and the reason.
  */
 int recording_altered(const char *path, bool samples, struct incise_error *err);
 
 /*
  * Whether the rows of a recording are those that were recorded, by its ledger. If not, says what
  * is wrong first: as a warning with @damaged, else as an error in @err, for a caller that fails
- * the program with it. A recording from before there was a ledger is taken as it is.
+ * the program with it.
  */
 bool recording_intact(const char *path, bool samples, bool damaged,
 		      struct incise_error *err);

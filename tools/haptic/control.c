@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * The control socket of a loop; see control.h. SOCK_SEQPACKET: a request is a packet, so that there
- * is none that is cut or joined, and none to wait for the rest of.
+ * The control socket of a loop; see control.h. SOCK_SEQPACKET: a request is a packet, so that no
+ * request is cut or joined, and the loop waits for no rest.
  */
 #include <errno.h>
 #include <fcntl.h>
@@ -61,7 +61,7 @@ static int set_mode(const char *path, mode_t mode, struct stat *made)
 	return rc;
 }
 
-/* Under a name of its own first: a client finds a socket that listens, or none. */
+/* Under a name of its own first: a client finds a socket that listens, or no socket. */
 static int listen_at(struct control *control)
 {
 	struct sockaddr_un address = {.sun_family = AF_UNIX};
@@ -197,7 +197,7 @@ void control_serve(struct control *control, const struct pollfd *polled,
 				  char reply[CONTROL_LINE]),
 		   void *context)
 {
-	/* From the last on: one that is dropped moves only those behind it. */
+	/* From the last on: a dropped client moves only the clients behind it. */
 	for (int i = control->clients - 1; i >= 0; i--)
 		if (polled[1 + i].revents &&
 		    !serve_client(control->client[i], answer, context))

@@ -13,7 +13,7 @@
 #include <incise/error.h>
 
 #define CONTROL_LINE 256  /* bytes of a request or a reply, with its 0 */
-#define CONTROL_CLIENTS 8 /* at once; one more takes the place of the oldest */
+#define CONTROL_CLIENTS 8 /* at once; a further one takes the place of the oldest */
 #define CONTROL_POLLED (1 + CONTROL_CLIENTS)
 
 struct control;
@@ -22,18 +22,18 @@ struct control;
 char *control_path(const char *page);
 
 /*
- * Listen beside the page, which this process must have made: a socket that is there is of a loop
+ * Listen beside the page, which this process must have made: an existing socket belongs to a loop
  * that has ended, and is replaced. The owner may connect, and in a folder that gives its group to
- * what is made there (set-group-ID, as /run/incise) the group. NULL with errno and @err.
+ * new files (set-group-ID, as /run/incise) the group. NULL with errno and @err.
  */
 struct control *control_new(const char *page, struct incise_error *err);
 
-/* Fill in what is to be polled, CONTROL_POLLED at most. Returns how many. */
+/* Fill in the descriptors to poll, CONTROL_POLLED at most. Returns how many. */
 int control_polled(const struct control *control, struct pollfd *polled);
 
 /*
- * Answer what has come. Never waits: a client that does not take its answer is dropped. A request
- * is printable; the answer is too, and without the end of its line.
+ * Answer the requests that have come. Never waits: a client that does not take its answer is
+ * dropped. A request is printable; the answer is too, and without the end of its line.
  */
 void control_serve(struct control *control, const struct pollfd *polled,
 		   void (*answer)(void *context, const char *request,

@@ -23,7 +23,7 @@
 /* Homing takes its time; a device that hangs does not take longer. */
 #define START_MOST_S 60
 
-/* Of who asks its tool: less than the watchdog of who watches. */
+/* Timeout of a question for its tool: less than the watchdog of the watcher. */
 #define ANSWER_MS 300
 
 /* Fade, and the way back of the nuts; then it is killed, and the module lets the force fade. */
@@ -37,7 +37,7 @@ char *feeder_page(const char *loop_page)
 	return cli_text("%.*s.feed.state", (int)n, loop_page);
 }
 
-/* Whether a feeder lives that has that page, and runs; *pid is its own, *of its scene and rig. */
+/* Whether a feeder with that page lives and runs; *pid is its own, *of its scene and rig. */
 static bool feeder_lives(const char *page, pid_t *pid, char **of)
 {
 	struct incise_error err = {0};
@@ -124,7 +124,7 @@ int feeder_begin(struct feeder *feeder, char **argv, struct incise_error *err)
 		free(of);
 		return 0;
 	}
-	/* One of a service would end with it. */
+	/* A feeder of a service would end with it. */
 	if (getenv("NOTIFY_SOCKET"))
 		return incise_error_set(err, ESRCH,
 					"a service does not start incise feed; start "
@@ -164,7 +164,7 @@ void feeder_end(struct feeder *feeder)
 		return;
 	feeder->own = false;
 	kill(feeder->pid, SIGTERM);
-	/* One that was stopped ends as well. */
+	/* A stopped feeder ends as well. */
 	kill(feeder->pid, SIGCONT);
 	while (waitpid(feeder->pid, NULL, WNOHANG) == 0) {
 		if (!looks--)

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * The feeder of a scene that the kernel renders: incise feed, a process of its own, which outlives the
- * one that watches.
+ * The feeder of a scene that the kernel renders: incise feed, a process of its own, which outlives its
+ * watcher.
  *
  *   incise feed ── NAME.feed.state, NAME.feed.control ──▶ incise haptic --in-kernel
  */
@@ -19,13 +19,12 @@ struct feeder {
 	char *page; /* of its state; free(3) */
 };
 
-/* The path of a feeder's page, for that of the loop which watches: free(3). */
+/* The path of a feeder's page, for the page of the loop which watches: free(3). */
 char *feeder_page(const char *loop_page);
 
 /*
- * Take the feeder that lives, or start one with these arguments: argv[0] is set to the program, which
- * is beside this one. Returns when it feeds. 0; -ECHILD (it ended: it has said why), -EINTR (a
- * signal).
+ * Take the living feeder, or start one with these arguments: argv[0] is set to the program, which is
+ * beside this one. Returns when it feeds. 0; -ECHILD (it ended: it has said why), -EINTR (a signal).
  */
 int feeder_begin(struct feeder *feeder, char **argv, struct incise_error *err);
 

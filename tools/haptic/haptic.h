@@ -25,7 +25,7 @@ struct haptic {
 	struct calibration_used calibration;
 
 	struct incise_rig *rig;
-	struct incise_scene *scene; /* that of the plan */
+	struct incise_scene *scene; /* the plan's */
 	struct incise_plan *plan;
 	struct incise_loop_options loop;
 	struct incise_loop_stats *stats;

@@ -50,13 +50,13 @@ static int recover_it(struct incise_stepper *stepper, const char *name,
 		return rc;
 	cli_note("%s: cleared the fault of an earlier program (%s)", name, cause);
 	rc = incise_stepper_status(stepper, status);
-	/* Where clearing is enough, what is latched is no error. */
+	/* If clearing is enough, a latched fault is no error. */
 	return rc == -EIO ? 0 : rc;
 }
 
 /*
- * Make an actuator ready for power: a target needs its 0, and that of a real machine must be
- * found, if it has a switch for that. Returns 0 or a negative errno.
+ * Make an actuator ready for power: a target needs its 0, and a real machine must find its 0,
+ * if it has a switch for that. Returns 0 or a negative errno.
  */
 static int make_ready(struct incise_rig *rig, int axis, bool home, bool recover,
 		      struct incise_error *err)
@@ -75,7 +75,7 @@ static int make_ready(struct incise_rig *rig, int axis, bool home, bool recover,
 	if (rc)
 		return rc;
 	if (!status.homed && !home) {
-		/* Until it is cleared, homing is refused as well. */
+		/* Until it is cleared, the actuator refuses homing as well. */
 		if (status.faults & ~(unsigned int)INCISE_STEPPER_FAULT_TRAVEL) {
 			incise_stepper_cause(stepper, cause, sizeof(cause));
 			return incise_error_set(err, EPERM, "%s: %s", info.name, cause);
@@ -117,7 +117,7 @@ int hold_take(struct incise_rig *rig, struct incise_error *err)
 	return rc;
 }
 
-/* Whether an actuator is still on its way to where there is no force. */
+/* Whether an actuator is still on its way to a place without force. */
 static bool returns(struct incise_stepper *stepper, int64_t gone_ns)
 {
 	struct incise_stepper_status status;

@@ -14,8 +14,8 @@
  * Make the actuators ready for power: a target needs their 0.
  *
  * @home    find it, unless it is known
- * @recover clear first only what a program that died or a machine that slept left latched: a
- *          fault with its cause in the machine waits for a person
+ * @recover clear first only faults that a dead program or a machine's sleep left latched: a
+ * fault with its cause in the machine waits for a person
  *
  * Returns 0 or a negative errno.
  */
@@ -23,8 +23,8 @@ int hold_prepare(struct incise_rig *rig, bool home, bool recover,
 		 struct incise_error *err);
 
 /*
- * Power them: all, or none. Poses of before are dropped. The first tick must follow within their
- * deadman's time. Returns 0 or a negative errno.
+ * Power all of them, or no actuator. Poses of before are dropped. The first tick must follow
+ * within their deadman's time. Returns 0 or a negative errno.
  */
 int hold_take(struct incise_rig *rig, struct incise_error *err);
 

@@ -20,7 +20,7 @@
 #include "hold.h"
 #include "run.h"
 
-/* So often poses are handed to the kernel, and what it renders is looked at, at most. */
+/* At most so often poses are handed to the kernel, and its status is read. */
 #define LOOKS_HZ 1000
 
 /* Leave the reason in the state page, too. */
@@ -44,7 +44,7 @@ static char *state_path(const char *scene)
 	i = state_folder_choose(list);
 	if (i >= 0)
 		path = cli_text("%s/%s.state", list[i], name);
-	/* Of the same folder for the feeder's page it was said already. */
+	/* The line for the feeder's page named the same folder already. */
 	if (i == STATE_FOLDER_TEMPORARY && !warned)
 		cli_warn("there is no %s and no XDG_RUNTIME_DIR: the status file is %s, "
 			 "which 'incise status' finds for this user only",
@@ -143,7 +143,7 @@ static bool has_real_clock(const char *spec)
 	return real;
 }
 
-/* The feeder's page is next to the one of this loop. */
+/* The feeder's page is next to this loop's. */
 static struct feeder *own_feeder;
 
 /* However this program ends, but by a signal that kills. */
@@ -566,8 +566,8 @@ static void report_text(const struct haptic *haptic)
 	       (unsigned long long)s->limited);
 	if (incise_pose_counts_text(&s->poses, flags, sizeof(flags)))
 		printf("poses      %s\n", flags);
-	printf("saturated  %llu at the largest force, %llu at the largest slew, %llu "
-	       "at the end of the travel, %llu in a ramp\n",
+	printf("limited    %llu ticks by force, %llu by slew rate, %llu by travel, %llu in "
+	       "the start ramp\n",
 	       (unsigned long long)ticks_with(s, INCISE_TICK_CLAMPED),
 	       (unsigned long long)ticks_with(s, INCISE_TICK_SLEWED),
 	       (unsigned long long)ticks_with(s, INCISE_TICK_TRAVEL),

@@ -10,7 +10,7 @@
 #ifndef INCISE_HAPTIC_RUN_H
 #define INCISE_HAPTIC_RUN_H
 
-#include "../cli/procedure.h"
+#include "../session/procedure.h"
 #include "haptic.h"
 
 struct haptic_job {

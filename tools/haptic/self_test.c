@@ -5,7 +5,7 @@
 #include <errno.h>
 #include <math.h>
 #include "../../lib/base/vector.h"
-#include "../cli/stroke.h"
+#include "../bench/stroke.h"
 #include "haptic.h"
 
 #define STROKE_S 0.6
@@ -111,7 +111,7 @@ int haptic_self_test(const struct incise_scene *scene, struct incise_tracker *tr
 	stroke_begin(&trajectory.stroke, trajectory.plan, &info);
 	stroke_pose(&trajectory.stroke, 0, &trajectory.sample);
 	incise_scene_limits(scene, &limits);
-	/* A tick sees the age, and the one after it the first of the fade. */
+	/* A tick sees the age, and the tick after it the first of the fade. */
 	test->silent_max_ms = limits.pose_age_ms +
 			      (double)incise_plan_fade_ns(trajectory.plan) * 1e-6 +
 			      2e-6 * (double)trajectory.period_ns;

@@ -101,7 +101,7 @@ static bool keys_open(void)
 	catch (ends);
 	atexit(keys_close);
 	now = before;
-	/* Ctrl-C and Ctrl-Z stay what they are. */
+	/* Ctrl-C and Ctrl-Z keep their effect. */
 	now.c_lflag &= ~(tcflag_t)(ICANON | ECHO);
 	now.c_cc[VMIN] = 1;
 	now.c_cc[VTIME] = 0;
@@ -109,7 +109,7 @@ static bool keys_open(void)
 	return !tcsetattr(STDIN_FILENO, TCSANOW, &now);
 }
 
-/* The tool of the key that was pressed, enum incise_tool; -1: it is none's. */
+/* The tool of the key that was pressed, enum incise_tool; -1: no tool's key. */
 static int keys_read(void)
 {
 	char key[32];
@@ -140,7 +140,7 @@ static int keys_read(void)
  * in memory.
  */
 
-/* The socket's address; 0: none, or an invalid one. */
+/* The socket's address; 0: not set, or invalid. */
 static socklen_t address(struct sockaddr_un *to)
 {
 	const char *path = getenv("NOTIFY_SOCKET");
@@ -283,8 +283,8 @@ static int start_thread(struct supervisor *s, struct incise_error *err)
 	int rc;
 
 	/*
-	 * The supervisor handles signals: in the loop they would make ticks late. Those of a
-	 * fault it cannot: blocked, they kill without a handler, which restores the terminal.
+	 * The supervisor handles signals: in the loop they would make ticks late. It cannot take
+	 * signals of a fault: blocked, they kill without a handler, which restores the terminal.
 	 */
 	sigfillset(&all);
 	for (const int *fault = keys_faults; *fault; fault++)
@@ -699,7 +699,7 @@ static bool wait_for_orders(struct supervisor *s)
 {
 	struct pollfd polled[3 + CONTROL_POLLED] = {
 		{.fd = s->ended_fd, .events = POLLIN},
-		/* One that is negative is passed over. */
+		/* A negative one is passed over. */
 		{.fd = s->keys && keys_here() ? STDIN_FILENO : -1, .events = POLLIN},
 		{.fd = s->foot ? incise_foot_switch_fd(s->foot) : -1, .events = POLLIN},
 	};

@@ -30,7 +30,7 @@ static const char *const names[COLUMNS] = {"force_N", "depth_mm", "velocity_mm_s
 
 struct table {
 	struct incise_dataset *data;
-	int column[COLUMNS]; /* in a row; -1: there is none */
+	int column[COLUMNS]; /* in a row; -1: no such column */
 	double low[COLUMNS], high[COLUMNS];
 	const char *group; /* "cut", "recording" or NULL */
 	int n_groups;
@@ -97,7 +97,7 @@ static void read_table(struct table *table, const char *path)
 	last = table->column[UNCERTAINTY];
 	table->data = incise_dataset_read_where(path, columns, n, table->group,
 						table->where, &table->left_out, &err);
-	/* One that is not stated is nan, which is no number of a dataset. */
+	/* An unknown uncertainty is nan, which is no number of a dataset. */
 	if (!table->data && last >= 0) {
 		table->column[UNCERTAINTY] = -1;
 		table->data = cli_require(
@@ -164,7 +164,7 @@ static void write_rows(const struct table *table, int over, const char *folder,
 	plot_data_end(data, folder);
 }
 
-/* Mean and SD of what was added. */
+/* Mean and SD of the added values. */
 struct moments {
 	double n, mean, m2;
 };
@@ -230,7 +230,7 @@ static void put_panel(FILE *script, const struct table *table, int over, const c
 	fputs("set xlabel ", script);
 	plot_put_label(script, names[over]);
 	fputs("\nset ylabel 'force / N'\nplot ", script);
-	/* Of single values; what is common to all does not average out. */
+	/* For single values; common parts do not average out. */
 	if (stated && bins)
 		fprintf(script,
 			"'%s' using 1:($2-1.96*$4):($2+1.96*$4) with filledcurves lc rgb "
@@ -264,7 +264,7 @@ static void put_panel(FILE *script, const struct table *table, int over, const c
 	fputc('\n', script);
 }
 
-/* One of the upper panels, with its data. */
+/* An upper panel, with its data. */
 static void put_upper(FILE *script, const struct table *table, int over,
 		      const struct figure *figure)
 {

@@ -15,7 +15,7 @@
 struct figure {
 	const char *path; /* the file that is drawn */
 	const char *data; /* of a model: the dataset of its residuals, or NULL */
-	/* Of a recording: the time that is drawn; -INFINITY, INFINITY: all. */
+	/* For a recording: the time that is drawn; -INFINITY, INFINITY: all. */
 	double from_s, to_s;
 	const char *folder, *name; /* of cli/plot.h */
 };

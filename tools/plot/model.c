@@ -30,7 +30,7 @@
 struct grid {
 	FILE *script;
 	int height, top; /* pixels */
-	/* Files of data, of this figure alone: another one may be in its folder. */
+	/* Files of data, of this figure alone: another figure may be in its folder. */
 	const char *functions, *surface, *bands[2], *residuals, *quantiles;
 };
 
@@ -64,7 +64,7 @@ static struct residuals residuals_of(const struct model_surface *surface,
 	for (int i = 0; i < n; i++)
 		columns[i] = surface->input[i].name;
 	columns[n] = surface->output.name;
-	/* As incise train: rows where the blade did not advance are not what it learns. */
+	/* As incise train, which does not learn from rows where the blade did not advance. */
 	data = cli_require(incise_dataset_read_where(path, columns, n + 1, NULL,
 						     "advancing", &r.left_out, &err),
 			   &err);
@@ -232,7 +232,7 @@ static void put_surface(struct grid *grid, const struct model_surface *surface)
 		model_plot_surface(grid->script, surface, grid->surface, title, "");
 		return;
 	}
-	/* The map's colours are those of the surface. */
+	/* The map has the colours of the surface. */
 	fputs("unset colorbox\n", grid->script);
 	place(grid, 0, 2, SURFACE_HEIGHT);
 	model_plot_surface(grid->script, surface, grid->surface, title, "");
@@ -241,7 +241,7 @@ static void put_surface(struct grid *grid, const struct model_surface *surface)
 	model_plot_contours(grid->script, surface, grid->surface, title);
 }
 
-/* @model NULL: of a compiled one the functions are not known; @uncertainty NULL: none. */
+/* @model NULL: a compiled model has no known functions; @uncertainty NULL: unknown. */
 static FILE *draw(const struct figure *figure, const struct model_surface *surface,
 		  const struct incise_model *model,
 		  const struct incise_uncertainty *uncertainty)

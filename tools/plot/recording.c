@@ -60,7 +60,7 @@ static double bin_s(const struct span *span, double bin)
 struct line {
 	FILE *out;
 	const struct span *span;
-	int bin; /* of the values below; -1: none */
+	int bin; /* of the values below; -1: empty */
 	double low, high, low_s, high_s;
 	double last_s; /* of the point that was written last; NAN: a gap is before the next */
 	int run;       /* points since the gap */
@@ -100,7 +100,7 @@ static void flush_bin(struct line *line)
 	line->bin = -1;
 }
 
-/* No line across what is missing. */
+/* No line across a gap. */
 static void line_gap(struct line *line)
 {
 	double value = line->low;
@@ -227,7 +227,7 @@ static bool next_batch(struct recorded *r, struct ArrowArrayStream *stream,
 	return true;
 }
 
-/* Note a sample, and what was lost before it; returns whether something was. */
+/* Note a sample, and losses before it; returns whether there were losses. */
 static bool note_sample(struct recorded *r, int stream, int64_t seq, double t_s,
 			int64_t *last_seq, double *last_s)
 {
@@ -409,7 +409,7 @@ static void read_events(struct recorded *r)
 
 /* --- the time that is drawn -------------------------------------------------------------- */
 
-/* First and last time of a stream, which is read for that; those of force are known. */
+/* First and last time of a stream, which is read for that; the times of force are known. */
 static void find_ends(struct recorded *r, const char *name, int64_t *first, int64_t *last)
 {
 	struct ArrowArrayStream stream;
@@ -457,7 +457,7 @@ static void find_span(struct recorded *r)
 		r->span.to_s = r->span.from_s + 1e-3;
 }
 
-/* --- what lies beside the lines -------------------------------------------------------------- */
+/* --- parts beside the lines ------------------------------------------------------------------ */
 
 /* Rows "from to" of the columns that are set, joined where they touch. Returns how many. */
 static int write_bins(const struct recorded *r, const bool set[BINS], const char *name)

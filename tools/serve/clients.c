@@ -42,7 +42,7 @@ struct client {
 	struct message *queue[CLIENT_QUEUE]; /* a ring: the first may have begun */
 	int first, waiting;
 	size_t begun;	     /* bytes of the first that left */
-	int64_t moved_ns;    /* when bytes left, or none waited */
+	int64_t moved_ns;    /* when bytes left, or no bytes waited */
 	uint64_t sent, lost; /* messages */
 
 	uint64_t received; /* bytes */
@@ -125,7 +125,7 @@ static void doom(struct client *client, const char *why)
 		snprintf(client->why, sizeof(client->why), "%s", why);
 }
 
-/* Send what the socket takes. */
+/* Send as much as the socket takes. */
 static void flush(struct client *client)
 {
 	while (client->waiting && !*client->why) {
@@ -296,7 +296,7 @@ static void set_option(int fd, int level, int name, int value)
 	setsockopt(fd, level, name, &value, sizeof(value));
 }
 
-/* Bytes that came and are not read would make close() a reset, which takes the answer with it. */
+/* Unread bytes would make close() a reset, which takes the answer with it. */
 static void refuse(struct clients *clients, int fd)
 {
 	uint8_t bytes[1024];
@@ -387,7 +387,7 @@ void clients_work(struct clients *clients)
 	close_doomed(clients);
 }
 
-/* Ten times a second: who stands still, and a new second of what may be received. */
+/* Ten times a second: find clients that stand still, and allow a new second of received bytes. */
 void clients_tick(struct clients *clients, int64_t now_ns)
 {
 	int64_t idle_ns = (int64_t)(clients->setup.idle_s * 1e9);
@@ -523,7 +523,7 @@ struct clients *clients_new(const struct clients_setup *setup)
 		*listener = fd;
 		clients->listeners++;
 		epoll_ctl(clients->epoll, EPOLL_CTL_ADD, fd, &event);
-		/* Of port 0 each address would have another. */
+		/* With port 0 each address would have another. */
 		if (!strcmp(port, "0"))
 			break;
 	}

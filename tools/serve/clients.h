@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * TCP clients that are sent messages, none of which can slow the others: each has a queue of its
- * own, and one that is full loses its oldest messages.
+ * TCP clients that are sent messages and cannot slow each other: each has a queue of its own,
+ * and a full queue loses its oldest messages.
  *
  *     message, shared ─┬─▶ queue of client 1 ─▶ its socket
  *                      └─▶ queue of client 2 ─▶ its socket      at most CLIENTS_MOST
  *
- * Bounds, whatever clients do: CLIENT_WAITING messages and one frame wait for each; the kernel
+ * Bounds, for any clients: CLIENT_WAITING messages and one frame wait for each; the kernel
  * holds CLIENT_SOCKET bytes; CLIENT_RECEIVED bytes a second are read from each.
  */
 #ifndef INCISE_TOOLS_SERVE_CLIENTS_H
@@ -29,7 +29,7 @@ struct message;
 struct message *message_new(int kind, bool large, size_t capacity);
 uint8_t *message_bytes(struct message *message);
 void message_set_size(struct message *message, size_t n);
-/* It is shared: the one who made it drops it, too. */
+/* It is shared: its maker drops it, too. */
 void message_drop(struct message *message);
 
 struct clients;
@@ -66,7 +66,7 @@ void clients_each(struct clients *clients,
 		  void *context);
 /* Put it in the client's queue, where the oldest of that kind may be lost for it. */
 void clients_send(struct client *client, struct message *message);
-/* Send what waits, of each client in one system call. clients_work() does so, too. */
+/* Send the waiting bytes, of each client in one system call. clients_work() does so, too. */
 void clients_flush(struct clients *clients);
 bool clients_are_empty(const struct clients *clients);
 int clients_summary(const struct clients *clients, char *text, size_t size);

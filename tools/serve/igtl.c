@@ -11,11 +11,14 @@
  *
  * The names differ, since pyigtl keeps one message for each name.
  */
+#include <endian.h>
 #include <errno.h>
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <incise/igtl.h>
+#include <openigtlink/igtl_image.h>
+#include <openigtlink/igtl_string.h>
+#include <openigtlink/igtl_transform.h>
+#include "../../lib/device/igtl/igtl_message.h"
 #include "../cli/cli.h"
 #include "../cli/json.h"
 #include "clients.h"
@@ -32,9 +35,8 @@ static const struct {
 	[STATUS] = {"STATUS", "Status"},	[REPLY] = {"CAPABILITY", "incise"},
 };
 
-#define SMALL 1024    /* capacity of all but frames */
+#define SMALL 1024    /* bytes of a text, and of a message's own parts */
 #define BODY_MAX 4096 /* of what clients send */
-#define FRAME_HEAD 512
 
 struct igtl {
 	struct serve_sink base;
@@ -44,7 +46,7 @@ struct igtl {
 	struct message *newest[OUTPUTS][2]; /* for GET_, by version */
 	struct pixels pixels;
 	uint32_t id;
-	uint64_t requests, ignored; /* what clients asked */
+	uint64_t requests, ignored; /* requests of clients */
 	bool warned;
 };
 
@@ -57,59 +59,52 @@ struct peer {
 
 /* --- sending ------------------------------------------------------------------------- */
 
+/* An item as the content of a message: a head, and what follows it, in the order of the wire. */
 struct sending {
 	struct igtl *igtl;
 	enum output output;
 	const struct serve_item *item;
-	ssize_t (*pack)(struct sending *sending, struct message *message,
-			const struct incise_igtl_label *label);
-	size_t capacity;
-	struct message
-		*message[2]; /* by version; packed when the first client needs it */
-	bool failed;
-	char text[SMALL]; /* of a STRING */
-	size_t n;
+	const void *head, *content;
+	size_t head_n, n;
+	/* By version; packed when the first client needs it. */
+	struct message *message[2];
 };
+
+static struct message *pack_message(const struct sending *sending,
+				    const struct incise_igtl_label *label)
+{
+	size_t capacity = SMALL + sending->head_n + sending->n;
+	struct message *message =
+		message_new(sending->output, sending->output == FRAME, capacity);
+	ssize_t n =
+		incise_igtl_pack(message_bytes(message), capacity, label, sending->head,
+				 sending->head_n, sending->content, sending->n);
+
+	message_set_size(message, n > 0 ? (size_t)n : 0);
+	return message;
+}
 
 static struct message *packed(struct sending *sending, int version)
 {
 	const struct serve_item *item = sending->item;
 	struct message **message = &sending->message[version - 1];
 	char t_ns[24], lost[24];
-	const struct incise_igtl_pair pairs[] = {
-		{.key = "t_ns",
-		 .key_n = 4,
-		 .value = t_ns,
-		 .value_n = (uint32_t)snprintf(t_ns, sizeof(t_ns), "%lld",
-					       (long long)item->t_ns)},
-		{.key = "lost",
-		 .key_n = 4,
-		 .value = lost,
-		 .value_n = (uint32_t)snprintf(lost, sizeof(lost), "%llu",
-					       (unsigned long long)item->lost)},
-	};
+	const char *const metadata[][2] = {{"t_ns", t_ns}, {"lost", lost}};
 	const struct incise_igtl_label label = {
 		.version = version,
+		.type = outputs[sending->output].type,
 		.name = outputs[sending->output].name,
 		.utc_ns = item->utc_ns,
 		.id = sending->igtl->id,
-		.metadata = pairs,
+		.metadata = metadata,
 		.n_metadata = 2,
 	};
-	ssize_t n;
 
-	if (*message || sending->failed)
+	if (*message)
 		return *message;
-	*message =
-		message_new(sending->output, sending->output == FRAME, sending->capacity);
-	n = sending->pack(sending, *message, &label);
-	if (n < 0) {
-		message_drop(*message);
-		*message = NULL;
-		sending->failed = true;
-		return NULL;
-	}
-	message_set_size(*message, (size_t)n);
+	snprintf(t_ns, sizeof(t_ns), "%lld", (long long)item->t_ns);
+	snprintf(lost, sizeof(lost), "%llu", (unsigned long long)item->lost);
+	*message = pack_message(sending, &label);
 	return *message;
 }
 
@@ -117,18 +112,14 @@ static void send_one(void *context, struct client *client, void *user)
 {
 	struct sending *sending = context;
 	const struct peer *peer = user;
-	struct message *message;
 
-	if (peer->stopped & 1u << sending->output)
-		return;
-	message = packed(sending, peer->version);
-	if (message)
-		clients_send(client, message);
+	if (!(peer->stopped & 1u << sending->output))
+		clients_send(client, packed(sending, peer->version));
 }
 
 /*
- * Send to all, and keep it for those who ask. Nothing older is kept: a client that comes later
- * gets a value that is true, or waits for the next one.
+ * Send to all, and keep it for clients that ask. Nothing older is kept: a client that comes
+ * later gets a value that is true, or waits for the next one.
  */
 static void send_all(struct sending *sending)
 {
@@ -146,113 +137,129 @@ static void send_all(struct sending *sending)
 	}
 }
 
-static ssize_t pack_pose(struct sending *sending, struct message *message,
-			 const struct incise_igtl_label *label)
+/* A TRANSFORM: columns of the rotation, then the translation. */
+static void send_matrix(struct igtl *igtl, enum output output,
+			const struct serve_item *item, igtl_float32 column[12])
 {
-	const double *q = sending->item->pose.quaternion;
-	double matrix[3][4];
+	struct sending sending = {.igtl = igtl,
+				  .output = output,
+				  .item = item,
+				  .head = column,
+				  .head_n = IGTL_TRANSFORM_SIZE};
+
+	igtl_transform_convert_byte_order(column);
+	send_all(&sending);
+}
+
+static void send_pose(struct igtl *igtl, const struct serve_item *item)
+{
+	const double *q = item->pose.quaternion;
+	igtl_float32 column[12];
 
 	for (int i = 0; i < 3; i++) {
 		int j = (i + 1) % 3, k = (i + 2) % 3;
 
-		matrix[i][i] = 1 - 2 * (q[1 + j] * q[1 + j] + q[1 + k] * q[1 + k]);
-		matrix[i][j] = 2 * (q[1 + i] * q[1 + j] - q[0] * q[1 + k]);
-		matrix[i][k] = 2 * (q[1 + i] * q[1 + k] + q[0] * q[1 + j]);
-		matrix[i][3] = sending->item->pose.position_mm[i];
+		column[4 * i] =
+			(float)(1 - 2 * (q[1 + j] * q[1 + j] + q[1 + k] * q[1 + k]));
+		column[3 * j + i] = (float)(2 * (q[1 + i] * q[1 + j] - q[0] * q[1 + k]));
+		column[3 * k + i] = (float)(2 * (q[1 + i] * q[1 + k] + q[0] * q[1 + j]));
+		column[9 + i] = (float)item->pose.position_mm[i];
 	}
-	return incise_igtl_pack_transform(message_bytes(message), sending->capacity,
-					  label, matrix);
+	send_matrix(igtl, POSE, item, column);
 }
 
-static ssize_t pack_force(struct sending *sending, struct message *message,
-			  const struct incise_igtl_label *label)
+static void send_data(struct igtl *igtl, const struct serve_item *item)
 {
-	const double *force_N = sending->item->force.mean_N;
-	const double matrix[3][4] = {
-		{1, 0, 0, force_N[0]}, {0, 1, 0, force_N[1]}, {0, 0, 1, force_N[2]}};
+	char text[SMALL];
+	igtl_string_header head = {.encoding = 3}; /* US-ASCII, by IANA's number */
+	struct sending sending = {.igtl = igtl,
+				  .output = DATA,
+				  .item = item,
+				  .head = &head,
+				  .head_n = sizeof(head),
+				  .content = text};
+	json_t *object = json_pack("{sI so so si sI}", "t_ns", (json_int_t)item->t_ns,
+				   "force_N", json_numbers(item->force.mean_N, 3), "sd_N",
+				   json_number(item->force.sd_N), "samples",
+				   item->force.samples, "lost", (json_int_t)item->lost);
 
-	return incise_igtl_pack_transform(message_bytes(message), sending->capacity,
-					  label, matrix);
+	sending.n = json_dumpb(object, text, sizeof(text),
+			       JSON_COMPACT | JSON_REAL_PRECISION(9));
+	json_decref(object);
+	head.length = (igtl_uint16)sending.n;
+	igtl_string_convert_byte_order(&head);
+	send_all(&sending);
 }
 
-static ssize_t pack_data(struct sending *sending, struct message *message,
-			 const struct incise_igtl_label *label)
+static void send_force(struct igtl *igtl, const struct serve_item *item)
 {
-	return incise_igtl_pack_string(message_bytes(message), sending->capacity, label,
-				       sending->text, sending->n);
+	const double *force_N = item->force.mean_N;
+	igtl_float32 column[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+
+	for (int i = 0; i < 3; i++)
+		column[9 + i] = (float)force_N[i];
+	send_matrix(igtl, FORCE, item, column);
+	send_data(igtl, item);
 }
 
-static ssize_t pack_status(struct sending *sending, struct message *message,
-			   const struct incise_igtl_label *label)
+static struct incise_igtl_status status_of(enum incise_igtl_code code, uint64_t sub_code,
+					   const char *error)
 {
-	static const uint16_t codes[] = {
+	struct incise_igtl_status status = {.code = htobe16(code),
+					    .sub_code = (int64_t)htobe64(sub_code)};
+
+	memcpy(status.error, error, strnlen(error, sizeof(status.error)));
+	return status;
+}
+
+static void send_status(struct igtl *igtl, const struct serve_item *item)
+{
+	static const enum incise_igtl_code codes[] = {
 		[SERVE_RUNS] = INCISE_IGTL_OK,
 		[SERVE_STARTS] = INCISE_IGTL_NOT_READY,
 		[SERVE_FAULT] = INCISE_IGTL_HARDWARE_FAILURE,
 		[SERVE_ENDED] = INCISE_IGTL_SHUT_DOWN,
 		[SERVE_ABSENT] = INCISE_IGTL_NOT_PRESENT,
 	};
-	struct incise_igtl_status status = {.code = codes[sending->item->status.state],
-					    .sub_code = (int64_t)sending->item->lost,
-					    .text = sending->item->status.text};
+	const struct incise_igtl_status head =
+		status_of(codes[item->status.state], item->lost, item->status.name);
+	struct sending sending = {.igtl = igtl,
+				  .output = STATUS,
+				  .item = item,
+				  .head = &head,
+				  .head_n = sizeof(head),
+				  .content = item->status.text,
+				  .n = strlen(item->status.text) + 1};
 
-	snprintf(status.error, sizeof(status.error), "%s", sending->item->status.name);
-	return incise_igtl_pack_status(message_bytes(message), sending->capacity, label,
-				       &status);
+	send_all(&sending);
 }
 
 /* A pixel is 1 mm, and the middle of the first one is the origin, as viewers expect. */
-static ssize_t pack_frame(struct sending *sending, struct message *message,
-			  const struct incise_igtl_label *label)
-{
-	const struct pixels *pixels = &sending->igtl->pixels;
-	uint16_t width = (uint16_t)pixels->width, height = (uint16_t)pixels->height;
-	const struct incise_igtl_image image = {
-		.components = (uint8_t)pixels->components,
-		.scalar = INCISE_IGTL_UINT8,
-		.little = true,
-		.ras = true,
-		.size = {width, height, 1},
-		.axis = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
-		.centre = {(width - 1) / 2.0, (height - 1) / 2.0, 0},
-		.part = {width, height, 1},
-		.pixel = pixels->bytes,
-		.n = (size_t)width * height * (size_t)pixels->components,
-	};
-
-	return incise_igtl_pack_image(message_bytes(message), sending->capacity, label,
-				      &image);
-}
-
-static void send_force(struct igtl *igtl, const struct serve_item *item)
-{
-	struct sending force = {.igtl = igtl,
-				.output = FORCE,
-				.item = item,
-				.pack = pack_force,
-				.capacity = SMALL};
-	struct sending data = {.igtl = igtl,
-			       .output = DATA,
-			       .item = item,
-			       .pack = pack_data,
-			       .capacity = SMALL};
-	json_t *object = json_pack("{sI so so si sI}", "t_ns", (json_int_t)item->t_ns,
-				   "force_N", json_numbers(item->force.mean_N, 3), "sd_N",
-				   json_number(item->force.sd_N), "samples",
-				   item->force.samples, "lost", (json_int_t)item->lost);
-
-	data.n = json_dumpb(object, data.text, sizeof(data.text),
-			    JSON_COMPACT | JSON_REAL_PRECISION(9));
-	json_decref(object);
-	send_all(&force);
-	send_all(&data);
-}
-
 static void send_frame(struct igtl *igtl, const struct serve_item *item)
 {
-	struct sending frame = {
-		.igtl = igtl, .output = FRAME, .item = item, .pack = pack_frame};
+	const struct pixels *pixels = &igtl->pixels;
 	int rc = pixels_convert(&igtl->pixels, item->frame);
+	igtl_uint16 width = (igtl_uint16)pixels->width;
+	igtl_uint16 height = (igtl_uint16)pixels->height;
+	igtl_image_header head = {
+		.version = IGTL_IMAGE_HEADER_VERSION,
+		.num_components = (igtl_uint8)pixels->components,
+		.scalar_type = IGTL_IMAGE_STYPE_TYPE_UINT8,
+		.endian = IGTL_IMAGE_ENDIAN_LITTLE,
+		.coord = IGTL_IMAGE_COORD_RAS,
+		.size = {width, height, 1},
+		.matrix = {1, 0, 0, 0, 1, 0, 0, 0, 1, (float)(width - 1) / 2,
+			   (float)(height - 1) / 2, 0},
+		.subvol_size = {width, height, 1},
+	};
+	struct sending sending = {.igtl = igtl,
+				  .output = FRAME,
+				  .item = item,
+				  .head = &head,
+				  .head_n = sizeof(head),
+				  .content = pixels->bytes,
+				  .n = (size_t)width * height *
+				       (size_t)pixels->components};
 
 	if (rc == -ENOTSUP && !igtl->warned) {
 		igtl->warned = true;
@@ -262,34 +269,21 @@ static void send_frame(struct igtl *igtl, const struct serve_item *item)
 	}
 	if (rc)
 		return;
-	frame.capacity = FRAME_HEAD + (size_t)igtl->pixels.width *
-					      (size_t)igtl->pixels.height *
-					      (size_t)igtl->pixels.components;
-	send_all(&frame);
+	igtl_image_convert_byte_order(&head);
+	send_all(&sending);
 }
 
 static void igtl_send(struct serve_sink *sink, const struct serve_item *item)
 {
-	struct igtl *igtl = (struct igtl *)sink;
-	struct sending small = {.igtl = igtl, .item = item, .capacity = SMALL};
+	static void (*const send[SERVE_KINDS])(struct igtl *,
+					       const struct serve_item *) = {
+		[SERVE_POSE] = send_pose,
+		[SERVE_FORCE] = send_force,
+		[SERVE_FRAME] = send_frame,
+		[SERVE_STATUS] = send_status,
+	};
 
-	switch (item->kind) {
-	case SERVE_POSE:
-		small.output = POSE;
-		small.pack = pack_pose;
-		send_all(&small);
-		break;
-	case SERVE_FORCE:
-		send_force(igtl, item);
-		break;
-	case SERVE_FRAME:
-		send_frame(igtl, item);
-		break;
-	default:
-		small.output = STATUS;
-		small.pack = pack_status;
-		send_all(&small);
-	}
+	send[item->kind]((struct igtl *)sink, item);
 }
 
 /* --- receiving ----------------------------------------------------------------------- */
@@ -320,18 +314,19 @@ static size_t igtl_full(void *context, uint8_t *bytes, size_t capacity)
 	const struct igtl *igtl = context;
 	const struct incise_igtl_label label = {.version =
 							igtl->version ? igtl->version : 1,
+						.type = outputs[STATUS].type,
 						.name = outputs[STATUS].name,
 						.utc_ns = serve_utc_of(cli_now_ns())};
-	struct incise_igtl_status status = {
-		.code = INCISE_IGTL_BUSY, .sub_code = CLIENTS_MOST, .error = "busy"};
+	const struct incise_igtl_status status =
+		status_of(INCISE_IGTL_BUSY, CLIENTS_MOST, "busy");
 	char text[100];
 	ssize_t n;
 
 	snprintf(text, sizeof(text),
 		 "%d clients are connected, and no more are served; end one of them",
 		 CLIENTS_MOST);
-	status.text = text;
-	n = incise_igtl_pack_status(bytes, capacity, &label, &status);
+	n = incise_igtl_pack(bytes, capacity, &label, &status, sizeof(status), text,
+			     strlen(text) + 1);
 	return n > 0 ? (size_t)n : 0;
 }
 
@@ -359,22 +354,19 @@ static unsigned int asked(const struct incise_igtl_message *message)
 }
 
 /* The types that are sent, 12 bytes each. */
-static void send_capability(struct igtl *igtl, struct client *client, int version)
+static void send_capability(struct client *client, int version)
 {
-	static const char types[][INCISE_IGTL_TYPE] = {"TRANSFORM", "STRING", "IMAGE",
-						       "STATUS", "CAPABILITY"};
+	static const char types[][IGTL_HEADER_TYPE_SIZE] = {
+		"TRANSFORM", "STRING", "IMAGE", "STATUS", "CAPABILITY"};
 	const struct incise_igtl_label label = {.version = version,
+						.type = outputs[REPLY].type,
 						.name = outputs[REPLY].name,
 						.utc_ns = serve_utc_of(cli_now_ns())};
-	struct message *message = message_new(REPLY, false, SMALL);
-	ssize_t n = incise_igtl_pack(message_bytes(message), SMALL, &label, "CAPABILITY",
-				     types, sizeof(types));
+	const struct sending sending = {
+		.output = REPLY, .content = types, .n = sizeof(types)};
+	struct message *message = pack_message(&sending, &label);
 
-	(void)igtl;
-	if (n > 0) {
-		message_set_size(message, (size_t)n);
-		clients_send(client, message);
-	}
+	clients_send(client, message);
 	message_drop(message);
 }
 
@@ -390,7 +382,7 @@ static void answer(struct igtl *igtl, struct client *client, struct peer *peer,
 		peer->version = message->version;
 	igtl->requests++;
 	if (get && !strncmp(message->type + 4, "CAPABIL", 7))
-		send_capability(igtl, client, peer->version);
+		send_capability(client, peer->version);
 	else if (!found)
 		igtl->ignored++;
 	else if (start)

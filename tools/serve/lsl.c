@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * The Lab Streaming Layer as a sink: three streams, whose times are those of acquisition.
+ * The Lab Streaming Layer as a sink: three streams with times of acquisition.
  *
  *     item          stream           content   channels
  *     pose          PREFIX-pose      MoCap     x, y, z in mm; qw, qx, qy, qz
@@ -51,7 +51,7 @@ struct lsl {
 	struct serve_sink base;
 	const char *prefix;
 	const struct incise_outlets *outlets;
-	struct incise_outlet *outlet[OUTPUTS]; /* NULL: the source has none */
+	struct incise_outlet *outlet[OUTPUTS]; /* NULL: not in the source */
 	uint64_t sent[OUTPUTS];
 	enum serve_state state;
 	char text[200];
@@ -68,7 +68,7 @@ static const struct lsl *of_const(const struct serve_sink *sink)
 	return (const struct lsl *)sink;
 }
 
-/* A status is sent each second; an event is one that differs. */
+/* A status is sent each second; an event is a status that differs. */
 static void send_event(struct lsl *lsl, const struct serve_item *item)
 {
 	const char *text = item->status.text ? item->status.text : "";

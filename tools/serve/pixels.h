@@ -16,7 +16,7 @@ struct pixels {
 };
 
 /*
- * Convert a frame: YUYV to its luminance, a JPEG to what is in it. Returns 0; -EBADMSG (damaged, or
+ * Convert a frame: YUYV to its luminance, a JPEG to its pixels. Returns 0; -EBADMSG (damaged, or
  * sizes that contradict each other), -ENOTSUP (a JPEG, and this program has no libjpeg).
  */
 int pixels_convert(struct pixels *pixels, const struct incise_camera_frame *frame);

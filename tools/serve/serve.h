@@ -5,7 +5,7 @@
  *     source ── samples ──▶ stream: rate, means, UTC ── items ──▶ sinks: OpenIGTLink, …
  *     (loop, rig, recording)                                      (each with its clients)
  *
- * A source is asked at the time that it names for what has come since. A sink takes items and
+ * A source names the time of the next request for its new samples. A sink takes items and
  * never waits. Lengths in mm, forces in N.
  */
 #ifndef INCISE_TOOLS_SERVE_H
@@ -70,25 +70,25 @@ struct serve_sink {
 };
 
 struct serve_sink_ops {
-	/* Send an item to all who want it; never waits. */
+	/* Send an item to all clients that want it; never waits. */
 	void (*send)(struct serve_sink *sink, const struct serve_item *item);
-	/* The end of a round of items: what was kept to leave together leaves. NULL: nothing. */
+	/* The end of a round of items: kept items leave together. NULL: nothing. */
 	void (*flush)(struct serve_sink *sink);
 	/*
-	 * A descriptor that polls as readable when the sink has work, and the work; NULL: none.
-	 * Bounded by itself, whatever clients do.
+	 * A descriptor that polls as readable when the sink has work, and the work; NULL: no
+	 * work. Bounded by itself, whatever clients do.
 	 */
 	int (*fd)(const struct serve_sink *sink);
 	void (*work)(struct serve_sink *sink);
-	/* Ten times a second: timeouts. NULL: none. */
+	/* Ten times a second: timeouts. NULL: no timeouts. */
 	void (*tick)(struct serve_sink *sink, int64_t now_ns);
-	/* Whether all that was sent has left; for the end. NULL: always. */
+	/* Whether all sent items have left; for the end. NULL: always. */
 	bool (*is_empty)(const struct serve_sink *sink);
 	/* A few words for the status line: "3 clients, 2 lost". Returns its length. */
 	int (*summary)(const struct serve_sink *sink, char *text, size_t size);
 	/* The end: say goodbye to all. */
 	void (*close)(struct serve_sink *sink);
-	/* The report after that, an object whose key is added to that of the program; and as lines. */
+	/* The report after that, an object whose key is added to the program's; and as lines. */
 	json_t *(*report)(const struct serve_sink *sink);
 	void (*print)(const struct serve_sink *sink);
 	void (*free)(struct serve_sink *sink);
@@ -97,7 +97,7 @@ struct serve_sink_ops {
 /* OpenIGTLink (igtl.c). */
 struct serve_igtl_options {
 	const char *address; /* [ADDR:]PORT */
-	int version;	     /* 0: 1, and what the client speaks */
+	int version;	     /* 0: 1, and the client's version */
 	double idle_s;	     /* a client that stands still for so long is closed */
 };
 
@@ -121,7 +121,7 @@ struct serve_source {
 
 struct serve_source_ops {
 	/*
-	 * Hand on what has come, and set the time of the next call, this machine's
+	 * Hand on new samples, and set the time of the next call, this machine's
 	 * CLOCK_MONOTONIC. Returns 0; 1: there is no more.
 	 */
 	int (*read)(struct serve_source *source, struct serve_stream *stream,
@@ -154,7 +154,7 @@ struct serve_source *serve_recording_open(const struct serve_source_options *opt
 
 /*
  * Samples of the source. A pose is of the tracked point, which @tip_mm moves to the tip; forces
- * are averaged until one is due. @lost: what the source has lost so far.
+ * are averaged until one is due. @lost: samples that the source has lost so far.
  */
 void serve_pose(struct serve_stream *stream, int64_t t_ns, const double position_mm[3],
 		const double quaternion[4], const double tip_mm[3], uint64_t lost);

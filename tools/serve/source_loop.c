@@ -110,7 +110,7 @@ static void loop_free(struct serve_source *source)
 static const struct serve_source_ops loop_ops = {
 	.read = loop_read, .utc = loop_utc, .free = loop_free};
 
-/* The page that was named, or that of the only loop that runs. */
+/* The named page, or the page of the only loop that runs. */
 static struct state_page_file *choose(struct state_pages *pages, bool named)
 {
 	struct state_page_file *one = named && pages->n == 1 ? pages->page : NULL;
@@ -143,7 +143,7 @@ struct serve_source *serve_loop_open(const struct serve_source_options *options,
 			 "recording");
 	state_pages_open(&loop->pages, options->operand);
 	page = choose(&loop->pages, options->operand);
-	/* The chosen one first, so that closing the pages closes what follows it, too. */
+	/* The chosen one first, so that closing the pages closes the rest, too. */
 	first = *loop->pages.page;
 	*loop->pages.page = *page;
 	*page = first;

@@ -166,7 +166,7 @@ static bool play_frame(struct playback *playback, struct serve_stream *stream,
 	rc = incise_frame_reader_at(playback->frames, row_ns, &frame, &err);
 	if (!rc)
 		serve_frame(stream, &frame, lost(playback));
-	/* One frame that is missing in the file is no reason to end. */
+	/* A frame that is missing in the file is no reason to end. */
 	playback->skipped += rc == -ENODATA || rc == -EBADMSG;
 	if (!rc || rc == -ENODATA || rc == -EBADMSG)
 		return true;

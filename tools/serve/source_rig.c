@@ -215,7 +215,7 @@ struct serve_source *serve_rig_open(const struct serve_source_options *options,
 		delay_ns(rig->calibration.tracker_delay_ms, rig->tracker_info.latency_ns);
 	rig->force_delay_ns = delay_ns(rig->calibration.force_delay_ms, 0);
 	rig->camera_delay_ns = delay_ns(rig->calibration.camera_delay_ms, 0);
-	/* Four looks in the period of what is sent: a quarter of it late at most. */
+	/* Four looks in the period of sending: a quarter of it late at most. */
 	rig->poll_ns = (int64_t)(1e9 / options->rate_hz / 4);
 	rig->poll_ns = rig->poll_ns < POLL_MIN_NS   ? POLL_MIN_NS
 		       : rig->poll_ns > POLL_MAX_NS ? POLL_MAX_NS

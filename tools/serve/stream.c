@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Rates, means and times of what is sent; see serve.h.
+ * Rates, means and times of sent items; see serve.h.
  *
  *     samples   | | | | | | | | | | | | | | |        a value is due on a grid of 1/rate, and the
  *     due       ^       ^       ^       ^            first sample that is not more than half a step
@@ -10,8 +10,8 @@
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
+#include "../../lib/base/vector.h"
 #include "../cli/cli.h"
-#include "../cli/quaternion.h"
 #include "stream.h"
 
 #define NS 1000000000LL
@@ -38,7 +38,7 @@ struct serve_stream {
 	char name[32], text[300];
 	int64_t status_ns; /* when it was sent; 0: never */
 
-	/* Of a recording: t_ns is played at here_ns; speed 0: live. */
+	/* For a recording: t_ns is played at here_ns; speed 0: live. */
 	int64_t t_ns, here_ns;
 	double speed;
 };
@@ -157,7 +157,7 @@ void serve_pose(struct serve_stream *stream, int64_t t_ns, const double position
 	set_due(stream, SERVE_POSE, t_ns);
 	for (int i = 0; i < 4; i++)
 		unit[i] = q[i] / norm;
-	quaternion_turn(turned, unit, tip_mm);
+	v3_rotate(turned, unit, tip_mm);
 	for (int i = 0; i < 3; i++)
 		item.pose.position_mm[i] = position_mm[i] + turned[i];
 	memcpy(item.pose.quaternion, unit, sizeof(unit));

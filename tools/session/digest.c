@@ -12,7 +12,6 @@
 #include <incise/version.h>
 #include "../../lib/base/ascending.h"
 #include "../../lib/base/vector.h"
-#include "../cli/quaternion.h"
 #include "session.h"
 
 #define TRACE_S 0.02	 /* 50 Hz */
@@ -32,7 +31,7 @@ struct session_digest {
 	/* The handle in its cut: the angle now, the way that it turns, and the ends since. */
 	bool turning;
 	double line[3]; /* of the cut that it went into */
-	int way;	/* 1, -1; 0: none yet */
+	int way;	/* 1, -1; 0: not yet */
 	double angle_deg, low_deg, high_deg;
 	bool met, hit; /* beyond the plane of the membrane, and through it */
 	bool at_wall;
@@ -115,7 +114,7 @@ static void close_gaps(struct session *s)
 	s->n_phases = n;
 }
 
-/* Close longer gaps until there are fewer phases; false: tools that take turns leave none. */
+/* Close longer gaps until there are fewer phases; false: no gap between one tool's phases. */
 static bool make_place(struct session *s)
 {
 	double apart_s = s->phases_apart_s;
@@ -228,7 +227,7 @@ static void see_handle(struct session_digest *digest, const struct incise_tick *
 	/* Where cuts cross, it may be in either from one tick to the next. */
 	if (!digest->turning)
 		memcpy(digest->line, opening.along, sizeof(digest->line));
-	quaternion_turn(flat, tick->quaternion, digest->scalpel.side);
+	v3_rotate(flat, tick->quaternion, digest->scalpel.side);
 	v3_cross(across, tick->normal, digest->line);
 	along_part = v3_dot(flat, digest->line);
 	across_part = v3_dot(flat, across);

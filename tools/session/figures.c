@@ -36,7 +36,7 @@ static void fill_plot(struct range *range)
 	range->high[i] += more / 2;
 }
 
-/* Of all that is shown but the way through the air. */
+/* Range of all shown points except the way through the air. */
 static struct range range_of(const struct session *s)
 {
 	struct range range = {{NAN, NAN}, {NAN, NAN}};
@@ -56,7 +56,7 @@ static struct range range_of(const struct session *s)
 	return range;
 }
 
-/* Data of gnuplot: the path of one tool, with gaps where another one is in the tissue. */
+/* Data of gnuplot: the path of one tool, with gaps where another tool is in the tissue. */
 static int put_path(FILE *script, const char *name, const struct session *s,
 		    enum incise_tool tool)
 {
@@ -184,7 +184,7 @@ static bool has_phase(const struct session *s, int tool)
 	return false;
 }
 
-/* The reference follows from its first contact on, which is put at that of this session. */
+/* The reference follows from its first contact on, which is put at this session's first contact. */
 static void put_over_time(FILE *script, const struct session *s,
 			  const struct session *reference, size_t member,
 			  const char *label, double most)

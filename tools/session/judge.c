@@ -91,7 +91,7 @@ static double apart_mm(const double a[3], const double b[3])
 		    (a[2] - b[2]) * (a[2] - b[2]));
 }
 
-/* Largest distance of an end of one cut from an end of the other one, or of its own. */
+/* Largest distance of an end of one cut from an end of the other cut, or of its own. */
 static double reach_mm(const struct session_cut *a, const struct session_cut *b)
 {
 	return fmax(fmax(apart_mm(a->from_mm, b->from_mm),
@@ -112,7 +112,7 @@ static double length_of(const struct session *session, int first)
 	return length_mm;
 }
 
-/* The longest incision, by the number of its first cut; -1: there is none. @n: how many there are */
+/* The longest incision, by the number of its first cut; -1: no incision. @n: how many there are */
 static int longest(const struct session *session, double *length_mm, int *n)
 {
 	int best = -1;

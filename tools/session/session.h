@@ -19,7 +19,7 @@
 #include <incise/plan.h>
 #include <incise/scene.h>
 
-/* Of the file: readers refuse others. */
+/* Schema of the file: readers refuse others. */
 #define SESSION_FORM 1
 
 #define SESSION_CODE_MAX 16 /* characters */
@@ -27,7 +27,7 @@
 #define SESSION_CUTS_MAX 1024 /* as of tissue.cuts_most */
 #define SESSION_TRACE_MAX 16384
 
-/* Beyond these a value is damage: a year, and what lib/tissue takes for a place. */
+/* Beyond these a value is damage: a year, and lib/tissue's limit of a place. */
 #define SESSION_TIME_MAX_S 3.2e7
 #define SESSION_PLACE_MAX_MM 1e6
 #define SESSION_FORCE_MAX_N 1e6
@@ -78,7 +78,7 @@ struct session {
 	double first_s, last_s; /* contacts */
 	double needed_s; /* from the first contact until the tube is in place, or the last contact */
 
-	double phases_apart_s; /* shorter gaps between those of one tool are closed */
+	double phases_apart_s; /* shorter gaps between phases of one tool are closed */
 	double phases_left_out;
 	int n_phases;
 	struct session_phase phase[SESSION_PHASES_MAX];
@@ -91,14 +91,14 @@ struct session {
 	struct {
 		double force_N, open_mm, turns, turned_deg, time_s;
 	} enlarging;
-	/* Of the tube; its depth now is that at the end. */
+	/* Numbers of the tube; its depth now is its depth at the end. */
 	struct {
 		double depth_mm, seated_mm, force_N, placed_s;
 	} insertion;
-	/* Of tools that came to the depth of the membrane. */
+	/* Numbers of tools that came to the depth of the membrane. */
 	struct {
 		bool hit, punctured;
-		enum incise_tool tool;	 /* that hit it first; AUTO: none */
+		enum incise_tool tool;	 /* that hit it first; AUTO: no tool */
 		double t_s, off_axis_mm; /* then */
 		double missed;		 /* how often a tool came beside it */
 		double missed_mm;	 /* least distance from the axis then */
@@ -131,7 +131,7 @@ struct session_digest;
 struct session_digest *session_digest_new(const struct incise_scene *scene,
 					  struct incise_error *err);
 
-/* Add a tick, each once and in order. One that is not finite or of the past is counted only. */
+/* Add a tick, each once and in order. A tick that is not finite or of the past is only counted. */
 void session_digest_tick(struct session_digest *digest, const struct incise_tick *tick);
 
 /* Ticks that never came, in total. */
@@ -179,10 +179,10 @@ void session_criterion_asked(int criterion, const struct incise_scene_criterion 
 /* To so many digits, and without a negative 0. */
 double session_rounded(double value, int digits);
 
-/* NAN: of yes and no there is none. */
+/* NAN: yes and no have no difference. */
 double session_criterion_difference(int criterion, double value, double reference);
 
-/* "29.6", "yes", "-" where there is none. */
+/* "29.6", "yes", "-" without a value. */
 void session_criterion_value(int criterion, double value, char *text, size_t size);
 
 /* --- figures --- */

@@ -557,7 +557,7 @@ static int take_trace(struct reader *reader, const json_t *json, struct session 
 	return rc;
 }
 
-/* Checks beyond those of the tables. */
+/* Checks beyond the tables' checks. */
 static int check(struct reader *reader, struct session *session)
 {
 	reader->place[0] = 0;

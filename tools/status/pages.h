@@ -20,8 +20,8 @@ struct state_pages {
 };
 
 /*
- * Open the page of a name, a scene or a file, or with NULL all; fails if there is none. Of
- * two pages of one name it takes that of the live loop. Warns of unreadable pages.
+ * Open the page of a name, a scene or a file, or with NULL all; fails without a page. If
+ * two pages have one name, it takes the live loop's. Warns of unreadable pages.
  */
 void state_pages_open(struct state_pages *pages, const char *asked);
 

@@ -77,7 +77,7 @@ static void put_state(FILE *out, loop *l, const char *metric)
 	put_count(out, l, metric, "state", "dead", !strcmp(word, "dead"));
 }
 
-/* Before the first tick none is held. */
+/* Before the first tick no tool is held. */
 static void put_tool(FILE *out, loop *l, const char *metric)
 {
 	for (int i = INCISE_TOOL_BLADE; loop_tool_names[i]; i++)
@@ -160,7 +160,7 @@ static void put_cost(FILE *out, loop *l, const char *metric)
 	put_histogram(out, l, metric, &l->now->cost, l->now->cost_sum_ns);
 }
 
-/* Where a value is in struct incise_state_now, and what it takes to the base unit. */
+/* Where a value is in struct incise_state_now, and its factor to the base unit. */
 #define AT(field) offsetof(struct incise_state_now, field)
 
 enum kind { OTHER, COUNT, REAL, TIME };

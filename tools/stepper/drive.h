@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * An actuator driven by hand: targets are repeated, as its deadman requires, and whatever
- * ends the program brings it to rest first.
+ * An actuator driven by hand: targets are repeated, as its deadman requires, and the program
+ * brings it to rest before any end.
  *
  *   open ─▶ power ─▶ ⟲ target, pass ─▶ end
  *             ╰────────────┴─▶ fault, Ctrl-C: to rest, power off, one line
  *
- * Times are those of the rig's clock, simulated or real.
+ * Times follow the rig's clock, simulated or real.
  */
 #ifndef INCISE_STEPPER_DRIVE_TOOL_H
 #define INCISE_STEPPER_DRIVE_TOOL_H

@@ -150,7 +150,7 @@ static bool read_histogram(struct controller *controller, const char *file, bool
 	return ok && bins;
 }
 
-/* Of "motor=0 edges=7 …" the edges, which the status page does not have. */
+/* The edges in "motor=0 edges=7 …", which the status page does not have. */
 static bool read_counters(struct controller *controller)
 {
 	FILE *stream = open_debugfs(controller, "counters");

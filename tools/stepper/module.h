@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
  * Controllers of the kernel module, as incise info prints them. A part of its own, as the
- * kernel's names (uapi) and those of incise/stepper.h exclude each other.
+ * kernel's names (uapi) and the names of incise/stepper.h exclude each other.
  */
 #ifndef INCISE_STEPPER_MODULE_TOOL_H
 #define INCISE_STEPPER_MODULE_TOOL_H
@@ -11,7 +11,7 @@
 /* Whether it is "stepper", for all controllers, or the path of one. */
 bool stepper_module_is(const char *what);
 
-/* Print it; fails the program if there is none. */
+/* Print it; fails the program without a module. */
 void stepper_module_show(const char *what, bool json);
 
 #endif

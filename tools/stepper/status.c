@@ -107,7 +107,7 @@ static void drop_name(struct incise_stepper *stepper, char *text)
 		memmove(text, rest + 2, strlen(rest + 2) + 1);
 }
 
-/* The device's own text for its fault; false if it only has that of the bit. */
+/* The device's own text for its fault; false if it only has the bit's text. */
 static bool own_cause(struct incise_stepper *stepper, unsigned int faults, char *text,
 		      size_t size)
 {
@@ -225,7 +225,7 @@ static json_t *measured(const struct incise_stepper_info *info, double value)
 	return info->measures_handle ? json_number(value) : json_null();
 }
 
-/* The device's own text, else that of its first fault; null without a fault. */
+/* The device's own text, else the text of its first fault; null without a fault. */
 static json_t *cause_json(struct incise_stepper *stepper, unsigned int faults)
 {
 	char text[300];

@@ -35,7 +35,7 @@ json_t *stepper_status_json(struct incise_stepper *stepper,
 /* Counters since the backend was opened, for example late SYNCs: an object of their keys. */
 json_t *stepper_counters_json(struct incise_stepper *stepper);
 
-/* One line of those that count trouble; none if there was none. */
+/* One line of the counters that count trouble; no line without trouble. */
 void stepper_counters_line(struct incise_stepper *stepper);
 
 #endif

@@ -29,11 +29,12 @@ struct row {
 };
 
 struct dataset {
-	const struct source_options *options;
+	const struct incise_sources_options *options;
+	const struct incise_trained *trained;
 	const struct incise_corpus *corpus;
+	int n_columns;
 	struct row *rows;
 	int n;
-	uint64_t left_out;
 	double min[INCISE_MODEL_INPUTS_MAX + 1], max[INCISE_MODEL_INPUTS_MAX + 1];
 };
 
@@ -41,7 +42,7 @@ static void find_outliers(struct dataset *data)
 {
 	double *values = cli_alloc(data->n, sizeof(*values));
 
-	for (int c = 0; c < data->options->n_columns && data->n >= GROUPS_MIN; c++) {
+	for (int c = 0; c < data->n_columns && data->n >= GROUPS_MIN; c++) {
 		double middle, spread;
 
 		for (int i = 0; i < data->n; i++)
@@ -75,20 +76,20 @@ static void collect(struct dataset *data)
 
 			row->source = survey;
 			row->group = &survey->groups[g];
-			for (int c = 0; c < data->options->n_columns; c++)
+			for (int c = 0; c < data->n_columns; c++)
 				row->mean[c] =
 					row->group->sum[c] / (double)row->group->rows;
 		}
 	}
 	incise_corpus_ranges(data->corpus, data->min, data->max);
-	if (data->options->group)
+	if (data->trained->group)
 		find_outliers(data);
 }
 
 /* A group by its name, which a whole source has as its hash. */
 static const char *name_of(const struct dataset *data, const struct row *row)
 {
-	return strcmp(data->options->group, "recording") ? row->group->name
+	return strcmp(data->trained->group, "recording") ? row->group->name
 							 : row->source->text;
 }
 
@@ -118,13 +119,13 @@ static void show_text(const struct dataset *data)
 
 	printf("%s, %s", cli_count(n, "source"),
 	       cli_count(incise_corpus_side(data->corpus, false)->rows, "row"));
-	if (data->options->group)
-		printf(", %s by %s", cli_count(data->n, "group"), data->options->group);
-	if (data->left_out)
+	if (data->trained->group)
+		printf(", %s by %s", cli_count(data->n, "group"), data->trained->group);
+	if (data->trained->left_out)
 		printf("; the blade did not advance in %llu more",
-		       (unsigned long long)data->left_out);
+		       (unsigned long long)data->trained->left_out);
 	printf("\n");
-	for (int c = 0; c < data->options->n_columns; c++)
+	for (int c = 0; c < data->n_columns; c++)
 		printf("%s: %g to %g\n", data->options->columns[c], data->min[c],
 		       data->max[c]);
 	for (int s = 0; s < n; s++) {
@@ -132,15 +133,15 @@ static void show_text(const struct dataset *data)
 			incise_corpus_source(data->corpus, s);
 
 		printf("%.12s  %15s", survey->hash, cli_count(survey->rows, "row"));
-		if (data->options->group)
+		if (data->trained->group)
 			printf(" %11s", cli_count(survey->n_groups, "group"));
 		print_source(survey->text);
 	}
-	for (int i = 0; i < data->n && data->options->group; i++) {
+	for (int i = 0; i < data->n && data->trained->group; i++) {
 		const struct row *row = &data->rows[i];
 
 		outliers += row->outlier;
-		for (int c = 0; c < data->options->n_columns && row->outlier; c++)
+		for (int c = 0; c < data->n_columns && row->outlier; c++)
 			if (fabs(row->distance[c]) > LIMIT)
 				printf("outlier: group %.*s of %.*s: mean %s %g is %+.1f "
 				       "deviations from the median of the groups\n",
@@ -150,9 +151,9 @@ static void show_text(const struct dataset *data)
 				       row->source->text, data->options->columns[c],
 				       row->mean[c], row->distance[c]);
 	}
-	if (data->options->group && data->n < GROUPS_MIN)
+	if (data->trained->group && data->n < GROUPS_MIN)
 		printf("outliers are sought from %d groups on\n", GROUPS_MIN);
-	else if (data->options->group && !outliers)
+	else if (data->trained->group && !outliers)
 		printf("no group is further than %g deviations from the median\n", LIMIT);
 }
 
@@ -160,7 +161,7 @@ static void show_json(const struct dataset *data)
 {
 	json_t *columns = json_array(), *sources = json_array(), *groups = json_array();
 
-	for (int c = 0; c < data->options->n_columns; c++)
+	for (int c = 0; c < data->n_columns; c++)
 		json_array_append_new(
 			columns, json_pack("{so sf sf}", "name",
 					   json_text(data->options->columns[c]), "min",
@@ -173,9 +174,9 @@ static void show_json(const struct dataset *data)
 			sources, json_pack("{ss so sI si}", "sha256", survey->hash,
 					   "text", json_text(survey->text), "rows",
 					   (json_int_t)survey->rows, "groups",
-					   data->options->group ? survey->n_groups : 0));
+					   data->trained->group ? survey->n_groups : 0));
 	}
-	for (int i = 0; i < data->n && data->options->group; i++) {
+	for (int i = 0; i < data->n && data->trained->group; i++) {
 		const struct row *row = &data->rows[i];
 
 		json_array_append_new(
@@ -183,41 +184,41 @@ static void show_json(const struct dataset *data)
 			json_pack("{so ss sI so so sb}", "name",
 				  json_text(name_of(data, row)), "source",
 				  row->source->hash, "rows", (json_int_t)row->group->rows,
-				  "means",
-				  json_numbers(row->mean, data->options->n_columns),
+				  "means", json_numbers(row->mean, data->n_columns),
 				  "deviations",
-				  json_numbers(row->distance, data->options->n_columns),
-				  "outlier", row->outlier));
+				  json_numbers(row->distance, data->n_columns), "outlier",
+				  row->outlier));
 	}
 	json_print(json_pack("{ss sI sI so so so}", "kind", "dataset", "rows",
 			     (json_int_t)incise_corpus_side(data->corpus, false)->rows,
-			     "left_out", (json_int_t)data->left_out, "columns", columns,
-			     "sources", sources, "groups", groups));
+			     "left_out", (json_int_t)data->trained->left_out, "columns",
+			     columns, "sources", sources, "groups", groups));
 }
 
-void dataset_show(char **paths, int n, struct source_options *options, bool json)
+static int show_source(void *user, const struct incise_train_step *step)
 {
-	struct source *sources = sources_new(paths, n, options);
-	struct incise_corpus *corpus =
-		incise_corpus_new(options->n_columns - 1, options->group, 1, 1);
-	struct dataset data = {.options = options, .corpus = corpus};
+	(void)user;
+	cli_progress("source %d of %d", step->source + 1, step->sources);
+	return 0;
+}
+
+void dataset_show(struct incise_train_source *sources, int n,
+		  struct incise_sources_options *options, bool json)
+{
+	struct incise_trained trained;
+	struct dataset data = {.options = options,
+			       .trained = &trained,
+			       .n_columns = options->n_inputs + 1};
 	struct incise_error err = {0};
 
-	if (!corpus)
-		cli_fail("no memory");
-	for (int i = 0; i < n; i++) {
-		cli_progress("source %d of %d", i + 1, n);
-		if (source_open(&sources[i], &err) ||
-		    incise_corpus_survey(corpus, &sources[i].corpus, &err))
-			cli_fail_with(&err);
-		data.left_out += sources[i].left_out;
-	}
-	cli_progress_end();
-	if (incise_corpus_settle(corpus, 0, &err))
+	options->train.progress = show_source;
+	options->end = INCISE_TRAIN_TO_CORPUS;
+	if (incise_train_sources(sources, n, options, &trained, &err))
 		cli_fail_with(&err);
+	cli_progress_end();
+	data.corpus = trained.corpus;
 	collect(&data);
 	json ? show_json(&data) : show_text(&data);
 	free(data.rows);
-	incise_corpus_free(corpus);
-	sources_free(sources, n);
+	incise_trained_free(&trained);
 }

@@ -178,7 +178,7 @@ int view_live_take(struct view_live *live, struct incise_view *view,
 		for (int i = 0; i < n && (live->own || live->looked); i++)
 			session_log_tick(log, &live->ticks[i]);
 	}
-	/* The picture has what the page still holds, a session what came since. */
+	/* The frame has the ticks of the page, a session the ticks since. */
 	if (!live->own && !live->looked) {
 		live->lost_before = live->lost;
 		live->reloads = live->now.reloads;

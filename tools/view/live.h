@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * Ticks of a running loop: another program's, read from its state page, or one in a thread of
+ * Ticks of a running loop: another program's, read from its state page, or a loop in a thread of
  * this program, which has a state page, too. A reader never delays the loop.
  */
 #ifndef INCISE_VIEW_LIVE_H

@@ -10,8 +10,8 @@
 #include <incise/replay.h>
 #include <incise/sim.h>
 #include "../cli/cli.h"
-#include "../cli/procedure.h"
 #include "../cli/recording.h"
+#include "../session/procedure.h"
 #include "../status/pages.h"
 #include "view.h"
 

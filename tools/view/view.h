@@ -43,7 +43,7 @@ struct view_job {
 	struct view_output output;
 	struct session_options session;
 	struct session_log *log; /* or NULL */
-	char fault[320];	 /* of the loop that was looked at; "": none */
+	char fault[320];	 /* of the watched loop; "": no loop */
 
 	struct incise_scene *scene;
 	double rate_hz;
@@ -66,7 +66,7 @@ void view_output_begin(struct view_output *output);
 bool view_output_wanted(const struct view_output *output);
 void view_output_end(struct view_output *output);
 
-/* Whether all frames are written that will be: the last one of a strip alone. */
+/* Whether no frame is left to write: after the last one of a strip without other files. */
 bool view_output_complete(const struct view_output *output);
 
 /* Print the files that were written, or add them to a report. */

@@ -77,6 +77,7 @@ int incise_sha256_text(const void *bytes, size_t n, char hex[INCISE_SHA256_TEXT]
 }
 
 int incise_sha256_file(const char *path, char hex[INCISE_SHA256_TEXT],
+		       bool (*stop)(void *user, size_t n), void *user,
 		       struct incise_error *err)
 {
 	int fd = open(path, O_RDONLY | O_CLOEXEC), code;
@@ -85,7 +86,8 @@ int incise_sha256_file(const char *path, char hex[INCISE_SHA256_TEXT],
 	ssize_t n = -1;
 
 	incise_sha256_start(&sha);
-	while (fd >= 0 && (n = read(fd, bytes, sizeof(bytes))) > 0)
+	while (fd >= 0 && (n = read(fd, bytes, sizeof(bytes))) > 0 &&
+	       !(stop && stop(user, (size_t)n)))
 		incise_sha256_add(&sha, bytes, (size_t)n);
 	code = errno;
 	if (fd >= 0)

@@ -32,8 +32,12 @@ int incise_sha256_end(struct incise_sha256 *sha, char hex[INCISE_SHA256_TEXT]);
 int incise_sha256_of(const void *bytes, size_t n, uint8_t digest[INCISE_SHA256_BYTES]);
 int incise_sha256_text(const void *bytes, size_t n, char hex[INCISE_SHA256_TEXT]);
 
-/* That of a file. Returns 0, or the negative errno of open(2) or read(2). */
+/*
+ * That of a file. @stop, or NULL, is asked after each @n bytes and ends it, with the digest of a part. Returns
+ * 0, or the negative errno of open(2) or read(2).
+ */
 int incise_sha256_file(const char *path, char hex[INCISE_SHA256_TEXT],
+		       bool (*stop)(void *user, size_t n), void *user,
 		       struct incise_error *err);
 
 /* 64 lower-case hexadecimal digits and a NUL. */

@@ -98,7 +98,7 @@ const struct incise_setting incise_actuator_can_settings[] = {
  *   SYNC n + 3
  *
  * that is x[n+1] = x[n] + T K (target - x[n-d]) with d = 2; another cycle is left for what
- * drive and bus add. Its roots, those of z^(d+1) - z^d + T K, lie within the unit circle for
+ * drive and bus add. The roots of z^(d+1) - z^d + T K lie within the unit circle for
  *
  *   0 < T K < 2 sin(π / (2 (2d + 1)))
  *

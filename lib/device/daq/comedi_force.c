@@ -5,9 +5,9 @@
  *
  *   card ─▶ its FIFO ─▶ kernel's buffer (up to 2 s) ─▶ thread, by blocks ─▶ feed
  *
- * There are no timestamps: t_ns is computed from the arrival of blocks. How many samples
- * an overflow lost is known by that time only, to a few samples; that it happened is
- * certain.
+ * There are no timestamps: t_ns is computed from the arrival of blocks. Only that time
+ * gives the number of samples that an overflow lost, to a few samples; the overflow
+ * itself is certain.
  */
 #include <errno.h>
 #include <fcntl.h>
@@ -21,8 +21,8 @@
 #include <comedilib.h>
 #include "../../base/monotonic.h"
 #include "../backends.h"
+#include "../daq_feed.h"
 #include "../stable_path.h"
-#include "daq_feed.h"
 
 /* --- card: subdevice, channel, range, and the command that samples them --- */
 
@@ -59,7 +59,7 @@ static int bits_of(lsampl_t maxdata)
 }
 
 /*
- * The narrowest range that is as wide as @full_scale_V; of two such, the one that starts
+ * The narrowest range that is as wide as @full_scale_V; if two are, the range that starts
  * higher (0 … 5 V before ±2.5 V). Its number, or -1. For 0 V the first.
  */
 static int choose_range(const comedi_range *ranges, int n, double full_scale_V)
@@ -122,7 +122,7 @@ static int card_error(const struct card *card, int code, const char *what,
 				card->path);
 }
 
-/* "/dev/comedi0:1"; -1 in @subdevice where none is named. */
+/* "/dev/comedi0:1"; -1 in @subdevice without a number. */
 static int parse(struct card *card, const char *arguments, int *subdevice,
 		 struct incise_error *err)
 {
@@ -271,7 +271,7 @@ static int take_rate(struct card *card, struct incise_error *err)
 			"force_setup.rate_hz",
 			card->where, card->path, card->setup.rate_hz,
 			1e9 / card->period_ns);
-	/* A larger buffer than the maximum is refused. */
+	/* The driver refuses a larger buffer than the maximum. */
 	want = (int)(card->setup.rate_hz * BUFFER_S) * (card->wide ? 4 : 2);
 	if (comedi_get_buffer_size(card->device, card->subdevice) < want) {
 		int most = comedi_get_max_buffer_size(card->device, card->subdevice);
@@ -457,7 +457,7 @@ static void pass_on(struct comedi_force *f, size_t bytes, bool last)
 			memcpy(&narrow, f->block + i * sizeof(narrow), sizeof(narrow));
 		if (f->gap)
 			count_gap(f, last_ns, t_ns);
-		/* Bits above those of the converter do not belong to the sample. */
+		/* Bits above the converter's do not belong to the sample. */
 		daq_feed_put(&f->feed, t_ns,
 			     (int32_t)((wide | narrow) &
 				       ((UINT32_C(1) << f->card.bits) - 1)));
@@ -674,7 +674,7 @@ static int force_scan(const char *arguments, incise_scan_found *found, void *con
 	int rc = 0;
 
 	(void)err;
-	/* Of "/dev/comedi0:0" the whole card is shown. */
+	/* For "/dev/comedi0:0" the whole card is shown. */
 	if (*arguments)
 		snprintf(pattern, sizeof(pattern), "%.*s", (int)(strcspn(arguments, ":")),
 			 arguments);

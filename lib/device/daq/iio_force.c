@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "../backends.h"
-#include "daq_feed.h"
+#include "../daq_feed.h"
 #include "iio_source.h"
 
 /*

@@ -471,7 +471,7 @@ static int use_named(struct iio_source *s, struct incise_error *err)
 	return rc ? refused(s, rc, "set the trigger", err) : 0;
 }
 
-/* The one named in rig.conf, our own, or the one already set. */
+/* The trigger named in rig.conf, our own, or the trigger already set. */
 static int set_trigger(struct iio_source *s, struct incise_error *err)
 {
 	static const char key[] = "trigger/current_trigger";

@@ -41,7 +41,7 @@ struct iio_source {
 	const char
 		*trigger_folder; /* where our own trigger is made: IIO_SOURCE_TRIGGERS */
 	bool trigger_refused;	 /* for lack of permission */
-	char trigger[64];	 /* our own; empty: none was made */
+	char trigger[64];	 /* our own; empty: not made */
 	char trigger_used[64];
 	char trigger_before[64]; /* restored on close */
 	bool trigger_set;
@@ -71,9 +71,9 @@ int iio_source_start(struct iio_source *source, const char *folder, unsigned int
 /* The device may be gone. */
 void iio_source_stop(struct iio_source *source);
 
-/* Number of scans read, or -errno: -EAGAIN (none), -ENODEV. */
+/* Number of scans read, or -errno: -EAGAIN (no scan), -ENODEV. */
 int iio_source_read(struct iio_source *source);
-/* Of scan @i of those. */
+/* The code and the timestamp of scan @i that was read. */
 int32_t iio_source_code(const struct iio_source *source, int i);
 int64_t iio_source_timestamp(const struct iio_source *source, int i);
 

@@ -15,7 +15,7 @@ struct gpio_lines;
  * Request the lines of a chip; the first INCISE_LINES_OUT are outputs, at the levels of @idle.
  *
  * @chip: name, label or path of the chip
- * @line: offsets, -1 for none, in the order of enum incise_actuator_line
+ * @line: offsets, -1 without a line, in the order of enum incise_actuator_line
  * @idle: bits 1 << line of outputs that start high
  * Returns NULL with errno: ENOENT (no such chip), EBUSY (a line is taken), EINVAL (no such
  * line), EACCES, ENOMEM …

@@ -35,7 +35,7 @@ const struct incise_setting incise_actuator_line_settings[] = {
 	{0},
 };
 
-/* Names in active_low = ["enable", "estop"]; behind those of the lines. */
+/* Names in active_low = ["enable", "estop"]; behind the names of the lines. */
 static int read_active_low(void *to, const config_setting_t *names, const char *path,
 			   struct incise_error *err)
 {

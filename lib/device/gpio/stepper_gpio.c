@@ -20,9 +20,9 @@
 #include "../../base/monotonic.h"
 #include "../backends.h"
 #include "../motor.h"
+#include "../pulser.h"
 #include "../thread.h"
 #include "gpio_lines.h"
-#include "pulser.h"
 
 #define SLEEPS 64 /* of the self-test */
 #define SLEEP_NS 200000

@@ -2,11 +2,15 @@
 /*
  * Samples from the bytes of an OpenIGTLink server; see igtl_poses.h.
  */
+#include <endian.h>
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include <strings.h>
+#include <openigtlink/igtl_position.h>
+#include <openigtlink/igtl_tdata.h>
+#include <openigtlink/igtl_transform.h>
 #include "../../base/vector.h"
 #include "igtl_poses.h"
 
@@ -258,6 +262,88 @@ static bool is_ours(struct igtl_poses *poses, const char *name)
 	return !*poses->device || !strcmp(poses->device, name);
 }
 
+/* --- bodies --- */
+
+/* Each reader: 0; -EPROTO (another size), -EDOM (a value is not finite). */
+
+/* On the wire by columns: three axes, then the translation. */
+static int read_matrix(const void *from, double matrix[3][4])
+{
+	igtl_float32 column[12];
+
+	memcpy(column, from, sizeof(column));
+	igtl_transform_convert_byte_order(column);
+	for (int i = 0; i < 12; i++) {
+		matrix[i % 3][i / 3] = column[i];
+		if (!isfinite(column[i]))
+			return -EDOM;
+	}
+	return 0;
+}
+
+static int read_transform(const struct incise_igtl_message *message, double matrix[3][4])
+{
+	return message->n == IGTL_TRANSFORM_SIZE ? read_matrix(message->content, matrix)
+						 : -EPROTO;
+}
+
+/* The rotation of a quaternion (x, y, z, w) of any length but 0. */
+static int set_rotation(double matrix[3][4], const double q[4])
+{
+	double norm = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+
+	/* Squares of floats are in the range of double. */
+	if (!isfinite(norm) || !(norm > 0))
+		return -EDOM;
+	for (int i = 0; i < 3; i++) {
+		int j = (i + 1) % 3, k = (i + 2) % 3;
+
+		matrix[i][i] = 1 - 2 * (q[j] * q[j] + q[k] * q[k]) / norm;
+		matrix[i][j] = 2 * (q[i] * q[j] - q[k] * q[3]) / norm;
+		matrix[i][k] = 2 * (q[i] * q[k] + q[j] * q[3]) / norm;
+	}
+	return 0;
+}
+
+/* Without an orientation the rotation is the unit matrix; a quaternion is normalised. */
+static int read_position(const struct incise_igtl_message *message, double matrix[3][4])
+{
+	igtl_position position = {.quaternion = {0}};
+	double q[4] = {0, 0, 0, 1};
+
+	if (message->n != IGTL_POSITION_MESSAGE_POSITON_ONLY_SIZE &&
+	    message->n != IGTL_POSITION_MESSAGE_WITH_QUATERNION3_SIZE &&
+	    message->n != IGTL_POSITION_MESSAGE_DEFAULT_SIZE)
+		return -EPROTO;
+	memcpy(&position, message->content, message->n);
+	igtl_position_convert_byte_order(&position);
+	for (int i = 0; i < 3; i++) {
+		matrix[i][3] = position.position[i];
+		if (!isfinite(matrix[i][3]))
+			return -EDOM;
+	}
+	for (int i = 0; i < (int)message->n / 4 - 3; i++)
+		q[i] = position.quaternion[i];
+	/* Of a quaternion with three numbers, w is what makes it a unit. */
+	if (message->n == IGTL_POSITION_MESSAGE_WITH_QUATERNION3_SIZE)
+		q[3] = sqrt(fmax(0, 1 - q[0] * q[0] - q[1] * q[1] - q[2] * q[2]));
+	return set_rotation(matrix, q);
+}
+
+/* Element @i of a TDATA, and the name of its instrument. -ENOENT: there are fewer. */
+static int read_tdata(const struct incise_igtl_message *message, size_t i, char *name,
+		      double matrix[3][4])
+{
+	const igtl_tdata_element *element = (const void *)message->content;
+
+	if (message->n % sizeof(*element))
+		return -EPROTO;
+	if (i >= message->n / sizeof(*element))
+		return -ENOENT;
+	incise_igtl_name(name, element[i].name, sizeof(element[i].name));
+	return read_matrix(element[i].transform, matrix);
+}
+
 /* PLUS sends the state of a tool as metadata: "OK", or else. */
 static bool is_seen(const struct incise_igtl_message *message)
 {
@@ -275,27 +361,29 @@ static void take_message(struct igtl_poses *poses,
 			 const struct incise_igtl_message *message, int64_t t_ns)
 {
 	struct incise_igtl_status status;
-	char name[INCISE_IGTL_NAME + 1];
+	char name[IGTL_HEADER_NAME_SIZE + 1];
 	bool seen = !poses->refused && is_seen(message);
 	double matrix[3][4];
 	int rc = -EPROTO;
 
 	poses->messages++;
 	if (!strcmp(message->type, "STATUS")) {
-		if (!incise_igtl_status(message, &status) &&
-		    (!*message->name || !strcmp(message->name, poses->device)))
-			poses->refused = status.code != INCISE_IGTL_OK;
+		if (message->n < sizeof(status) ||
+		    (*message->name && strcmp(message->name, poses->device)))
+			return;
+		memcpy(&status, message->content, sizeof(status));
+		poses->refused = be16toh(status.code) != INCISE_IGTL_OK;
 		return;
 	}
 	if (!strcmp(message->type, "TRANSFORM"))
-		rc = incise_igtl_transform(message, matrix);
+		rc = read_transform(message, matrix);
 	else if (!strcmp(message->type, "POSITION"))
-		rc = incise_igtl_position(message, matrix);
+		rc = read_position(message, matrix);
 	if (rc != -EPROTO && is_ours(poses, message->name))
 		take(poses, rc ? NULL : (const double(*)[4])matrix, seen, message->utc_ns,
 		     t_ns);
-	for (int i = 0; !strcmp(message->type, "TDATA"); i++) {
-		rc = incise_igtl_tdata(message, i, name, matrix);
+	for (size_t i = 0; !strcmp(message->type, "TDATA"); i++) {
+		rc = read_tdata(message, i, name, matrix);
 		if (rc && rc != -EDOM)
 			break;
 		if (is_ours(poses, name))

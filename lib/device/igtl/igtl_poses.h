@@ -20,17 +20,17 @@
 #define INCISE_IGTL_POSES_H
 
 #include <stdatomic.h>
-#include <incise/igtl.h>
 #include <incise/tracker.h>
 #include "../../base/ring.h"
 #include "../pace.h"
 #include "../tracker_feed.h"
+#include "igtl_message.h"
 
 #define IGTL_NAMES 8 /* of devices that are remembered for a message */
 
 struct igtl_poses {
 	struct incise_tracker_setup setup;
-	char device[INCISE_IGTL_NAME + 1]; /* "": any */
+	char device[IGTL_HEADER_NAME_SIZE + 1]; /* "": any */
 	struct incise_igtl_stream *stream;
 	struct incise_ring ring; /* of struct incise_tracker_sample */
 	struct incise_pace pace;
@@ -41,7 +41,7 @@ struct igtl_poses {
 	bool restarted;	   /* the next sample is marked so */
 	bool refused;	   /* the device's last STATUS was an error */
 	/* Names of devices that sent poses. */
-	char names[IGTL_NAMES][INCISE_IGTL_NAME + 1];
+	char names[IGTL_NAMES][IGTL_HEADER_NAME_SIZE + 1];
 	int n_names;
 	/* Poses so far, and times of the first and the last one. */
 	uint64_t n;

@@ -27,6 +27,7 @@
 #include "igtl_poses.h"
 
 #define MS INT64_C(1000000)
+#define PORT 18944
 #define CONNECT_MS 2000
 #define FIRST_MS 5000  /* for enough poses to know the rate */
 #define LEARN_NS 5e8   /* of poses */
@@ -257,7 +258,7 @@ static int parse(struct igtl_tracker *t, const char *arguments, const char **dev
 	bool bad = !host_n || (bracket && !host[host_n]) || host_n >= sizeof(t->host) ||
 		   (*port && *port != ':') || (*port && !port_n) ||
 		   port_n >= sizeof(t->port);
-	long number = bad || !port_n ? INCISE_IGTL_PORT : strtol(port + 1, NULL, 10);
+	long number = bad || !port_n ? PORT : strtol(port + 1, NULL, 10);
 
 	*device = port_n && port[1 + port_n] ? port + 2 + port_n : "";
 	if (port_n &&
@@ -267,14 +268,14 @@ static int parse(struct igtl_tracker *t, const char *arguments, const char **dev
 			"%s: \"%.80s\": the port is not a number from 1 to "
 			"65535; correct it",
 			where, arguments);
-	bad |= strlen(*device) > INCISE_IGTL_NAME ||
+	bad |= strlen(*device) > IGTL_HEADER_NAME_SIZE ||
 	       (port_n && port[1 + port_n] && !**device);
 	if (bad)
 		return incise_error_set(
 			err, EINVAL,
 			"%s: \"%.80s\": expected igtl:HOST:PORT:DEVICE with a name of at most "
 			"%d letters, such as igtl:localhost:18944:StylusToTracker; correct it",
-			where, arguments, INCISE_IGTL_NAME);
+			where, arguments, IGTL_HEADER_NAME_SIZE);
 	snprintf(t->host, sizeof(t->host), "%.*s", (int)host_n, host);
 	snprintf(t->port, sizeof(t->port), "%ld", number);
 	return 0;

@@ -10,12 +10,12 @@
 #include <unistd.h>
 #include "liblsl.h"
 
-#define LIBRARY_VARIABLE "PYLSL_LIB" /* of pylsl, and of those who know it */
+#define LIBRARY_VARIABLE "PYLSL_LIB" /* of pylsl and its users */
 #define CONFIG_VARIABLE "LSLAPICFG"
 /* Its fatal errors only: that a stream broke off is reported by the reader, in its own words. */
 #define QUIET "[log]\nlevel = -3\n"
 
-/* Whether liblsl finds a configuration, which is the user's: the places are those it reads. */
+/* Whether liblsl finds a configuration of the user, in the places that it reads. */
 static bool is_configured(void)
 {
 	const char *home = getenv("HOME");

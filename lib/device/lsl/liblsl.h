@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
  * liblsl of the Lab Streaming Layer, opened at run time: Debian has no package of it. The
- * functions and their types are those of its documented C interface, of version 1.13 and later.
+ * functions and their types follow its documented C interface, of version 1.13 and later.
  */
 #ifndef INCISE_LIBLSL_H
 #define INCISE_LIBLSL_H
@@ -65,9 +65,9 @@ struct liblsl {
 
 /*
  * Open PYLSL_LIB of the environment, else liblsl.so.2, else liblsl.so, and never close it: its
- * threads outlive what they were started for. Unless a configuration of LSL is there, its
- * messages on stderr are turned off but for fatal errors: what concerns the user is in the errors
- * of the callers. 0, -ENOENT (there is none), -ENOEXEC (it lacks a function).
+ * threads outlive their work. Unless a configuration of LSL is there, its messages on stderr are
+ * turned off but for fatal errors: the callers' errors tell the user enough. 0, -ENOENT (no
+ * library), -ENOEXEC (it lacks a function).
  */
 int liblsl_open(struct liblsl *lsl, const char *where, struct incise_error *err);
 

@@ -17,7 +17,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "../backends.h"
-#include "../daq/daq_feed.h"
+#include "../daq_feed.h"
 #include "../pace.h"
 #include "liblsl.h"
 
@@ -33,7 +33,7 @@
 #define BITS 31
 #define STREAMS_MAX 64
 #define OLD_S (QUEUE_S + 5.0) /* in the queue here, and some in the sender's */
-#define AHEAD_S 0.5	      /* a correction that is off by more is none */
+#define AHEAD_S 0.5	      /* a correction that is off by more is invalid */
 #define BACK_NS 250e6	      /* no clock is set back by less */
 #define STRAYS 8   /* samples in a row of another time, after which it is the right one */
 #define DOUBTS 100 /* samples after which a sender is wrong, not one sample */
@@ -62,7 +62,7 @@ struct lsl_force {
 	int n_channels, channel;
 	const struct unit *unit;
 	double step;	 /* N or V per code */
-	int64_t last_ns; /* of the last sample; 0: none */
+	int64_t last_ns; /* of the last sample; 0: no sample */
 	double last_value;
 	int strays;
 	/* Samples that were taken; of no time in the queue, and how far that was off; of an equal time. */
@@ -88,7 +88,7 @@ static void take(struct lsl_force *f, double value, double stamp_s, int64_t now_
 	uint64_t missing;
 	int64_t t_ns;
 
-	/* No time that a sample in the queue can have: it is lost, as is a force that is no number. */
+	/* No sample in the queue can have this time: it is lost, like a force that is no number. */
 	if (!(t_s >= 0 && t_s > now_s - OLD_S && t_s < now_s + AHEAD_S)) {
 		f->timeless++;
 		f->off_s = t_s - now_s;
@@ -117,7 +117,7 @@ static void take(struct lsl_force *f, double value, double stamp_s, int64_t now_
 		daq_feed_lose(&f->feed, 1);
 }
 
-/* The fault of most samples, which a count of losses does not show; NULL: none. */
+/* The fault of most samples, which a count of losses does not show; NULL: no fault. */
 static const char *doubt(struct lsl_force *f, char text[200])
 {
 	if (f->timeless >= DOUBTS && !f->taken)
@@ -486,8 +486,8 @@ static void *force_open(const struct incise_backend_request *request,
 /* --- search --- */
 
 /*
- * The channels of a stream, which are in its full description alone, and the first one with a unit
- * of a force. Returns how many have one.
+ * The channels of a stream, which are in its full description alone, and the first channel with a
+ * unit of a force. Returns how many have one.
  */
 static int list_channels(const struct liblsl *lsl, lsl_streaminfo found, char *list,
 			 size_t size, char *first, size_t first_size)
@@ -520,7 +520,7 @@ static int list_channels(const struct liblsl *lsl, lsl_streaminfo found, char *l
 	return fits;
 }
 
-/* Of several channels of forces the first one is named, as an example that can be opened. */
+/* If there are several channels of forces, the first is named, as an example that can be opened. */
 static void show(const struct liblsl *lsl, lsl_streaminfo info,
 		 struct incise_scan_device *device)
 {
@@ -569,7 +569,7 @@ static int force_scan(const char *arguments, incise_scan_found *found, void *con
 	for (int i = 0; i < n && i < STREAMS_MAX; i++) {
 		if (!rc) {
 			show(&lsl, all[i], &device);
-			/* Poses and markers are no force channels, but one that is asked for is shown. */
+			/* Poses and markers are no force channels, but a named stream is shown. */
 			if (device.usable || *arguments)
 				rc = found(context, &device);
 		}

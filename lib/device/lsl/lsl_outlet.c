@@ -16,7 +16,7 @@ struct incise_outlet {
 	lsl_outlet outlet;
 };
 
-/* Of the process, as liblsl has one state in it. */
+/* One for the process, as liblsl has one state in it. */
 static struct liblsl lsl;
 
 static void describe(lsl_streaminfo info, const struct incise_outlet_setup *setup)

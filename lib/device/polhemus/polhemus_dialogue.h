@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Commands to a tracker before records flow, and its answers. Waiting is counted in what
- * the reads waited, so that a test's line may have its own time.
+ * Commands to a tracker before records flow, and its answers. Waiting is counted by the
+ * waits of the reads, so that a test's line may have its own time.
  *
  *   FASTRAK    '2' station what … CR LF      in ASCII, also when records are binary
  *              '2' ' ' 'E' "*ERROR*" command "*ERROR* EC" code …
@@ -28,7 +28,7 @@ struct polhemus_status {
 	bool centimetres;
 	bool compensated;
 	bool continuous;
-	int test_error; /* of its self-test; 0: none */
+	int test_error; /* of its self-test; 0: no error */
 	int sensors;	/* bit 0: station 1 has one; -1: it does not say */
 	char version[7];
 	char id[33]; /* set by X; printable, without blanks at its ends */
@@ -52,7 +52,7 @@ struct polhemus_frame {
 	int family;
 	unsigned int station;
 	unsigned char command;
-	unsigned char error; /* 0 or ' ': none */
+	unsigned char error; /* 0 or ' ': no error */
 	const unsigned char *payload;
 	size_t n;      /* of payload */
 	size_t length; /* of all */
@@ -72,7 +72,7 @@ struct polhemus_dialogue {
 	struct incise_error *err;
 	unsigned char bytes[1024]; /* received, not yet parsed */
 	size_t n;
-	int64_t first_ns; /* when the first byte was received; 0: none was */
+	int64_t first_ns; /* when the first byte was received; 0: no byte yet */
 };
 
 /* All of these return -ECANCELED once line->stop is set. */
@@ -81,7 +81,7 @@ struct polhemus_dialogue {
 int polhemus_say(struct polhemus_dialogue *d, const char *command);
 
 /*
- * Drop bytes until none comes. -EBUSY, without a message: they come for more than 0.5 s.
+ * Drop bytes until they end. -EBUSY, without a message: they come for more than 0.5 s.
  */
 int polhemus_drain(struct polhemus_dialogue *d);
 

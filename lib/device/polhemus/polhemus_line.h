@@ -20,8 +20,8 @@ struct polhemus_line_ops {
 	int (*write)(struct polhemus_line *line, const void *bytes, size_t n);
 	/*
 	 * Returns the number of bytes that came, and the time of the last one
-	 * (CLOCK_MONOTONIC). 0: none within @timeout_ms; -ENODEV: gone, which reopen() may
-	 * mend; -EIO.
+	 * (CLOCK_MONOTONIC). 0: no bytes within @timeout_ms; -ENODEV: gone, which reopen()
+	 * may mend; -EIO.
 	 */
 	ssize_t (*read)(struct polhemus_line *line, void *bytes, size_t size,
 			int64_t *t_ns, int timeout_ms);

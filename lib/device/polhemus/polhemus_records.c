@@ -207,7 +207,7 @@ bool polhemus_records_next(struct polhemus_records *records,
 		if (found)
 			break;
 	}
-	/* Years of noise must not become none. */
+	/* Years of noise must not overflow to 0. */
 	records->skipped = records->skipped + at < records->skipped
 				   ? UINT32_MAX
 				   : records->skipped + at;

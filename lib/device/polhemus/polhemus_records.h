@@ -18,8 +18,8 @@
  * legal inside a float. So a record is believed when all of it holds: the header, the
  * sentinel at its distance, a quaternion of length 1, a position in the room, a switch that
  * is a switch. Where it does not, the search goes on one byte further: damage costs the
- * records that it touches. What it does to a position and leaves that in the room is
- * not seen; no program can.
+ * records that it touches. Damage that leaves a position in the room is not seen; no program can
+ * see it.
  */
 #ifndef INCISE_POLHEMUS_RECORDS_H
 #define INCISE_POLHEMUS_RECORDS_H
@@ -70,7 +70,7 @@ double polhemus_real(const unsigned char *bytes);
 /* Bytes of a record; 0: there is no such layout. */
 size_t polhemus_layout_length(const struct polhemus_layout *layout);
 
-/* One record at @bytes, which are polhemus_layout_length(): all of it holds, or false. */
+/* Take one record at @bytes, which are polhemus_layout_length(); false unless all of it holds. */
 bool polhemus_record_read(const struct polhemus_layout *layout,
 			  const unsigned char *bytes, struct polhemus_record *record);
 
@@ -78,8 +78,8 @@ void polhemus_records_init(struct polhemus_records *records,
 			   const struct polhemus_layout *layout);
 
 /*
- * Bytes that came at @t_ns. How many of them were taken: all, when polhemus_records_next()
- * was called until it said false, and @n is at most POLHEMUS_RECORD_MAX.
+ * Bytes that came at @t_ns. Returns how many of them were taken: all, if polhemus_records_next()
+ * was called until it returned false, and @n is at most POLHEMUS_RECORD_MAX.
  */
 size_t polhemus_records_put(struct polhemus_records *records, const unsigned char *bytes,
 			    size_t n, int64_t t_ns);

@@ -123,7 +123,7 @@ static int fastrak_put(struct polhemus_dialogue *d, const char *command,
 	return width == 2 && m != n ? polhemus_not_taken(d, what, reply) : 0;
 }
 
-/* A station that is to be on and is not. */
+/* A station that should be on and is off. */
 static int no_sensor(struct polhemus_dialogue *d, int station)
 {
 	return incise_error_set(
@@ -152,7 +152,7 @@ static int fastrak_stations(struct polhemus_dialogue *d, uint8_t mask)
 	if (polhemus_reply_fields(reply, 1, fields, POLHEMUS_STATIONS) !=
 	    POLHEMUS_STATIONS)
 		return polhemus_not_taken(d, "its stations", reply);
-	/* Where none of these is on, another one stays on. */
+	/* If all of these are off, another one stays on. */
 	for (int i = 0; i < POLHEMUS_STATIONS; i++)
 		if (mask >> i & 1 && !fields[i])
 			return no_sensor(d, i + 1);
@@ -414,9 +414,9 @@ static int no_answer(struct polhemus_dialogue *d)
 }
 
 /*
- * Stop any stream. CR ends an incomplete command, c the stream of a FASTRAK, P that of
- * the others. For those, c and CR start a stream; a FASTRAK answers P with records. All
- * answers are dropped.
+ * Stop any stream. CR ends an incomplete command, c the stream of a FASTRAK, P the stream
+ * of the others. For those, c and CR start a stream; a FASTRAK answers P with records.
+ * All answers are dropped.
  */
 static int quiet(struct polhemus_dialogue *d)
 {
@@ -425,7 +425,7 @@ static int quiet(struct polhemus_dialogue *d)
 							       : "\rc\rP";
 	int rc = -EBUSY;
 
-	/* Repeatedly: one that was just switched on may miss the first. */
+	/* Repeatedly: a tracker that was just switched on may miss the first. */
 	for (int i = 0; rc == -EBUSY && i < STOPS; i++) {
 		rc = polhemus_say(d, stop);
 		if (!rc)

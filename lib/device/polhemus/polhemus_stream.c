@@ -377,7 +377,7 @@ static void number(struct polhemus_stream *stream, const struct polhemus_record 
 	}
 }
 
-/* Lateness of one more record, if none is missing before those that wait and it. */
+/* Lateness of one more record, if no record is missing before it and the waiting ones. */
 static int64_t late_if_held_up(const struct polhemus_stream *stream,
 			       const struct polhemus_record *record, uint64_t *seq)
 {
@@ -480,7 +480,7 @@ static void take_record(struct polhemus_stream *stream,
 		return;
 	}
 	late_ns = late_if_held_up(stream, record, &seq);
-	/* Nobody may have looked in between. */
+	/* Maybe no call looked in between. */
 	if (wait->n && late_ns >= wait->least_late_ns - round_of(gaps) / 2) {
 		polhemus_stream_quiet(stream, record->t_ns);
 		late_ns = late_if_held_up(stream, record, &seq);

@@ -33,10 +33,10 @@
  * A loss is reported at once where stations are out of order, or half a record or more
  * was damaged. Where only time shows it, records behind a gap of 1.5 rounds or more are held
  * back, see struct polhemus_stream, for half a round: if they were held up, the others come
- * at once. Of a shorter gap the lateness must stay for POLHEMUS_GAPS_WINDOW records (0.5 s):
- * then the number is right, but its place in seq is that much late, which a reader of the
- * recording mends by the arrivals. A drift between the two clocks is followed. With sync
- * from outside there is no period; only order and damage show a loss.
+ * at once. After a shorter gap the lateness must stay for POLHEMUS_GAPS_WINDOW records (0.5 s): then
+ * the number is right, but its place in seq is that much late, which a reader of the recording mends
+ * by the arrivals. A drift between the two clocks is followed. With sync from outside there is no
+ * period; only order and damage show a loss.
  */
 #define POLHEMUS_GAPS_WINDOW 60
 
@@ -58,7 +58,7 @@ struct polhemus_gaps {
 	int last;	      /* its place in the order */
 	uint32_t frame;	      /* its count */
 	unsigned int refused; /* in a row */
-	/* Of the last record refused for its count. */
+	/* The last record refused for its count. */
 	uint32_t refused_frame;
 	int64_t refused_ns;
 	/* The window: least lateness in it, lateness of its first record. */
@@ -77,8 +77,8 @@ void polhemus_gaps_start(struct polhemus_gaps *gaps, int64_t t_ns);
 void polhemus_gaps_broken(struct polhemus_gaps *gaps);
 
 /*
- * Records that are certainly missing when none came since the last; never more than
- * count as lost when one comes after polhemus_gaps_broken().
+ * Records that are certainly missing if no record came since the last; never more than count as lost
+ * when a record comes after polhemus_gaps_broken().
  */
 uint64_t polhemus_gaps_silent(const struct polhemus_gaps *gaps, int64_t t_ns);
 
@@ -101,10 +101,10 @@ bool polhemus_gaps_add(struct polhemus_gaps *gaps, const struct polhemus_record 
 struct polhemus_wait {
 	struct polhemus_record *records; /* capacity of the ring */
 	size_t n;
-	uint64_t seq; /* of the last one, if none is missing before them */
+	uint64_t seq; /* of the last one, if no record is missing before them */
 	int last;     /* its place in the order */
 	int64_t first_late_ns, late_ns, least_late_ns;
-	int64_t since_ns; /* for so long none was less late by half a round */
+	int64_t since_ns; /* for so long no record was less late by half a round */
 };
 
 struct polhemus_stream {

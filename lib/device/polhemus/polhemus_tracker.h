@@ -22,7 +22,7 @@ struct polhemus_times {
 	int silent_ms, retry_ms, gone_ms;
 };
 
-/* Of a rig; tests use shorter ones. */
+/* Times of a rig; tests use shorter ones. */
 #define POLHEMUS_TIMES ((struct polhemus_times){1000, 250, 10000})
 
 /*

@@ -230,7 +230,7 @@ struct polhemus_line *polhemus_tty_open(const char *arguments, const char *where
 		errno = EINVAL;
 		return NULL;
 	}
-	/* Of a long path, the end is the part that differs. */
+	/* The ends of long paths differ. */
 	tail = tty->path + strlen(tty->path);
 	if ((size_t)(tail - tty->path) >= sizeof(tty->line.name))
 		tail -= sizeof(tty->line.name) - 1;

@@ -8,7 +8,7 @@
  *   interrupt IN       records of a stream (FASTRAK; the others send all on bulk IN)
  *
  * The descriptors say which endpoints these are. Each IN endpoint always has several
- * transfers of one packet in flight, so that none is missed while another is read; a
+ * transfers of one packet in flight, so that no packet is missed while another is read; a
  * packet is timestamped when its transfer completes. When unread packets fill the queue, no
  * transfer is submitted: the device waits, and no packet is dropped.
  */
@@ -51,7 +51,7 @@ static int read_id(const char *text, uint16_t *id)
 	return 0;
 }
 
-/* Skip a number as write_path() writes it, at most 255; NULL: there is none. */
+/* Skip a number as write_path() writes it, at most 255; NULL: no number. */
 static const char *skip_number(const char *text)
 {
 	int value = 0, n = 0;
@@ -142,7 +142,7 @@ static void path_of(libusb_device *device, char path[USB_PATH_MAX])
 	write_path(path, libusb_get_bus_number(device), ports, n > 0 ? n : 0);
 }
 
-/* 0, with "" where it has none; -EACCES; -EIO: it does not answer. */
+/* 0, with "" without a serial number; -EACCES; -EIO: it does not answer. */
 static int serial_of(libusb_device *device, const struct libusb_device_descriptor *d,
 		     char serial[USB_SERIAL_MAX])
 {
@@ -213,7 +213,7 @@ static struct fitting find_fitting(libusb_device **list, const struct usb_name *
 	return f;
 }
 
-/* One that waits for its firmware, and its path; NULL: there is none. */
+/* A tracker that waits for its firmware, and its path; NULL: no such tracker. */
 static const struct polhemus_model *find_unready(libusb_device **list,
 						 char path[USB_PATH_MAX])
 {
@@ -287,7 +287,7 @@ static int choose(libusb_device **list, const struct usb_name *wanted, const cha
 {
 	struct fitting f = find_fitting(list, wanted);
 
-	/* Of several, take the one that was open before. */
+	/* If there are several, take the one that was open before. */
 	if (f.n > 1 && was[0]) {
 		struct usb_name again = *wanted;
 
@@ -309,8 +309,8 @@ static int choose(libusb_device **list, const struct usb_name *wanted, const cha
 }
 
 /*
- * The device named @wanted, which the caller unrefs; messages call it @name. Of several
- * it is the one at @was, unless that is "". -ENODEV, -EINVAL (several), -EACCES, -ENOMEM.
+ * The device named @wanted, which the caller unrefs; messages call it @name. Of several the
+ * one at @was is taken, unless that is "". -ENODEV, -EINVAL (several), -EACCES, -ENOMEM.
  */
 static int find_device(libusb_context *context, const struct usb_name *wanted,
 		       const char *was, const char *name, libusb_device **device,
@@ -380,7 +380,7 @@ static int usb_scan(const char *arguments, incise_scan_found *found, void *conte
 			"usb:%.60s: expected usb: for all, or usb:0f44:0002; "
 			"correct it",
 			arguments);
-	/* A computer without USB has none. */
+	/* A computer without USB has no trackers. */
 	if (libusb_init(&usb))
 		return 0;
 	if (libusb_get_device_list(usb, &list) < 0)
@@ -485,7 +485,7 @@ static void cancel_all(struct polhemus_usb *usb)
 	for (int i = 0; usb->in_flight && i < CANCEL_MS / 10; i++)
 		libusb_handle_events_timeout_completed(usb->context, &step, NULL);
 	for (int i = 0; i < ENDPOINTS_IN * FLIGHTS; i++) {
-		/* One that never completes is leaked: libusb might still write to it. */
+		/* A transfer that never completes is leaked: libusb might still write to it. */
 		if (usb->transfers[i] && !usb->in_flight)
 			libusb_free_transfer(usb->transfers[i]);
 		usb->transfers[i] = NULL;

@@ -241,7 +241,7 @@ static void *camera_open(const struct incise_backend_request *asked,
 
 /*
  * Search. A camera is named by a path that stays when it is plugged in elsewhere (by-id),
- * or by that of its socket (by-path); /dev/video0 depends on the order of plugging.
+ * or by the path of its socket (by-path); /dev/video0 depends on the order of plugging.
  */
 struct search {
 	incise_scan_found *found;
@@ -298,7 +298,7 @@ static int look_at(struct search *s, const char *path)
 	return 0;
 }
 
-/* One that cannot be opened is left out. */
+/* A camera that cannot be opened is left out. */
 static void look_at_all(struct search *s)
 {
 	glob_t files;
@@ -324,7 +324,7 @@ static int camera_scan(const char *arguments, incise_scan_found *found, void *co
 		return incise_error_set(err, EACCES,
 					"v4l2: no permission to open cameras; join the "
 					"group that owns /dev/video*");
-	/* A missing device, or one that is no camera, was not found. */
+	/* A missing device, or a device that is no camera, was not found. */
 	if (rc && rc != -ENOENT && rc != -ENOTTY && rc != -ENXIO && rc != -ENODEV)
 		return incise_error_set(err, -rc, "v4l2: %.100s: %s", arguments,
 					strerror(-rc));

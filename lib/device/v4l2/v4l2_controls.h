@@ -29,10 +29,9 @@ struct v4l2_controls {
 };
 
 /*
- * Lock all that the camera has, at what @setup says, or at what they are. @rate_hz of the
- * frames, 0: not known. 0; -EINVAL, -ERANGE (@setup), -EOPNOTSUPP (the camera has not
- * what
- * @setup sets), -EIO (it does not hold), -EBUSY, -ENODEV. @where starts the message.
+ * Lock all controls of the camera, at the values of @setup, or as they are. @rate_hz of the
+ * frames, 0: not known. 0; -EINVAL, -ERANGE (@setup), -EOPNOTSUPP (the camera lacks a control
+ * that @setup sets), -EIO (it does not hold), -EBUSY, -ENODEV. @where starts the message.
  */
 int v4l2_controls_lock(struct v4l2_controls *controls, int fd,
 		       const struct incise_camera_setup *setup, double rate_hz,

@@ -31,7 +31,7 @@ static const struct {
 
 #define KNOWN (sizeof(known) / sizeof(*known))
 
-/* Format number @i of the driver; 0: none. */
+/* Format number @i of the driver; 0: no such format. */
 static uint32_t offered(int fd, uint32_t i)
 {
 	struct v4l2_fmtdesc reported = {.index = i, .type = V4L2_BUF_TYPE_VIDEO_CAPTURE};
@@ -176,7 +176,7 @@ static struct v4l2_fract nearest_interval(int fd, const struct v4l2_shape *shape
 	return best;
 }
 
-/* The rate stays 0 where the driver has none. */
+/* The rate stays 0 if the driver has no rate. */
 static void set_rate(int fd, struct v4l2_shape *shape, double hz)
 {
 	struct v4l2_streamparm reported = {.type = V4L2_BUF_TYPE_VIDEO_CAPTURE};

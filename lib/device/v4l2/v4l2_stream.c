@@ -281,9 +281,9 @@ static int drop_damaged(struct v4l2_stream *s, int i, struct incise_error *err)
 }
 
 /*
- * The queue of waiting buffers: only the thread moves the head; whoever takes the oldest
- * moves the tail over it. So a number is taken once, and its place is written again only
- * after that.
+ * The queue of waiting buffers: only the thread moves the head; the side that takes the
+ * oldest moves the tail over it. So a number is taken once, and its place is written again
+ * only after that.
  */
 static int waiting_at(const struct v4l2_stream *s, unsigned long long n)
 {

@@ -70,8 +70,8 @@ int v4l2_stream_start(struct v4l2_stream *stream, int fd, const struct v4l2_shap
 		      int64_t exposure_ns, const char *where, struct incise_error *err);
 
 /*
- * Wait for a frame for at most @timeout_ms and dequeue it. 1: one came, whole or damaged;
- * 0: none; -ENODEV, -EIO: the stream has ended, with the cause in @err.
+ * Wait for a frame for at most @timeout_ms and dequeue it. 1: a frame came, whole or
+ * damaged; 0: no frame; -ENODEV, -EIO: the stream has ended, with the cause in @err.
  */
 int v4l2_stream_step(struct v4l2_stream *stream, int timeout_ms,
 		     struct incise_error *err);

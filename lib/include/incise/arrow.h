@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
  * The Arrow C data and stream interfaces: another library reads the columns in place, without
- * a copy and without an Arrow library. The structs are those of the Arrow specification; other
+ * a copy and without an Arrow library. The structs follow the Arrow specification; other
  * headers may define the same ones, under the same guards.
  *
  *     recording ──► incise_recording_stream() ──► ArrowArrayStream ──► pyarrow, polars, DuckDB …
@@ -85,23 +85,22 @@ struct incise_recording;
  * "table" | the columns of incise_export() with these options |
  *
  * t_ns is the best time of acquisition, CLOCK_MONOTONIC. Fields have the metadata "unit" and
- * "description", those that a calibration enters its values too, with the uncertainties that it
- * states and their covariances; those of a table with uncertainties "uncertainty_variables",
- * "uncertainty_of" and "correlation". The table has the provenance of
- * an export. Memory is that of a few batches of at most 65536 rows, whatever the length.
+ * "description", fields by a calibration also its values, with the uncertainties that it states and
+ * their covariances; fields of a table with uncertainties "uncertainty_variables", "uncertainty_of"
+ * and "correlation". The table has the provenance of an export. Memory holds a few batches of at most
+ * 16384 rows, whatever the length.
  *
  * The stream reads by a connection of its own: the recording may be closed before, and several
  * streams of one recording may be read by turns or from several threads, each by one thread at a
- * time. Of a recording that is being written it has the rows up to the last commit before this
- * call. A stream that was opened before fork(2) fails in the child with EINVAL.
+ * time. For a recording that is being written it has the rows up to the last commit before this call.
+ * A stream that was opened before fork(2) fails in the child with EINVAL.
  *
  * @param what    as above
  * @param options calibration of any stream, and all of "table"; progress is called for "table"
  *                only, from a thread of the stream; copied. NULL: the defaults
  * @param stream  result; the caller calls its release. Its get_next() returns EINVAL (an
  *                impossible row), EIO, ENODATA (no cut), EINTR (stopped by progress), ENOMEM
- * @return 0; -EINVAL (no such stream, impossible options, a damaged recording), -ENOTSUP (an
- *         older recording without this stream), -EIO, -ENOMEM, -EAGAIN (no thread).
+ * @return 0; -EINVAL (no such stream, impossible options, a damaged recording), -EIO, -ENOMEM, -EAGAIN (no thread).
  */
 INCISE_API int incise_recording_stream(struct incise_recording *recording,
 				       const char *what,
@@ -115,7 +114,7 @@ INCISE_API int incise_recording_stream(struct incise_recording *recording,
  * code: an exception may be on its way when a capsule goes, so no code in Python may run. Part of
  * libincise-record.
  *
- * @param capsule PyObject of a process that has PyCapsule_GetPointer(); in another one nothing happens
+ * @param capsule PyObject of a process that has PyCapsule_GetPointer(); in others without effect
  */
 INCISE_API void incise_arrow_capsule_free(void *capsule);
 

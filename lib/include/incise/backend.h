@@ -123,7 +123,7 @@ struct incise_stepper_ops {
 		     struct incise_stepper_info *info);
 	void (*close)(struct incise_stepper *stepper);
 
-	/** The device's own description of its fault; 0: none, and @text is unchanged. */
+	/** The device's own description of its fault; 0: no description, and @text is unchanged. */
 	int (*cause)(struct incise_stepper *stepper, char *text, size_t size);
 	int (*counter)(struct incise_stepper *stepper, int i,
 		       struct incise_stepper_counter *counter);
@@ -207,7 +207,7 @@ enum incise_actuator_mode {
 /** A drive on a CAN bus: the group `can`. Units that are 0 come from the drive. */
 struct incise_actuator_can {
 	enum incise_actuator_mode mode;
-	uint32_t bitrate;		  /**< 0: that of the interface */
+	uint32_t bitrate;		  /**< 0: the interface's */
 	uint32_t cycle_ns;		  /**< between SYNCs */
 	double counts_per_turn;		  /**< position units per turn of the screw */
 	double velocity_per_turn_s;	  /**< velocity units per turn/s: 60 for rpm */
@@ -293,7 +293,7 @@ struct incise_backend {
 		      struct incise_error *err);
 	/**
 	 * Search for devices as incise_scan() does. NULL: not supported.
-	 * @arguments are those of the device's string, possibly incomplete: "can0"
+	 * @arguments come from the device's string, possibly incomplete: "can0"
 	 */
 	int (*scan)(const char *arguments, incise_scan_found *found, void *context,
 		    struct incise_error *err);

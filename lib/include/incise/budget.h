@@ -10,8 +10,8 @@
  *     u = √(Σ part²)          value ± 2 u holds 95 %
  *
  * Parts are standard uncertainties, and independent of each other: where a calibration has a
- * covariance of two values, the part of the first one has what they share. So, of the quantities
- * p and q of two rows i and j, the covariance is the sum over the common sources s that both have
+ * covariance of two values, the first part has the common error. So, of the quantities p and q of
+ * two rows i and j, the covariance is the sum over the common sources s that both have
  *
  *     cov(p_i, q_j) = Σ part_p,s(i) · part_q,s(j)
  *
@@ -49,11 +49,11 @@ enum incise_budget_source {
 	INCISE_BUDGET_TIP_X, /**< position of the tip in the sensor's frame, mm */
 	INCISE_BUDGET_TIP_Y,
 	INCISE_BUDGET_TIP_Z,
-	INCISE_BUDGET_SURFACE,	 /**< surface along its normal, mm */
-	INCISE_BUDGET_ALIGNMENT, /**< times of the tracker against those of the force, s */
-	INCISE_BUDGET_LINE,	 /**< line through the tracker's arrivals, s */
-	INCISE_BUDGET_DELAY,	 /**< delay of the force, s */
-	INCISE_BUDGET_SOURCES,	 /**< number of common sources */
+	INCISE_BUDGET_SURFACE,	     /**< surface along its normal, mm */
+	INCISE_BUDGET_ALIGNMENT,     /**< times of the tracker against the force's, s */
+	INCISE_BUDGET_LINE,	     /**< line through the tracker's arrivals, s */
+	INCISE_BUDGET_DELAY,	     /**< delay of the force, s */
+	INCISE_BUDGET_SOURCES,	     /**< number of common sources */
 	INCISE_BUDGET_NO_SOURCE = -1 /**< of a part of its own */
 };
 
@@ -100,7 +100,7 @@ struct incise_budget;
  *
  * @param given      calibration in place of the recording's own, as in
  *                   incise_export_options; or NULL
- * @param given_path its file, whose history states the uncertainties; NULL: none is stated
+ * @param given_path its file, whose history states the uncertainties; NULL: unknown uncertainties
  * @return budget, to be freed with incise_budget_free(); NULL with errno EINVAL (an invalid
  *         row, or an invalid calibration_conf in the recording), EIO, ENOMEM; ENOENT and others
  *         of incise_calibration_load() for @given_path
@@ -126,7 +126,7 @@ INCISE_API double incise_budget_covariance(const struct incise_budget *budget,
 					   enum incise_budget_source b);
 
 /**
- * Say what states no uncertainty, so that the total of a quantity is not known.
+ * List the sources without an uncertainty, which make the total of a quantity unknown.
  *
  * @return one line for people with the remedy, owned by @budget; NULL: all is stated
  */
@@ -144,9 +144,9 @@ struct incise_budget_row {
 	double tip_1_s[3]; /**< the same of the velocity */
 	/** 0 … 1, way from one record of the tracker to the next; 0: at a record */
 	double share;
-	double force_share; /**< noise of the force, of that of one sample; 1: one sample */
-	bool smoothed;	    /**< velocity of resampled rows; else that of each pose */
-	bool tracker_time; /**< the time is that of a tracker record, else of the force */
+	double force_share; /**< noise of the force over the noise of one sample */
+	bool smoothed;	    /**< velocity of resampled rows; else of each pose */
+	bool tracker_time;  /**< the time is a tracker record's, else the force's */
 };
 
 /**

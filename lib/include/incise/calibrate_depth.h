@@ -21,25 +21,15 @@
 #define INCISE_CALIBRATE_DEPTH_H
 
 #include <stdbool.h>
+#include <incise/calibration.h>
 #include <incise/error.h>
 #include <incise/export.h>
 
 INCISE_BEGIN_DECLS
 
-/** Largest number of lines of a budget. */
-#define INCISE_DEPTH_BUDGET 6
 /** Smallest number of pairs for a line. */
 #define INCISE_DEPTH_PAIRS_MIN 6
 #define INCISE_DEPTH_SPAN_MIN_PX 20.0 /**< smallest range of lengths for a line */
-
-/** A line of the uncertainty budget of mm_px. */
-struct incise_depth_part {
-	const char *name; /**< static */
-	char type;	  /**< 'A': from the scatter of data; 'B': other */
-	double u;
-	const char *unit;
-	double sensitivity; /**< change of mm_px per unit */
-};
 
 /** The result; on error, as far as it is known. */
 struct incise_depth_fit {
@@ -57,8 +47,7 @@ struct incise_depth_fit {
 	 * deviation.
 	 */
 	double bend_mm, bend_sd_mm;
-	int n_parts;
-	struct incise_depth_part part[INCISE_DEPTH_BUDGET];
+	struct incise_calibration_budget budget; /**< of mm_px */
 };
 
 /** One length, measured n times. */
@@ -151,8 +140,7 @@ struct incise_board_fit {
 	int n, views; /**< given, accepted */
 	bool believed[INCISE_BOARD_VIEWS];
 	double view_rms_px[INCISE_BOARD_VIEWS];
-	int n_parts;
-	struct incise_depth_part part[INCISE_DEPTH_BUDGET];
+	struct incise_calibration_budget budget; /**< of mm_px */
 };
 
 /**

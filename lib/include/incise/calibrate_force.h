@@ -15,6 +15,7 @@
 #define INCISE_CALIBRATE_FORCE_H
 
 #include <stdbool.h>
+#include <incise/calibration.h>
 #include <incise/error.h>
 #include <incise/export.h>
 
@@ -55,19 +56,6 @@ enum incise_calibrate_force_state {
 	INCISE_CALIBRATE_FORCE_OUTLIER,
 };
 
-/** A line of the uncertainty budget. */
-struct incise_calibrate_force_part {
-	char source[48];
-	char type; /**< 'A': from the statistics of readings; 'B': other */
-	double u;  /**< standard uncertainty of the source, in @unit */
-	char unit[8];
-	double sensitivity; /**< mV/N per unit */
-	double u_mV_N;	    /**< contribution to the sensitivity's u, added in squares */
-};
-
-/** Largest number of lines of a budget. */
-#define INCISE_CALIBRATE_FORCE_PARTS 6
-
 /** The result: the line, its range and its uncertainty budget. */
 struct incise_calibrate_force {
 	double sensitivity_mV_N, sensitivity_u_mV_N; /**< U is twice that (k = 2) */
@@ -93,8 +81,7 @@ struct incise_calibrate_force {
 	double clips_N;	      /**< load at the end of the converter; NAN: unknown */
 	int pairs, used, saturated, outliers, loads, series;
 	bool pass; /**< within tolerance of the nominal sensitivity */
-	int parts;
-	struct incise_calibrate_force_part part[INCISE_CALIBRATE_FORCE_PARTS];
+	struct incise_calibration_budget budget; /**< of the sensitivity */
 };
 
 /** Set the defaults documented above. */

@@ -29,6 +29,7 @@
 #define INCISE_CALIBRATE_STEPPER_H
 
 #include <stdbool.h>
+#include <incise/calibration.h>
 #include <incise/error.h>
 #include <incise/export.h>
 
@@ -60,18 +61,6 @@ enum incise_calibrate_stepper_state {
 	INCISE_CALIBRATE_STEPPER_OUTLIER,
 };
 
-/** A line of the uncertainty budget of N_step. */
-struct incise_calibrate_stepper_part {
-	char source[48];
-	char type; /**< 'A': from the statistics of readings; 'B': other */
-	double u;  /**< standard uncertainty of the source, in @unit */
-	char unit[8];
-	double u_N_step; /**< contribution to the u of N_step, added in squares */
-};
-
-/** Number of lines of a budget. */
-#define INCISE_CALIBRATE_STEPPER_PARTS 3
-
 /** The result. */
 struct incise_calibrate_stepper {
 	double N_step, N_step_u; /**< force per microstep; U is twice that (k = 2) */
@@ -94,8 +83,7 @@ struct incise_calibrate_stepper {
 	int freedom;
 	int points, used, saturated, outliers, strokes;
 	bool pass;
-	int parts;
-	struct incise_calibrate_stepper_part part[INCISE_CALIBRATE_STEPPER_PARTS];
+	struct incise_calibration_budget budget; /**< of N_step */
 };
 
 /** Set the defaults documented above. */

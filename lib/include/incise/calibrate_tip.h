@@ -12,7 +12,7 @@
  * The effect of noise: a position noise of s mm and an orientation noise of a rad move a
  * pose's equations by s along the tool, and by hypot(s, a |t|) across it: 0.02 mm and 0.025
  * degrees are 0.03 mm at 50 mm and 0.05 mm at 100 mm. The tip's standard uncertainty across
- * the tool is roughly that divided by sin(cone / 4) √N: 0.1 mm (k = 2) needs N = 16
+ * the tool is roughly this hypot() divided by sin(cone / 4) √N: 0.1 mm (k = 2) needs N = 16
  * independent poses at 100 mm and a cone of 60 degrees, and 1000 poses give 0.012 mm. The
  * distortion of the tracker does not average out; the residuals show it.
  */

@@ -75,9 +75,28 @@ INCISE_API double incise_calibration_get(const struct incise_calibration *calibr
 struct incise_calibration_value {
 	char key[32]; /**< of calibration.conf; tip_x_mm, tip_y_mm, tip_z_mm for tip_mm */
 	char unit[16]; /**< mV/N, mm/px, ms, … */
-	double found;  /**< previous value; NAN: none */
+	double found;  /**< previous value; NAN: no value */
 	double left;   /**< new value */
 	double u;      /**< standard uncertainty; U is twice that (k = 2) */
+};
+
+/** A line of the uncertainty budget of a calibration's result. */
+struct incise_calibration_part {
+	const char *source;  /**< static */
+	char type;	     /**< 'A': from the statistics of readings; 'B': other */
+	double u;	     /**< standard uncertainty of the source, in @unit */
+	const char *unit;    /**< static */
+	double sensitivity;  /**< change of the result per unit */
+	double contribution; /**< u times that: part of the result's u, added in squares */
+};
+
+/** Largest number of lines of a budget. */
+#define INCISE_CALIBRATION_PARTS 6
+
+/** The uncertainty budget of a calibration's result. */
+struct incise_calibration_budget {
+	int n;
+	struct incise_calibration_part part[INCISE_CALIBRATION_PARTS];
 };
 
 /** Largest number of values of a calibration. */
@@ -89,7 +108,7 @@ struct incise_calibration_record {
 	char date[32]; /**< UTC, as in 2026-11-21T14:48:16Z; empty for append: now */
 	char device[64];
 	char method[120]; /**< in words */
-	char raw[200];	  /**< name of the file with the raw data; empty: none */
+	char raw[200];	  /**< name of the file with the raw data; empty: no file */
 	uint32_t raw_crc; /**< CRC32C of that file */
 	int n;		  /**< number of values */
 	struct incise_calibration_value values[INCISE_CALIBRATION_VALUES];
@@ -137,7 +156,17 @@ INCISE_API int incise_calibration_history(const char *path,
 					  struct incise_error *err);
 
 /**
- * Read the text of a calibration.conf, for example that of a recording: its values as
+ * The last value that a calibration which passed gave to a key. Thread-safe; not real-time safe.
+ *
+ * @param record set to its calibration; or NULL
+ * @return a part of @records; NULL: none
+ */
+INCISE_API const struct incise_calibration_value *incise_calibration_last(
+	const struct incise_calibration_record *records, int n, const char *key,
+	const struct incise_calibration_record **record);
+
+/**
+ * Read the text of a calibration.conf, for example of a recording: its values as
  * incise_calibration_load(), and its history as incise_calibration_history().
  *
  * @param name    of the text, for errors

@@ -7,6 +7,7 @@
 #ifndef INCISE_DATASET_H
 #define INCISE_DATASET_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <incise/error.h>
@@ -47,35 +48,13 @@ INCISE_API struct incise_dataset *incise_dataset_read_where(
 	const char *where, size_t *left_out, struct incise_error *err);
 
 /**
- * Take a row of numbers, in the order of the columns, with the text of its group (NULL without);
- * both are valid during the call. Not 0: no further row is read, and that is returned.
- */
-typedef int (*incise_row_taker)(void *user, const double *row, const char *group,
-				struct incise_error *err);
-
-/**
- * Read rows one by one, in memory of one row, as incise_dataset_read_where() reads them.
+ * Whether a CSV file has a column; a file that cannot be read has none.
  *
- * @param left_out set to the number of omitted rows; or NULL
- * @return 0; the negative errno of incise_dataset_read_where(), or what @take returned
+ * @param stated set to false where its first row has no finite number there; or NULL
  */
-INCISE_API int incise_dataset_each(const char *path, const char *const *columns, int n,
-				   const char *group, const char *where,
-				   incise_row_taker take, void *user, uint64_t *left_out,
-				   struct incise_error *err);
+INCISE_API bool incise_dataset_has(const char *path, const char *column, bool *stated);
 
 struct ArrowArrayStream;
-
-/**
- * The same for an Arrow stream, as incise_dataset_from_arrow() reads it; releases the stream.
- *
- * @return 0; the negative errno of incise_dataset_from_arrow(), or what @take returned
- */
-INCISE_API int incise_dataset_each_arrow(struct ArrowArrayStream *stream,
-					 const char *const *columns, int n,
-					 const char *group, const char *where,
-					 incise_row_taker take, void *user,
-					 uint64_t *left_out, struct incise_error *err);
 
 /**
  * Read columns of an Arrow stream as a dataset, as incise_dataset_read_where() does of CSV.
@@ -105,12 +84,6 @@ INCISE_API const double *incise_dataset_row(const struct incise_dataset *data,
 
 /** Group of a row, counted from 0 in order of appearance; -1 without a group column. */
 INCISE_API int incise_dataset_group(const struct incise_dataset *data, size_t row);
-
-/**
- * SHA-256 of its rows and groups as numbers, hexadecimal: equal for equal rows, whatever their file.
- * @return 0; or -ENOMEM and an empty text
- */
-INCISE_API int incise_dataset_sha256(const struct incise_dataset *data, char hex[65]);
 
 INCISE_END_DECLS
 #endif

@@ -13,7 +13,7 @@ INCISE_BEGIN_DECLS
 
 /** An error with a line for people. Initialise it with {0}. */
 struct incise_error {
-	int code;	/**< positive errno, 0 for none */
+	int code;	/**< positive errno, 0 without an error */
 	char text[500]; /**< one line without a newline: what, where, what to do */
 };
 

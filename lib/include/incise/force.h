@@ -62,8 +62,8 @@ INCISE_API void incise_force_info(const struct incise_force *force,
 				  struct incise_force_info *info);
 
 /**
- * Adapt a calibration to a channel. One that measures newtons has 1000 mV/N; unless the
- * calibration has these, its zero is that of another device, and becomes NAN: it is measured.
+ * Adapt a calibration to a channel. A channel that measures newtons has 1000 mV/N; unless the
+ * calibration has these, its zero belongs to another device, and becomes NAN: it is measured.
  * A calibration stays as it is for a channel in volts.
  */
 INCISE_API void incise_force_calibration(const struct incise_force_info *info,

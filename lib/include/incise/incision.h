@@ -19,10 +19,10 @@
  * deepens it. Where the blade leaves the line, another cut begins. Cuts that meet are one
  * incision.
  *
- * A tool goes into the cut that lets it in the deepest, of those that are as near as the
- * nearest: down to the depth of which a stretch round its place, without a gap, is as long as it
- * needs. The stretch goes on where the cut ends and another, joined one goes on within 45° of
- * its direction. A cut across, or a stab, lends neither length nor depth.
+ * A tool goes into the cut that lets it in the deepest, among the cuts as near as the nearest:
+ * down to the depth of which a stretch round its place, without a gap, is as long as it needs.
+ * The stretch goes on where the cut ends and another, joined one goes on within 45° of its
+ * direction. A cut across, or a stab, lends neither length nor depth.
  *
  * A handle or tube in a cut opens it as wide as the cut is deep there, up to the tool's extent
  * across the cut. stretch_mm of the opening is elastic; the rest remains.
@@ -75,7 +75,7 @@ struct incise_opening {
 	double at_mm; /**< position along the cut */
 	double depth_mm; /**< a stretch of the cut here, long enough for the tool, is so deep */
 	double open_mm;	  /**< remaining opening here */
-	double length_mm; /**< of the stretch; ≥ what the tool needs */
+	double length_mm; /**< of the stretch; ≥ the tool's need */
 	double along[3];  /**< direction of the cut */
 };
 

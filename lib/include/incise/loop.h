@@ -82,8 +82,8 @@ struct incise_loop_stats {
 
 /**
  * Run a plan, and release the actuator at the end in every case. Makes no allocation, and no
- * system call except the clock's and those of options->ticked. Meanwhile the thread's timer
- * slack is 1 ns, see PR_SET_TIMERSLACK(2const), and then what it was before.
+ * system call except by the clock and by options->ticked. Meanwhile the thread's timer slack
+ * is 1 ns, see PR_SET_TIMERSLACK(2const), and then its earlier value.
  *
  * @param stats caller's memory, some 300 KiB; zeroed here
  * @return 0 at the end of the duration or when stopped; -EINVAL (options), -ETIME (too many

@@ -45,7 +45,7 @@ INCISE_API void incise_loop_control_free(struct incise_loop_control *control);
 INCISE_API int incise_loop_control_offer(struct incise_loop_control *control,
 					 struct incise_plan *plan);
 
-/** Take back an offered plan that is not active; NULL if there is none. */
+/** Take back an offered plan that is not active; NULL without such a plan. */
 INCISE_API struct incise_plan *incise_loop_control_withdraw(
 	struct incise_loop_control *control);
 

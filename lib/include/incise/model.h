@@ -9,8 +9,8 @@
  * With the AND method min the smallest membership grade replaces the product. A rule may
  * exclude inputs, and the rules need not form the full grid.
  *
- * A cutting model has the inputs depth_mm and velocity_mm_s and the output force_N. This
- * interface does not depend on that: units are those of the training data.
+ * A cutting model has the inputs depth_mm and velocity_mm_s and the output force_N. This interface
+ * does not depend on that: the training data give the units.
  *
  * Song et al. write the Gaussian as exp(-(x-m)²/σ²). Files and this interface use MATLAB's
  * form exp(-(x-c)²/(2 s²)): s = σ/√2.

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * The origin of a file: what it was made of, in the file itself. Exports, models and figures carry
- * a token for each file that they were made of, and for those that these were made of, up to the
- * recordings. A token is ASCII without blanks or quotes, so that each format holds it as it is, and
- * a reader finds it in the bytes of any file:
+ * The origin of a file: the files that it was made of, named in the file itself. Exports, models and
+ * figures carry a token for each file that they were made of, and for those that these were made of, up to
+ * the recordings. A token is ASCII without blanks or quotes, so that each format holds it as it is, and a
+ * reader finds it in the bytes of any file:
  *
  *     incise:2:recording:4f1c…9a:97:4e1b…02:liver.rec;
  *            │     │       │    │    │        └ name, other bytes than A-Z a-z 0-9 - . _ ~ as %XX
@@ -13,8 +13,8 @@
  *            │     └ recording, export, model …
  *            └ depth: 1 for what the file was made of, 2 for what that was made of
  *
- * A token proves nothing by itself. The SHA-256 shows whether a file or recording that is at hand is
- * the one that is meant. Part of libincise-record.
+ * A token proves nothing by itself. The SHA-256 shows whether a file or recording at hand is the right
+ * one. Part of libincise-record.
  */
 #ifndef INCISE_ORIGIN_H
 #define INCISE_ORIGIN_H
@@ -53,8 +53,7 @@ struct incise_origin {
 INCISE_API int incise_origin_text(const struct incise_origin *origin, char *text);
 
 /**
- * Find the next token in any bytes. Whatever looks like a token and is not well formed is passed
- * over. Thread safe.
+ * Find the next token in any bytes. Malformed tokens are passed over. Thread safe.
  *
  * @param bytes  n bytes
  * @param at     place to search from; moved behind the token that was found, or to n
@@ -68,8 +67,8 @@ struct incise_recording;
 
 /**
  * Write the origin of an open recording: its head at its last commit, of depth 1, and of depth 2 the
- * calibration by which it is read, if it is not that of its capture; of a joined one those of each member,
- * named "day.rec:a". One of an older format, without a seal, has none.
+ * calibration by which it is read, unless the capture's is active; for a joined one the same for each
+ * member, named "day.rec:a". A recording of an older format, without a seal, has no origin.
  *
  * @param text tokens with a blank between them, as many as fit, and a NUL
  * @param size at least 1

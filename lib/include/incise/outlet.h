@@ -45,7 +45,7 @@ struct incise_outlets {
 	void (*push)(struct incise_outlet *outlet, const double *values, int64_t t_ns);
 	/** The same for a stream of text. */
 	void (*push_text)(struct incise_outlet *outlet, const char *text, int64_t t_ns);
-	/** Whether anyone reads it now. */
+	/** Whether a client reads it now. */
 	bool (*has_readers)(struct incise_outlet *outlet);
 	/** End the stream; NULL is accepted. */
 	void (*close)(struct incise_outlet *outlet);
@@ -57,7 +57,7 @@ struct incise_outlets {
  * @param where   begin of messages: the option or key that asks for it
  * @param outlets result, static
  * @return 0; -ENOENT (no module, or no liblsl: the message says what to install), -ENOEXEC (one
- *         of them is broken)
+ *         of the two is broken)
  */
 INCISE_API int incise_outlets_open(const char *where,
 				   const struct incise_outlets **outlets,

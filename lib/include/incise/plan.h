@@ -62,7 +62,7 @@ INCISE_API struct incise_plan *incise_plan_new_fed(
 	struct incise_error *err);
 
 /**
- * The same with a plane for scenes without a surface, like that of a rig, in place of z = 0.
+ * The same with a plane for scenes without a surface, for example a rig's, in place of z = 0.
  *
  * @param normal outward, any length above 0
  */
@@ -144,12 +144,12 @@ struct incise_plan_lean {
 };
 
 /**
- * Of all states of rest that a search came to, the one about which the loop, with its forces as they are there for small
- * motions, swings with the least more of them: by its eigenvalues in three dimensions.
+ * The state with the least margin among all states of rest that a search came to: the loop, with its forces for small
+ * motions there, swings with the least increase of them, by its eigenvalues in three dimensions.
  */
 struct incise_plan_weakest {
 	double margin; /**< with so many times the forces; INCISE_PLAN_MARGIN_MOST: with no fewer */
-	double along[3]; /**< direction of that swing, unit; 0: none was found */
+	double along[3]; /**< direction of that swing, unit; 0: not found */
 	double hz;	 /**< of that swing */
 	double lean_N, depth_mm;
 	double place_mm[3];    /**< of the surface */
@@ -157,7 +157,7 @@ struct incise_plan_weakest {
 	enum incise_held held;
 	bool tilted; /**< as above */
 	int states;  /**< looked at */
-	/** Of them, those with a margin below 1 that rest all the same: the account of work ends their swings. */
+	/** States with a margin below 1 that rest all the same: the account of work ends their swings. */
 	int paid;
 };
 #define INCISE_PLAN_MARGIN_MOST 16 /**< a larger margin is not looked for */
@@ -208,7 +208,7 @@ INCISE_API void incise_plan_stability(const struct incise_plan *plan,
 				      struct incise_plan_stability *stability);
 
 /**
- * Make a plan read the ticks that the kernel renders: incise_plan_tick() then computes none.
+ * Make a plan read the ticks that the kernel renders: incise_plan_tick() then computes no force.
  * The feeder controls poses, tool and the end of the force.
  *
  * @param plan of incise_plan_new_fed() of the same scene, before its first tick
@@ -239,10 +239,10 @@ INCISE_API void incise_plan_rendered(const struct incise_plan *plan,
 	INCISE_REALTIME;
 
 /**
- * The certified error of a plan with arithmetic = "fixed": the largest difference of its force
- * from that of the same plan in double, on the same poses, before start and limits. It follows
- * from the source of the tick, which runs on numbers that carry their errors (lib/number/bounded.h);
- * what the slew's limit rounds comes on top, 61 uN for each tick in a row that it holds the force.
+ * The certified error of a plan with arithmetic = "fixed": the largest difference of its force from the force of the
+ * same plan in double, on the same poses, before start and limits. It follows from the source of the tick, which runs
+ * on numbers that carry their errors (lib/number/bounded.h); the rounding of the slew's limit comes on top, 61 uN for
+ * each tick in a row that it holds the force.
  *
  * It holds
  *  - for poses one tracker period apart, of a hand up to 1 m/s and 2 m/s², each within 2 mm of where the filter expects it;

@@ -27,7 +27,7 @@
 
 INCISE_BEGIN_DECLS
 
-/** What is verified. Tables and rows are those that a program is about to read: no seal is read. */
+/** The depth of a verification. Tables and rows are those that a program is about to read: no seal is read. */
 enum incise_prove_level {
 	INCISE_PROVE_SEALS, /**< nothing: what is in seal/ is listed */
 	/**
@@ -39,7 +39,7 @@ enum incise_prove_level {
 	INCISE_PROVE_ALL, /**< as incise_verify() */
 };
 
-/** What is wanted; {0}: list what is in seal/. */
+/** Options of a proof; {0}: list the files in seal/. */
 struct incise_prove_options {
 	enum incise_prove_level level;
 	/** Signers that are trusted, ALLOWED SIGNERS of ssh-keygen(1): compare statements and check. */
@@ -103,7 +103,7 @@ struct incise_proof_statement {
 	char *differences[INCISE_PROOF_DIFFERENCES]; /**< texts; there may be more */
 };
 
-/** What is in seal/ of a recording, of a member of a joined one, or of the join itself. */
+/** The files in seal/ of a recording, of a member of a joined one, or of the join itself. */
 struct incise_proof_seal {
 	char *path;	   /**< folder of the recording */
 	bool join;	   /**< its statement is incise_session_statement() */

@@ -13,12 +13,12 @@
 
 INCISE_BEGIN_DECLS
 
-/** Functions of the module, and where this process is among the others. */
+/** Functions of the module, and the rank of this process. */
 struct incise_ranks {
 	int rank, size; /**< 0 ≤ rank < size */
 	/**
-	 * Exchange bytes with all: @all becomes those of rank 0, 1, …, one after another, with
-	 * their numbers in @sizes (size of them); both are freed with free(3). 0 or -ENOMEM.
+	 * Exchange bytes with all: @all has the bytes of rank 0, 1, …, one after another, with
+	 * their numbers in @sizes (size of them); free both with free(3). 0 or -ENOMEM.
 	 */
 	int (*gather)(const void *bytes, size_t n, void **all, size_t **sizes);
 	/** Send bytes to one rank, which receives them. */

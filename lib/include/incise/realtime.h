@@ -32,7 +32,7 @@ enum incise_realtime_policy {
 
 /** Default priority. Threads of devices have 85: the loop must not delay them. */
 #define INCISE_REALTIME_PRIORITY 80
-/** Highest priority: below that of devices. */
+/** Highest priority: below the devices'. */
 #define INCISE_REALTIME_PRIORITY_MAX 84
 /** The loop may run on any CPU. */
 #define INCISE_REALTIME_ANY_CPU (-1)
@@ -102,7 +102,7 @@ INCISE_API struct incise_realtime *incise_realtime_new(
 /**
  * Touch the stack, move to the CPU and set the policy. Call it in the loop's thread before its
  * first tick. The thread must end if this fails. Threads that it starts inherit its CPU: start
- * those of devices in another thread.
+ * threads of devices in another thread.
  *
  * @return 0, or -EPERM, -EINVAL, -EBUSY: as above, if privileges were lost since
  */

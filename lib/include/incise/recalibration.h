@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
  * Recalibration of a recording after the fact: another calibration.conf in its folder, by which
- * all readers see its rows from then on. What was recorded stays as it is, bit for bit, and its
- * own calibration can be made active again. Part of libincise-record.
+ * all readers see its rows from then on. The recorded data stay as they are, bit for bit, and
+ * their own calibration can be made active again. Part of libincise-record.
  *
  *     NAME.rec/recording.db                              rows, and the calibration of the capture
  *     NAME.rec/calibration/0001-20261127T054012Z.conf    a later one
@@ -21,10 +21,9 @@ INCISE_BEGIN_DECLS
 
 /** A calibration that a recording has, or had. */
 struct incise_recalibration {
-	/** In the recording's folder, calibration/0001-….conf; empty: that of the capture. */
+	/** In the recording's folder, calibration/0001-….conf; empty: the capture's. */
 	char file[160];
-	char date
-		[32]; /**< UTC, as in 2026-11-27T05:40:12Z; empty for that of the capture */
+	char date[32]; /**< UTC, as in 2026-11-27T05:40:12Z; empty for the capture's */
 	/** Makes the calibration of the capture active again. */
 	bool original;
 	bool active;
@@ -33,11 +32,11 @@ struct incise_recalibration {
 };
 
 /**
- * Calibrations of a recording, oldest first; the first one is that of the capture.
+ * Calibrations of a recording, oldest first; the first one is the capture's.
  *
- * Values are those of the folder now. It opens no database, and does not read the calibrations,
- * so it works where a file is damaged. Of a joined recording each member has its own: give the
- * path of the member.
+ * Values come from the folder as it is now. It opens no database, and does not read the
+ * calibrations, so it works where a file is damaged. Each member of a joined recording has its
+ * own: give the path of the member.
  *
  * @param path as for incise_recording_open(), without a choice of members
  * @param list to be freed with free(3)
@@ -54,8 +53,8 @@ INCISE_API int incise_recalibrations(const char *path, struct incise_recalibrati
  *
  * Readers then use the values that the file has: sensitivity and zero of a force channel in
  * volts, the camera's scale, the tip of the blade, and delays. Depth and speed are computed from
- * the poses again if the tip differs. Values that the file does not have stay those of the
- * capture, as the surface does, which no calibration has.
+ * the poses again if the tip differs. Values that the file does not have stay the capture's, and
+ * so does the surface, which no calibration has.
  *
  * @param path        one recording; of a joined one, the path of a member
  * @param calibration file to copy; NULL: the calibration of the capture
@@ -72,8 +71,8 @@ INCISE_API int incise_recalibrate(const char *path, const char *calibration,
 /**
  * The calibration by which an open recording is read.
  *
- * @param active .file is empty for that of the capture; of a joined recording it is that of the
- *               first member with another one, NAME/calibration/0001-….conf
+ * @param active .file is empty for the capture's; for a joined recording it belongs to the first
+ *               member with another one, NAME/calibration/0001-….conf
  */
 INCISE_API void incise_recording_recalibration(const struct incise_recording *recording,
 					       struct incise_recalibration *active);

@@ -37,14 +37,14 @@ struct incise_recorder_setup {
 	bool armed;
 	/**
 	 * Armed: triggers in addition to incise_recorder_trigger(): size of the force, once its
-	 * zero is known (0: none), and a press of the stylus's button.
+	 * zero is known (0: off), and a press of the stylus's button.
 	 */
 	double trigger_force_N;
 	bool trigger_button;
 	bool cuts; /**< write start and end of each cut as events "cut" */
 	/**
-	 * Source of wall time; see incise-capture(1), --clock-source. NULL: "auto", and none for
-	 * a simulated clock.
+	 * Source of wall time; see incise-capture(1), --clock-source. NULL: "auto", and no
+	 * source for a simulated clock.
 	 */
 	const char *clock_source;
 };
@@ -58,8 +58,9 @@ struct incise_recorder_stats {
 	uint64_t frames_unlooked; /**< frames not analysed for lack of time */
 	uint64_t force_clipped;	  /**< codes at either end of the range */
 	double depth_mm;	  /**< last depth, from the tracker */
-	double camera_depth_mm;	  /**< last depth, from vision; NAN: none */
+	double camera_depth_mm;	  /**< last depth, from vision; NAN: no depth */
 	double force_N;		  /**< last force; 0 until the zero is known */
+	double full_scale_N;	  /**< largest force of the channel */
 	double zero_mV;		  /**< NAN until known */
 	bool button;		  /**< button of the stylus */
 	bool armed;		  /**< waits for a trigger */
@@ -119,24 +120,6 @@ INCISE_API void incise_recorder_trigger(struct incise_recorder *recorder);
  */
 INCISE_API int incise_recorder_mark(struct incise_recorder *recorder, const char *kind,
 				    const char *text, struct incise_error *err);
-
-/**
- * Add a row to the table of events at a time of CLOCK_MONOTONIC, of kind "sync" for a pulse of a
- * line that several rigs see.
- *
- * @return as incise_recorder_mark()
- */
-INCISE_API int incise_recorder_mark_at(struct incise_recorder *recorder, int64_t t_ns,
-				       const char *kind, const char *text,
-				       struct incise_error *err);
-
-/**
- * Get the newest point of the wall time, which is about a second old at most.
- *
- * @return 0; -ENODATA: none yet, or a recording without wall time
- */
-INCISE_API int incise_recorder_wall(const struct incise_recorder *recorder,
-				    struct incise_wall_point *point);
 
 /** Get the state of the recording. */
 INCISE_API void incise_recorder_stats(const struct incise_recorder *recorder,

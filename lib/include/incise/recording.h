@@ -24,9 +24,8 @@ INCISE_BEGIN_DECLS
  *     acquisition ──── delay ────► earliest ──── jitter ────► arrival   (CLOCK_MONOTONIC)
  *                                  arrival       ≥ 0
  *
- * Times of a timestamped stream come from the device or the kernel, and its jitter is that of
- * the timestamps. Times of other streams come from a line below all arrivals, which models the
- * device's clock.
+ * Times of a timestamped stream come from the device or the kernel, and its jitter is the timestamps'. Times of
+ * other streams come from a line below all arrivals, which models the device's clock.
  */
 struct incise_stream {
 	char name[16]; /**< force, tracker, camera */
@@ -43,11 +42,10 @@ struct incise_stream {
 	double jitter_max_ms; /**< largest distance above the line */
 	double offset_ms;     /**< total: delay plus expected error of the line */
 	/**
-	 * Standard uncertainty of times on this clock; without that of the delay if
-	 * delay_sd_ms is NAN.
+	 * Standard uncertainty of times on this clock; without the delay's if delay_sd_ms is NAN.
 	 */
 	double offset_sd_ms;
-	char ended[200]; /**< cause of an early end; empty: none */
+	char ended[200]; /**< cause of an early end; empty: no early end */
 };
 
 struct incise_recording;
@@ -73,7 +71,7 @@ struct incise_recording_info {
 	double tip_mm[3]; /**< calibrated tip; applied to depth, not to poses */
 	int cuts;	  /**< periods with the blade in the tissue */
 	double depth_max_mm, force_max_N;
-	struct incise_stream streams[INCISE_STREAMS_MAX]; /**< in format 2 */
+	struct incise_stream streams[INCISE_STREAMS_MAX]; /**< none if it had format 1 */
 	int n_streams;
 	bool newtons; /**< the force channel measures N: read full_scale_V, offset_V as N */
 	/** UTC of start_ns, ns since 1970, by the wall clock to one second; 0: not known */
@@ -87,7 +85,8 @@ struct incise_recording_info {
  * crash or a full disk, open that.
  *
  * @return recording, to be closed with incise_recording_close(); NULL with errno ENOENT,
- *         EINVAL (not a recording, damaged, or of a newer version), EIO, ENOMEM.
+ *         EINVAL (not a recording, damaged, or of a newer version), ENOTSUP (of format 1 to 3: it is converted
+ *         by incise_recording_recover()), EIO, ENOMEM.
  */
 INCISE_API struct incise_recording *incise_recording_open(const char *path,
 							  struct incise_error *err);
@@ -104,10 +103,10 @@ struct incise_recovered {
 };
 
 /**
- * Copy an interrupted recording to a folder that does not exist: its database with what its log has, or
- * without what its journal takes back, and all else bit for bit. It is as incomplete as it was; reading
- * it needs no private copy. One of an older format, interrupted or complete, becomes one of today's,
- * after a check by its ledger. The recording that is read stays as it is.
+ * Copy an interrupted recording to a folder that does not exist: its database with the changes in its log, or
+ * without the changes that its journal takes back, and all else bit for bit. It is as incomplete as it was;
+ * reading it needs no private copy. A recording of an older format, interrupted or complete, is converted to
+ * today's, after a check by its ledger. The recording that is read stays as it is.
  *
  * @param damaged convert one that is not as it was recorded, too
  * @return 0; -EEXIST (@p output), -EBUSY (it is being written), -EINVAL (no recording, damaged, or one with
@@ -118,7 +117,7 @@ INCISE_API int incise_recording_recover(const char *path, const char *output,
 					bool damaged, struct incise_recovered *made,
 					struct incise_error *err);
 
-/** Its name, which cuts and origins have: that of its folder without .rec. It belongs to the recording. */
+/** Its name, which cuts and origins have: the folder's without .rec. It belongs to the recording. */
 INCISE_API const char *incise_recording_name(const struct incise_recording *recording);
 
 /**
@@ -178,7 +177,7 @@ struct incise_recording_length {
  * tracker records around each. Frames without a record within 50 ms on both sides are omitted.
  *
  * @param lengths to be freed with free(3); NULL for none
- * @return number of frames; -EINVAL (an invalid row; a recording of format 1 has no frames),
+ * @return number of frames; -EINVAL (an invalid row),
  *         -EIO, -ENOMEM
  */
 INCISE_API int incise_recording_lengths(struct incise_recording *recording,
@@ -192,7 +191,7 @@ struct incise_frame_reader;
  * Read the frames of a recording's camera.mkv, by their times.
  *
  * @return reader, to be freed with incise_frame_reader_free(); it reads by connections of its own.
- *         NULL with errno ENOTSUP (a recording of form 1), ENODATA (without frames), EINVAL, EIO,
+ *         NULL with errno ENODATA (without frames), EINVAL, EIO,
  *         ENOMEM; ENOENT, ENOEXEC (the file, or the module that reads it).
  */
 INCISE_API struct incise_frame_reader *incise_frame_reader_new(
@@ -209,7 +208,7 @@ INCISE_API const char *incise_frame_reader_codec(
  * Get the frame whose t_ns is nearest. Frames before the last one that
  * was read make it start at the file's beginning; later ones are quick.
  *
- * @param frame t_ns is that of the row, CLOCK_MONOTONIC; data as the camera sent it (MJPEG) or
+ * @param frame t_ns is the row's, CLOCK_MONOTONIC; data as the camera sent it (MJPEG) or
  *              without row padding, valid until the next call
  * @return 0; -ENODATA (no row), -EBADMSG (the frame is missing in the file or was altered), -EINVAL,
  *         -EIO, -ENOMEM.
@@ -220,7 +219,7 @@ INCISE_API int incise_frame_reader_at(struct incise_frame_reader *reader, int64_
 
 /** Columns of standard uncertainties; see incise/budget.h. */
 enum incise_export_uncertainty {
-	INCISE_EXPORT_NONE,  /**< none; of resampled rows those of noise and time */
+	INCISE_EXPORT_NONE, /**< no uncertainties; for resampled rows by noise and time */
 	INCISE_EXPORT_TOTAL, /**< of each force, depth, velocity and time */
 	INCISE_EXPORT_PARTS, /**< these, and each of their parts */
 };
@@ -254,11 +253,12 @@ struct incise_export_options {
 	enum incise_export_uncertainty uncertainty;
 	/**
 	 * Part of a recording: seconds from its first sample, 0: to its end; and the number of a cut, from 1, or
-	 * 0. Rows are those of the whole export; what lies before and behind is not read, but the poses before.
+	 * 0. Rows equal the rows of the whole export; samples before and behind are not read, except the poses
+	 * before.
 	 */
 	double from_s, to_s;
 	int cut;
-	/** File of @ref calibration, whose history states uncertainties; NULL: none is stated. */
+	/** File of @ref calibration, whose history states uncertainties; NULL: unknown uncertainties. */
 	const char *calibration_path;
 
 	/**
@@ -279,14 +279,14 @@ struct incise_export_report {
 	uint64_t clipped; /**< force samples at an end of the converter; not averaged */
 	double depth_max_mm, velocity_max_mm_s;
 	/**
-	 * The uncertainties that are not stated, whose columns are NaN: "QUANTITY: REASON; REASON…",
-	 * separated by newlines; empty: none.
+	 * The unknown uncertainties, whose columns are NaN: "QUANTITY: REASON; REASON…", separated by newlines;
+	 * empty: all are known.
 	 */
 	char unstated[1000];
 	/**
-	 * Resampled, with a camera: its depth over that of the tracker, a ratio, and by how much that
-	 * makes them differ over the depths there are; NAN: not both measured depths of 3 mm and more;
-	 * 0 where rows are not resampled.
+	 * Resampled, with a camera: its depth over the tracker's, a ratio, and the difference that this makes
+	 * over the measured depths; NAN: not both measured depths of 3 mm and more; 0 where rows are not
+	 * resampled.
 	 */
 	double camera_ratio, camera_off_mm;
 };
@@ -301,7 +301,7 @@ struct incise_export_report {
  * advancing blade and once without. Depth and velocity are interpolated at the times of the
  * force samples.
  *
- * Uncertainties have columns as in incise/budget.h. Those of means are of the mean: its own parts
+ * Uncertainties have columns as in incise/budget.h. Uncertainties of means are for the mean: its own parts
  * shrink with the number of independent samples, the common parts do not.
  *
  * HDF5 has a one-dimensional dataset per column, with its name and the attributes units and
@@ -311,7 +311,7 @@ struct incise_export_report {
  *
  * MCAP has one whole recording for viewers, not only its cuts: /force, /tracker, /depth and
  * /events in JSON. In the report, rows is then the number of messages, and cuts is 0. With
- * @ref incise_export_options.ros2 its messages are those of ROS 2, with the camera's frames, in
+ * @ref incise_export_options.ros2 its messages are messages of ROS 2, with the camera's frames, in
  * metres and UTC: /tip, /force, /events, /camera/image; poses that the tracker flags as unusable
  * are omitted.
  *

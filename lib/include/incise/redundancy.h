@@ -36,7 +36,7 @@ struct incise_redundancy {
 
 /**
  * Compare both depths. Pairs with a change of depth above 20 mm/s are omitted. The
- * uncertainties are those of means over one second, because errors of neighbouring pairs are
+ * uncertainties come from means over one second, because errors of neighbouring pairs are
  * correlated. A pure function.
  *
  * @return 0; -ENODATA (fewer than 30 pairs, or 4 seconds of them), -EINVAL, -ENOMEM

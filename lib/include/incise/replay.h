@@ -7,7 +7,7 @@
  *     tick    |   |   |   |   |   |   |   |   at the multiples of the scene's period
  *     force   ╰─╯ ╰─╯ ╰─╯ ╰─╯ ╰─╯ ╰─╯ ╰─╯     its mean over a period around the tick
  *
- * Time is that of the recording. Nothing depends on the computer's clock, so that forces are
+ * Time is the recording's. Nothing depends on the computer's clock, so that forces are
  * bit-exact in each run and at any speed.
  */
 #ifndef INCISE_REPLAY_H

@@ -44,7 +44,7 @@ enum incise_rig_device {
 	INCISE_RIG_STEPPER = 8,
 	/** With STEPPER: only read their state, while another program drives them. */
 	INCISE_RIG_WATCH = 16,
-	/** With CAMERA: only if a rig.conf names one; "sim:KEY=VALUE,…" names none. */
+	/** With CAMERA: only if a rig.conf names one; "sim:KEY=VALUE,…" names no camera. */
 	INCISE_RIG_IF_NAMED = 32,
 };
 
@@ -128,7 +128,7 @@ INCISE_API int incise_rig_foot_switch(const struct incise_rig *rig,
 /**
  * The key `sign_key` of rig.conf: path of the private key of SSH that signs recordings of this rig.
  *
- * @return path, owned by the rig; NULL: none
+ * @return path, owned by the rig; NULL: no file
  */
 INCISE_API const char *incise_rig_sign_key(const struct incise_rig *rig);
 

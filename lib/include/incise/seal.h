@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
  * The seal of a recording: a chain of SHA-256 over its commits, and the statement, a small text
- * that says all of it in digests. Who signs or time-stamps the statement vouches for the
+ * that says all of it in digests. A person who signs or time-stamps the statement vouches for the
  * recording as it was then; see incise-recording(5). Part of libincise-record.
  */
 #ifndef INCISE_SEAL_H
@@ -79,14 +79,14 @@ struct incise_seal_statement {
  * incise_verify() compares them. The same recording gives the same text.
  *
  * @param path as for incise_recording_open()
- * @return text, to be freed with free(3); NULL with errno ENODATA (of an older format, which has
- *         no seal), ENOTSUP (a joined recording: each of its members has its own statement),
+ * @return text, to be freed with free(3); NULL with errno ENODATA (it has no sealed
+ *         commit), ENOTSUP (a joined recording: each of its members has its own statement),
  *         EBADMSG (its rows differ from its seal), or as of incise_recording_open(). Thread-safe.
  */
 INCISE_API char *incise_seal_statement(const char *path, struct incise_error *err);
 
 /**
- * Read a statement. Accepts exactly what incise_seal_statement() writes, and nothing else.
+ * Read a statement. Accepts exactly the form that incise_seal_statement() writes.
  *
  * @param text need not end with a NUL
  * @return 0; -EINVAL, and @p err has the line. Thread-safe.
@@ -101,7 +101,7 @@ INCISE_API int incise_seal_read(struct incise_seal_statement *statement, const c
  * commits after the last one in the statement.
  *
  * @param watch may be NULL
- * @return 0: report->sealed says whether it is what the statement says; -EINVAL: not a statement;
+ * @return 0: report->sealed: whether it agrees with the statement; -EINVAL: not a statement;
  *         otherwise as incise_verify(); -ENODATA, -ENOTSUP as errno of incise_seal_statement()
  */
 INCISE_API int incise_seal_compare(const char *path, const char *text, size_t length,
@@ -111,17 +111,17 @@ INCISE_API int incise_seal_compare(const char *path, const char *text, size_t le
 
 /**
  * Get identity and last head of an opened recording as they are in its tables, without
- * recomputing them: to write them next to what is made of it.
+ * recomputing them: to write them into files that are made of it.
  *
  * @param identity 32 hexadecimal digits and a NUL
- * @return 0; -ENODATA (of an older format; no commit), -ENOTSUP (joined), -EINVAL, -EIO.
+ * @return 0; -ENODATA (no commit), -ENOTSUP (joined), -EINVAL, -EIO.
  */
 INCISE_API int incise_seal_head(struct incise_recording *recording, char identity[33],
 				struct incise_seal_head *head, struct incise_error *err);
 
 /**
  * Whether an opened recording was converted from one of an older format with this last head, 64
- * hexadecimal digits: what was made of that, or signed, was of the same samples.
+ * hexadecimal digits: files made of that, and its signatures, cover the same samples.
  */
 INCISE_API bool incise_seal_before(struct incise_recording *recording, const char *head);
 

@@ -25,7 +25,7 @@ INCISE_BEGIN_DECLS
 
 /** Signals that align clocks. */
 enum incise_session_align {
-	INCISE_ALIGN_CLOCKS, /**< none: wall time alone */
+	INCISE_ALIGN_CLOCKS, /**< no signal: wall time alone */
 	INCISE_ALIGN_TAP,    /**< knocks that force or tracker of each member show */
 	/** events of the kind "sync", of a common line, or steps that it makes in the force */
 	INCISE_ALIGN_EVENTS,
@@ -61,10 +61,10 @@ struct incise_session_options {
 /**
  * Join recordings into a session. Their files are cloned, linked or copied; not a bit changes.
  *
- * @param paths  n recordings, 2 to INCISE_SESSION_MEMBERS_MAX, the first one's clock is that of
- *               the session
+ * @param paths  n recordings, 2 to INCISE_SESSION_MEMBERS_MAX, the first one's clock is the
+ *               session's
  * @param output a new folder; while it is written, it is output.part
- * @return 0; -EINVAL (a session, the same recording twice, a recording of format 1), -ENODATA (no
+ * @return 0; -EINVAL (a session, the same recording twice), -ENODATA (no
  *         wall time, or an unknown uncertainty, and no signal that aligns), -EDOM (a signal that
  *         matches at several offsets, or may match by chance), -ERANGE (an uncertainty
  *         above within_s, clocks and signal that disagree, a clock that went back), -EEXIST, -EBUSY (it is being
@@ -102,7 +102,7 @@ INCISE_API int incise_session_members(const struct incise_recording *recording,
  * with numbers as "%.17g" writes them.
  *
  * @return text, to be freed with free(3); the same recording gives the same. NULL with errno EINVAL
- *         (not joined), ENODATA (a member of an older format, which has no seal), EIO, ENOMEM.
+ *         (not joined), ENODATA (a member without a sealed commit), EIO, ENOMEM.
  */
 INCISE_API char *incise_session_statement(const struct incise_recording *recording,
 					  struct incise_error *err);

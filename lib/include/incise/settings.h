@@ -11,11 +11,11 @@
 struct incise_key {
 	char name[80]; /**< "sim.seed"; "actuator[2].lead_mm" of several, from 1 on */
 	/**
-	 * as in the file and in JSON: 2.5, true, "text", [0, 0, 1]; empty: none, or the device's
-	 * own
+	 * as in the file and in JSON: 2.5, true, "text", [0, 0, 1]; empty: no value, or the
+	 * device's own
 	 */
 	char value[400];
-	const char *unit; /**< of its numbers: "N/mm"; "" for none */
+	const char *unit; /**< of its numbers: "N/mm"; "" without a unit */
 	const char *help; /**< one sentence */
 	bool given;	  /**< in the file; else the default */
 	int line;	  /**< line in the file; 0: not in the file */

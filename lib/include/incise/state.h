@@ -68,7 +68,7 @@ INCISE_API struct incise_state_writer *incise_state_new(
  * Publish a change of state; it is in the file when this returns. Call this and the functions
  * below in the normal thread; they accept a writer of NULL.
  *
- * @param reason one line, truncated to 299 bytes; NULL or "" for none
+ * @param reason one line, truncated to 299 bytes; NULL or "" for no reason
  */
 INCISE_API void incise_state_run(struct incise_state_writer *writer, enum incise_run run,
 				 const char *reason);

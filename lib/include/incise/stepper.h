@@ -167,7 +167,7 @@ struct incise_stepper_counter {
 };
 
 /**
- * Return the actuator's counter i; status.late is not one of them.
+ * Return the actuator's counter i, without status.late.
  * @param i 0 …
  * @return 0; -ENOENT (no more counters). The strings are valid as long as the device.
  */

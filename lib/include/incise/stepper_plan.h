@@ -31,7 +31,7 @@ struct incise_stepper_rendered {
 	uint64_t missed;	 /**< ticks skipped because the timer was late */
 	uint64_t poses, refused; /**< accepted and rejected poses */
 	int64_t t_ns;		 /**< when the tick was due */
-	int64_t age_ns;		 /**< age of its pose; INT64_MAX: none */
+	int64_t age_ns;		 /**< age of its pose; INT64_MAX: no pose */
 	unsigned int flags;	 /**< INCISE_TICK_… */
 	enum incise_phase phase;
 	enum incise_tool held;
@@ -69,7 +69,7 @@ struct incise_stepper_pose_given {
 	/** NULL: no pose, but keep the actuators on. */
 	const struct incise_tracker_sample *sample;
 	enum incise_tool tool; /**< tool in the hand, or INCISE_TOOL_AUTO */
-	bool tube;	       /**< the pose is that of the tube's station */
+	bool tube;	       /**< the pose belongs to the tube's station */
 	bool fade;	       /**< ramp the force to 0 while poses have this */
 };
 

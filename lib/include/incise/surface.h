@@ -16,7 +16,7 @@ INCISE_BEGIN_DECLS
 /** A point on the surface. */
 struct incise_touch {
 	double point_mm[3]; /**< on the surface */
-	/** Outward unit normal; on an edge or corner of a mesh between those of its faces. */
+	/** Outward unit normal; on an edge or corner of a mesh between the normals of its faces. */
 	double normal[3];
 	/** distance; > 0 inside, < 0 outside; at a border as on its side */
 	double depth_mm;

@@ -20,7 +20,7 @@ struct incise_tracker_sample {
 	double position_mm[3]; /**< tracked point, in the tracker's frame */
 	/** unit, w first; from the scalpel's to the tracker's frame */
 	double quaternion[4];
-	char status;	 /**< flag, see incise_pose_usable(); ' ' or 0: none */
+	char status;	 /**< flag, see incise_pose_usable(); ' ' or 0: no flag */
 	uint8_t station; /**< number of the sensor, from 1; 1 on the simulated rig */
 	bool button;	 /**< button of the stylus is pressed; false without one */
 	bool restarted; /**< first record after an interruption: periods have a new phase */
@@ -60,10 +60,10 @@ struct incise_tracker_info {
 	int stations;	    /**< sensors that send records; seq counts all of them */
 	/** Others trigger it: rate_hz is its highest or mean rate; records have no period. */
 	bool external_sync;
-	int64_t grain_ns; /**< grid of arrival times: 1000000 for USB; 0: none */
+	int64_t grain_ns; /**< grid of arrival times: 1000000 for USB; 0: no grid */
 	/** Station on the scalpel: the first one; 0: every station but the tube's */
 	uint8_t scalpel_station;
-	uint8_t tube_station; /**< station at the end of the tube; 0: none */
+	uint8_t tube_station; /**< station at the end of the tube; 0: no such station */
 	bool network;	      /**< poses come over a network, whose delay has no bound */
 };
 

@@ -19,7 +19,6 @@
 INCISE_BEGIN_DECLS
 
 struct incise_dataset;
-struct incise_factor;
 
 /** Rows of inputs and output, row-major, n × (n_inputs + 1); not owned. */
 struct incise_pairs {
@@ -28,12 +27,33 @@ struct incise_pairs {
 	int n_inputs;
 };
 
+/** A phase of a training. */
+enum incise_train_phase {
+	INCISE_TRAIN_SURVEY, /**< first reading of the sources (incise/corpus.h) */
+	INCISE_TRAIN_SEARCH, /**< search of the membership functions */
+	INCISE_TRAIN_ADD, /**< second reading of the sources, for the sums of all pairs */
+	INCISE_TRAIN_SOLVE, /**< consequents, standard deviation and baselines */
+};
+
+/** A step of a training. */
+struct incise_train_step {
+	enum incise_train_phase phase;
+	/** Epoch of the final training that has ended, 1: the given premises; 0: none has. */
+	int epoch;
+	double train_rmse, check_rmse; /**< after that; check is NaN without check data */
+	/** While sources are read: the present one, from 0, and how many there are. */
+	int source, sources;
+	int resumed;	      /**< sources that an interrupted training has surveyed */
+	uint64_t rows, total; /**< rows read, and in all; 0: not known */
+};
+
 /**
- * Called after each epoch of the final training with the epoch (1: the given premises) and the
- * RMSE; check is NaN without check data.
+ * Called after each epoch of the final training, and about every 10 ms of computing, by no clock:
+ * the same training calls it as often. It is called from the thread of the training.
+ *
+ * @return 0; else the training ends at once with -ECANCELED
  */
-typedef void (*incise_train_progress)(void *user, int epoch, double train_rmse,
-				      double check_rmse);
+typedef int (*incise_train_progress)(void *user, const struct incise_train_step *step);
 
 /** Options of training; incise_train_options_init() fills in the defaults. */
 struct incise_train_options {
@@ -67,31 +87,17 @@ struct incise_train_options {
 	 * each consequent. 0 (default): 3000. SIZE_MAX: all, in time that grows with them.
 	 */
 	size_t tuned;
-	/** Training ends soon with -ECANCELED when another thread or a signal handler makes it other
-	 *  than 0; or NULL. */
-	const volatile int *stop;
 	/**
 	 * Set to the predictive standard deviation, to be freed with
 	 * incise_uncertainty_free(); or NULL. Not set on error.
 	 */
 	struct incise_uncertainty **uncertainty;
 	/**
-	 * Ranges of inputs and output over all pairs, where those given are a sample of them
-	 * (n_inputs + 1; only min and max are used), for incise_train_start(); NULL: those of the
-	 * pairs.
+	 * Ranges of inputs and output over all pairs, where the given pairs are a sample of them
+	 * (n_inputs + 1; only min and max are used), for incise_train_start(); NULL: ranges of the
+	 * given pairs.
 	 */
 	const struct incise_variable *ranges;
-	/**
-	 * The pairs given are a sample: return the sums of all pairs, at the membership functions
-	 * of the model, which the consequents are fitted to; the caller's to free. NULL ends the
-	 * training with -ECANCELED. Called once with @user; NULL: the pairs given are all.
-	 */
-	struct incise_factor *(*all)(void *user, const struct incise_model *premises);
-	/**
-	 * The sums of @ref all have weights (incise_corpus_weigh()): there are then no fits with a
-	 * random factor of each group. The model given to it has the consequents of the sample.
-	 */
-	bool weighted;
 };
 
 /** Report of a training. */
@@ -101,7 +107,7 @@ struct incise_train_report {
 	double ridge; /**< ridge of the search, and of the consequents unless averaged */
 	double train_rmse,
 		check_rmse; /**< of the kept parameters; check NaN without data */
-	/** Of the scaled least-squares problem, without ridge; infinite: not all is determined. */
+	/** Condition of the scaled least squares, without ridge; infinite: not all is determined. */
 	double condition;
 	int parameters;	   /**< linear + premise */
 	int rules_unfired; /**< rules whose firing strength never exceeds 0.05 in the data */
@@ -144,15 +150,15 @@ INCISE_API void incise_train_options_init(struct incise_train_options *options);
  * select the epoch with @options->classic (as in MATLAB's anfis). In the default mode the
  * check error is therefore an error on unseen data.
  *
- * @param model   initial premises, Gaussians or bells; its ranges should be those of the
- *                training pairs
+ * @param model   initial premises, Gaussians or bells; its ranges should be the ranges of the
+ * training pairs
  * @param check   or NULL
  * @param report  or NULL
  * @return 0; -EINVAL (no pairs, a value that is not finite, wrong n_inputs, a constant input),
  *         -ENODATA (fewer pairs than consequent parameters), -ENOTSUP (the rules are not a
  *         full grid, the AND method is min, or another kind of membership function), -ERANGE (a
  *         training pair is a whole range or more outside the model's ranges), -EDOM
- *         (least squares failed), -ECANCELED (options->stop), -ENOMEM. On error the model is
+ *         (least squares failed), -ECANCELED (options->progress), -ENOMEM. On error the model is
  *         unchanged.
  */
 INCISE_API int incise_train(struct incise_model *model, const struct incise_pairs *train,
@@ -173,11 +179,13 @@ struct incise_baselines {
  * Compute baselines that a useful model must beat. The nearest-neighbour baseline uses random
  * subsets of very many pairs: 20000 neighbours and 5000 queries.
  *
- * @param groups group of each training pair, or NULL
- * @return 0, -EINVAL, -ENOMEM, -EDOM.
+ * @param groups   group of each training pair, or NULL
+ * @param progress as of incise_train_options, or NULL
+ * @return 0, -EINVAL, -ENOMEM, -EDOM, -ECANCELED.
  */
 INCISE_API int incise_baselines(const struct incise_pairs *train, const int *groups,
 				const struct incise_pairs *on,
+				incise_train_progress progress, void *user,
 				struct incise_baselines *result,
 				struct incise_error *err);
 

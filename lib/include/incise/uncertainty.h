@@ -10,8 +10,8 @@
  * are sparse. The noise comes from held-out groups, so that ±1.96 sd should contain 95 % of a
  * new cut.
  *
- * Of pairs with uncertainties (incise/propagation.h), the calibrations of the rigs add to it: of
- * those that the model was trained on, and of the one that a new output is measured by.
+ * With uncertainties of pairs (incise/propagation.h), the calibrations of the rigs add to it: of
+ * the rigs that the model was trained on, and of the rig that measures a new output.
  *
  *   sd(x)² = noise² (1 + |R⁻ᵀφ(x)|²) + |K φ(x)|² + |B φ(x)|²
  *            data     model            calibration  rig

@@ -83,7 +83,7 @@ struct incise_verify_report {
 	struct incise_verify_frames frames;
 	/** Its seal agrees, and the statement that it was compared with; false without a seal. */
 	bool sealed;
-	uint64_t commits; /**< in the seal; 0: of an older format, without one */
+	uint64_t commits; /**< in the seal; 0: it has none */
 };
 
 /** Callbacks; any may be NULL. */
@@ -103,8 +103,7 @@ struct incise_verify_watch {
  *
  * @param path  as for incise_recording_open()
  * @param watch may be NULL
- * @return 0: report->complete has the result; -ENODATA: a recording of format 1, which has no
- *         ledger; -ECANCELED: stopped by @p watch; negative errno of incise_recording_open(),
+ * @return 0: report->complete has the result; -ECANCELED: stopped by @p watch; negative errno of incise_recording_open(),
  *         for example -EINVAL for a file that is too damaged to open.
  */
 INCISE_API int incise_verify(const char *path, const struct incise_verify_watch *watch,

@@ -1,287 +1,428 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Streams of a recording in Arrow's form; see incise/arrow.h. The rows of the tables are read
- * here, what an export makes of them in arrow_table.c.
+ * Streams of a recording in Arrow's form, as one more format of an export; see incise/arrow.h. An export pushes
+ * its rows; a stream is pulled: the export runs in a thread, but only while the caller waits in get_next()
+ * for a block of rows.
  *
- *     table ──► rows, with their best times ──► batch ──► ArrowArrayStream
+ *     thread:   waits ─┐ rows ──► block ─┐ waits
+ *     caller:          └ get_next() ……   └──► returns
+ *
+ * So a caller that forks finds the thread at rest: SQLite's locks are free in the child. A consumer may move
+ * columns out of an array and free them later: each column owns its buffers.
  */
 #include <dlfcn.h>
 #include <errno.h>
 #include <math.h>
+#include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-#include <incise/recording.h>
-#include "../export/writers.h"
-#include "../read/rows.h"
-#include "../read/session.h"
-#include "arrow_batch.h"
+#include <incise/arrow.h>
+#include "../../base/utf8.h"
+#include "../../device/thread.h"
+#include "../export/streams.h"
 
-#define BATCH_ROWS 65536
-#define COLUMNS_MAX 13
+/* --- schema -------------------------------------------------------------------------- */
 
-/* --- from a source to a stream ------------------------------------------------------- */
+/* Arrow's letters. */
+static char format_of(enum incise_column_type type)
+{
+	switch (type) {
+	case INCISE_COLUMN_SINGLE:
+	case INCISE_COLUMN_COARSE:
+		return 'f';
+	case INCISE_COLUMN_REAL:
+	case INCISE_COLUMN_SEEN:
+		return 'g';
+	case INCISE_COLUMN_FLAG:
+		return 'b';
+	case INCISE_COLUMN_SHORT:
+		return 'i';
+	case INCISE_COLUMN_NAME:
+	case INCISE_COLUMN_TEXT:
+		return 'u'; /* UTF-8 */
+	default:
+		return 'l';
+	}
+}
+
+/* Bytes of metadata, written if @to is not NULL: a count, then a length before each text. */
+static size_t put_count(char *to, size_t at, int32_t count)
+{
+	if (to)
+		memcpy(to + at, &count, sizeof(count));
+	return at + sizeof(count);
+}
+
+static size_t put_word(char *to, size_t at, const char *text)
+{
+	size_t length = strlen(text);
+
+	at = put_count(to, at, (int32_t)length);
+	if (to)
+		memcpy(to + at, text, length);
+	return at + length;
+}
+
+static size_t put_pairs(char *to, const struct incise_provenance *pairs)
+{
+	size_t at = put_count(to, 0, pairs->n);
+
+	for (int i = 0; i < pairs->n; i++) {
+		at = put_word(to, at, pairs->items[i].key);
+		at = put_word(to, at, pairs->items[i].value);
+	}
+	return at;
+}
+
+static void schema_release(struct ArrowSchema *schema)
+{
+	for (int64_t i = 0; i < schema->n_children; i++) {
+		if (schema->children[i] && schema->children[i]->release)
+			schema->children[i]->release(schema->children[i]);
+		free(schema->children[i]);
+	}
+	free(schema->children);
+	free((char *)schema->format);
+	free((char *)schema->name);
+	free((char *)schema->metadata);
+	schema->release = NULL;
+}
+
+/* False: no memory; it has to be released all the same. */
+static bool open_schema(struct ArrowSchema *schema, const char *format, const char *name,
+			const struct incise_provenance *pairs)
+{
+	char *metadata = malloc(put_pairs(NULL, pairs));
+
+	if (metadata)
+		put_pairs(metadata, pairs);
+	*schema = (struct ArrowSchema){
+		.format = strdup(format),
+		.name = strdup(name),
+		.metadata = metadata,
+		.release = schema_release,
+	};
+	return schema->format && schema->name && metadata && !pairs->rc;
+}
+
+/* Describe a column: its unit, the calibration that enters it, and whose uncertainty it is or has. */
+static void describe_column(struct incise_provenance *pairs,
+			    const struct incise_table_column *columns, int n, int i)
+{
+	const struct incise_table_column *column = &columns[i];
+	const struct incise_provenance *calibration = column->calibration;
+	char *names = incise_column_uncertainties(columns, n, i);
+
+	incise_provenance_add(pairs, "unit", "%s", column->unit);
+	incise_provenance_add(pairs, "description", "%s", column->about);
+	for (int k = 0; calibration && k < calibration->n; k++)
+		incise_provenance_add(pairs, calibration->items[k].key, "%s",
+				      calibration->items[k].value);
+	if (names)
+		incise_provenance_add(pairs, "uncertainty_variables", "%s", names);
+	if (column->of)
+		incise_provenance_add(pairs, "uncertainty_of", "%s", column->of);
+	if (column->of)
+		incise_provenance_add(pairs, "correlation", "%s", column->correlation);
+	free(names);
+}
+
+static bool add_child(struct ArrowSchema *schema,
+		      const struct incise_table_column *columns, int n, int i)
+{
+	const char format[] = {format_of(columns[i].type), '\0'};
+	struct ArrowSchema *child = calloc(1, sizeof(*child));
+	struct incise_provenance pairs = {0};
+	bool made;
+
+	if (!child)
+		return false;
+	schema->children[schema->n_children++] = child;
+	describe_column(&pairs, columns, n, i);
+	made = open_schema(child, format, columns[i].name, &pairs);
+	child->flags = columns[i].type == INCISE_COLUMN_SEEN ? ARROW_FLAG_NULLABLE : 0;
+	incise_provenance_free(&pairs);
+	return made;
+}
+
+/* The schema of a table. Returns 0 or -ENOMEM. */
+static int make_schema(struct ArrowSchema *schema,
+		       const struct incise_table_column *columns, int n,
+		       const struct incise_provenance *provenance)
+{
+	bool made = open_schema(schema, "+s", "", provenance);
+
+	schema->children = calloc((size_t)n, sizeof(*schema->children));
+	made = made && schema->children;
+	for (int i = 0; i < n && made; i++)
+		made = add_child(schema, columns, n, i);
+	if (made)
+		return 0;
+	schema_release(schema);
+	return -ENOMEM;
+}
+
+/* --- arrays -------------------------------------------------------------------------- */
+
+static void array_release(struct ArrowArray *array)
+{
+	for (int64_t i = 0; i < array->n_children; i++) {
+		if (array->children[i] && array->children[i]->release)
+			array->children[i]->release(array->children[i]);
+		free(array->children[i]);
+	}
+	for (int64_t i = 0; i < array->n_buffers; i++)
+		free((void *)array->buffers[i]);
+	free(array->children);
+	free(array->buffers);
+	array->release = NULL;
+}
+
+/* An array of the block's rows, or of a column of them. False: no memory; it has to be released all the same. */
+static bool open_array(struct ArrowArray *array, const struct incise_table *table,
+		       int n_buffers)
+{
+	*array = (struct ArrowArray){
+		.length = (int64_t)table->filled,
+		.buffers = calloc((size_t)n_buffers, sizeof(*array->buffers)),
+		.release = array_release,
+	};
+	array->n_buffers = array->buffers ? n_buffers : 0;
+	return array->buffers;
+}
+
+static void set_bit(uint8_t *bits, size_t at, bool value)
+{
+	bits[at / 8] |= (uint8_t)(value << at % 8);
+}
+
+/* The values of a column of numbers; NULL: no memory. */
+static void *copy_numbers(const union incise_cell *cells, size_t n, char format)
+{
+	void *to = calloc(n, format == 'b' ? 1 : format == 'f' || format == 'i' ? 4 : 8);
+	float *singles = to;
+	int32_t *shorts = to;
+
+	if (!to)
+		return NULL;
+	switch (format) {
+	case 'b':
+		for (size_t i = 0; i < n; i++)
+			set_bit(to, i, cells[i].integer);
+		break;
+	case 'f':
+		for (size_t i = 0; i < n; i++)
+			singles[i] = (float)cells[i].real;
+		break;
+	case 'i':
+		for (size_t i = 0; i < n; i++)
+			shorts[i] = (int32_t)cells[i].integer;
+		break;
+	default:
+		memcpy(to, cells, n * sizeof(*cells));
+	}
+	return to;
+}
+
+/* Mark the values that are there, and write 0 for the others, if any is missing. False: no memory. */
+static bool mark_missing(struct ArrowArray *child, double *values, uint8_t **bits)
+{
+	size_t n = (size_t)child->length;
+
+	for (size_t i = 0; i < n; i++)
+		child->null_count += isnan(values[i]);
+	*bits = child->null_count ? calloc(1, (n + 7) / 8) : NULL;
+	for (size_t i = 0; i < n && *bits; i++) {
+		set_bit(*bits, i, !isnan(values[i]));
+		values[i] = isnan(values[i]) ? 0 : values[i];
+	}
+	return !child->null_count || *bits;
+}
+
+static const char *text_of(const struct incise_table *table, enum incise_column_type type,
+			   const union incise_cell *cell)
+{
+	return type == INCISE_COLUMN_NAME ? table->names[cell->integer - 1]
+					  : table->texts + cell->integer;
+}
+
+/* The texts of a column, and their offsets. False: no memory, or too many bytes. */
+static bool copy_texts(const struct incise_table *table, enum incise_column_type type,
+		       const union incise_cell *cells, const void *buffers[2])
+{
+	int32_t *offsets = calloc(table->filled + 1, sizeof(*offsets));
+	size_t size = 0;
+	char *to;
+
+	for (size_t i = 0; i < table->filled; i++)
+		size += strlen(text_of(table, type, &cells[i]));
+	to = size < INT32_MAX ? malloc(size + 1) : NULL;
+	buffers[0] = offsets;
+	buffers[1] = to;
+	for (size_t i = 0; offsets && to && i < table->filled; i++)
+		offsets[i + 1] =
+			(int32_t)(utf8_copy_printable(to + offsets[i],
+						      text_of(table, type, &cells[i]),
+						      "") -
+				  to);
+	return offsets && to;
+}
+
+/* Copy column @i of the block. False: no memory; it has to be released all the same. */
+static bool copy_column(const struct incise_table *table, int i, struct ArrowArray *child)
+{
+	const union incise_cell *cells = &table->block[(size_t)i * INCISE_TABLE_STRIDE];
+	enum incise_column_type type = table->columns[i].type;
+	char format = format_of(type);
+	void *values;
+
+	if (!open_array(child, table, format == 'u' ? 3 : 2))
+		return false;
+	if (format == 'u')
+		return copy_texts(table, type, cells, child->buffers + 1);
+	child->buffers[1] = values = copy_numbers(cells, table->filled, format);
+	return values && (type != INCISE_COLUMN_SEEN ||
+			  mark_missing(child, values, (uint8_t **)&child->buffers[0]));
+}
+
+/* The rows of the block. Returns 0 or -ENOMEM. */
+static int make_array(struct ArrowArray *array, const struct incise_table *table)
+{
+	bool made = open_array(array, table, 1); /* no row is missing */
+
+	array->children = calloc((size_t)table->n_columns, sizeof(*array->children));
+	made = made && array->children;
+	for (int i = 0; i < table->n_columns && made; i++) {
+		struct ArrowArray *child = calloc(1, sizeof(*child));
+
+		array->children[i] = child;
+		array->n_children += child != NULL;
+		made = child && copy_column(table, i, child);
+	}
+	if (made)
+		return 0;
+	array_release(array);
+	return -ENOMEM;
+}
+
+/* --- a stream, and its export in the thread ------------------------------------------- */
 
 struct stream {
-	struct incise_arrow_source *source;
-	struct incise_error err;
-	pid_t owner;
-	bool ended;
-};
-
-static int stream_fail(struct stream *stream, int code)
-{
-	/* A message was left where the cause is known, unless there is no memory. */
-	if (stream->err.code != code)
-		incise_error_set(&stream->err, code, "stream of a recording: %s",
-				 strerror(code));
-	stream->ended = true;
-	return code;
-}
-
-/* Connections and threads are not those of a child. */
-static bool is_foreign(struct stream *stream)
-{
-	if (stream->owner == getpid())
-		return false;
-	incise_error_set(&stream->err, EINVAL,
-			 "this stream was opened by process %ld before a fork; open "
-			 "the recording again in this process",
-			 (long)stream->owner);
-	return true;
-}
-
-static int stream_schema(struct ArrowArrayStream *self, struct ArrowSchema *out)
-{
-	struct stream *stream = self->private_data;
-	const struct incise_arrow_source *source = stream->source;
-
-	memset(out, 0, sizeof(*out));
-	if (incise_arrow_schema(out, source->fields, source->n_fields,
-				&source->provenance))
-		return stream_fail(stream, ENOMEM);
-	return 0;
-}
-
-static int stream_next(struct ArrowArrayStream *self, struct ArrowArray *out)
-{
-	struct stream *stream = self->private_data;
-	int rc;
-
-	memset(out, 0, sizeof(*out));
-	if (is_foreign(stream))
-		return EINVAL;
-	if (stream->ended) /* also after an error, which is repeated */
-		return stream->err.code;
-	rc = stream->source->next(stream->source, out, &stream->err);
-	if (rc)
-		return stream_fail(stream, -rc);
-	stream->ended = !out->release;
-	return 0;
-}
-
-static const char *stream_error(struct ArrowArrayStream *self)
-{
-	const struct stream *stream = self->private_data;
-
-	return stream->err.code ? stream->err.text : NULL;
-}
-
-static void source_close(struct incise_arrow_source *source)
-{
-	incise_provenance_free(&source->provenance);
-	source->close(source);
-}
-
-static void stream_release(struct ArrowArrayStream *self)
-{
-	struct stream *stream = self->private_data;
-
-	/* In a child what is the parent's stays as it is. */
-	if (stream->owner == getpid())
-		source_close(stream->source);
-	free(stream);
-	self->release = NULL;
-}
-
-/* --- rows of a table ----------------------------------------------------------------- */
-
-struct table;
-
-#define FIELD(name, unit, about, type)                              \
-	{                                                           \
-		name, unit, about, INCISE_ARROW_##type, false, NULL \
-	}
-#define SEEN(name, unit, about)                                  \
-	{                                                        \
-		name, unit, about, INCISE_ARROW_REAL, true, NULL \
-	}
-#define SEQ FIELD("seq", "1", "number of the sample, from the device", INT64)
-#define TIME FIELD("t_ns", "ns", "best time of acquisition, CLOCK_MONOTONIC", INT64)
-#define ARRIVAL FIELD("arrival_ns", "ns", "time of receipt, CLOCK_MONOTONIC", INT64)
-#define POSITION "position as received, without the calibrated tip"
-#define ORIENTATION "orientation, unit quaternion"
-
-struct rows_source {
-	struct incise_arrow_source base;
-	const struct table *table;
+	struct incise_table_format format; /* table->format is this one */
+	const char *what;
 	struct incise_recording *recording;
-	struct incise_rows rows;
-	struct incise_arrow_batch batch;
-	struct incise_recording_force scale;
-	double depth_scale; /* of another calibration, of depths by vision */
-	struct incise_provenance time, value;
-	struct incise_arrow_field fields[COLUMNS_MAX + 1];
+	struct incise_export_options options, given; /* for the thread; as given */
+	struct incise_calibration calibration;
+	char *calibration_path;
+	struct incise_provenance provenance, time,
+		value; /* time and value of some columns */
+	struct incise_table_column *columns;
+	int n_columns;
+	pthread_t thread;
+	pid_t owner;
+	struct incise_error last; /* of the caller */
+
+	pthread_mutex_t lock; /* of all that follows */
+	pthread_cond_t changed;
+	struct ArrowArray block; /* release NULL: none */
+	bool started;		 /* the columns are known */
+	bool wanted;		 /* the caller waits for a block */
+	bool ended, stop;
+	int rc; /* of the export, once it has ended */
+	struct incise_error err;
 };
 
-static void put_force(struct rows_source *source)
+static struct stream *stream_of(const struct incise_table *table)
 {
-	struct incise_arrow_batch *batch = &source->batch;
-	const struct incise_recording_force *scale = &source->scale;
-	int64_t code = incise_rows_int(&source->rows, 2);
-
-	incise_arrow_put_int(batch, 0, incise_rows_int(&source->rows, 0));
-	incise_arrow_put_int(batch, 1, source->rows.t_ns);
-	incise_arrow_put_int(batch, 2, code);
-	incise_arrow_put_real(batch, 3, code * scale->n_per_code - scale->zero_N);
-	incise_arrow_put_int(batch, 4, code <= 0 || code >= scale->top);
+	return (struct stream *)((char *)(uintptr_t)table->format -
+				 offsetof(struct stream, format));
 }
 
-/* Column @column of the rows as column @to. */
-static void put_column(struct rows_source *source, int column, int to)
+static void signal_state(struct stream *stream, bool *flag)
 {
-	struct incise_arrow_batch *batch = &source->batch;
-	const struct incise_arrow_field *field = &source->fields[to];
-	const struct incise_rows *rows = &source->rows;
-
-	if (field->nullable && isnan(incise_rows_real(rows, column)))
-		incise_arrow_put_missing(batch, to);
-	else if (!strcmp(field->name, "status"))
-		incise_arrow_put_text(batch, to,
-				      (const char[]){incise_rows_char(rows, column), 0});
-	else if (field->type == INCISE_ARROW_TEXT)
-		incise_arrow_put_text(batch, to, incise_rows_text(rows, column, NULL));
-	else if (field->type == INCISE_ARROW_REAL)
-		incise_arrow_put_real(batch, to,
-				      incise_rows_real(rows, column) *
-					      (field->nullable && field->calibration
-						       ? source->depth_scale
-						       : 1));
-	else if (column == 1)
-		incise_arrow_put_int(batch, to, rows->t_ns);
-	else if (!strcmp(field->name, "arrival_ns"))
-		incise_arrow_put_int(batch, to,
-				     incise_session_time(rows->times.map,
-							 incise_rows_int(rows, column)));
-	else
-		incise_arrow_put_int(batch, to, incise_rows_int(rows, column));
+	pthread_mutex_lock(&stream->lock);
+	*flag = true;
+	pthread_cond_broadcast(&stream->changed);
+	pthread_mutex_unlock(&stream->lock);
 }
 
-static void put_columns(struct rows_source *source)
+/* Leave a block, or NULL before the first, and wait until another is wanted. 0 or -ECANCELED. */
+static int hand_over(struct stream *stream, const struct ArrowArray *block)
 {
-	for (int i = 0; i < source->base.n_fields; i++)
-		put_column(source, i, i);
-}
+	bool stop;
 
-/* Events have no number. */
-static void put_event(struct rows_source *source)
-{
-	for (int i = 0; i < source->base.n_fields; i++)
-		put_column(source, i + 1, i);
-}
-
-/* A table, and its columns, as of rows.h. */
-static const struct table {
-	const char *name, *columns;
-	void (*put)(struct rows_source *source); /* the present row into the batch */
-	struct incise_arrow_field fields[COLUMNS_MAX + 1];
-	const char *calibrated; /* column whose calibration is known, or NULL */
-} tables[] = {
-	{"force",
-	 "seq, t_ns, code",
-	 put_force,
-	 {SEQ, TIME, FIELD("code", "1", "code of the converter", INT32),
-	  FIELD("force_N", "N", "on the blade", REAL),
-	  FIELD("clipped", "1", "the converter was at an end", FLAG)},
-	 "force_N"},
-	{"tracker",
-	 "seq, t_ns, arrival_ns, x_mm, y_mm, z_mm, qw, qx, qy, qz, status, station, "
-	 "button",
-	 put_columns,
-	 {SEQ, TIME, ARRIVAL, FIELD("x_mm", "mm", POSITION, REAL),
-	  FIELD("y_mm", "mm", POSITION, REAL), FIELD("z_mm", "mm", POSITION, REAL),
-	  FIELD("qw", "1", ORIENTATION, REAL), FIELD("qx", "1", ORIENTATION, REAL),
-	  FIELD("qy", "1", ORIENTATION, REAL), FIELD("qz", "1", ORIENTATION, REAL),
-	  FIELD("status", "1", "error letter of the tracker, space: none", TEXT),
-	  FIELD("station", "1", "sensor of the tracker, from 1", INT32),
-	  FIELD("button", "1", "the button of the stylus was pressed", FLAG)},
-	 NULL},
-	{"depth",
-	 "seq, t_ns, depth_mm, velocity_mm_s",
-	 put_columns,
-	 {SEQ, TIME, FIELD("depth_mm", "mm", "of the tip below the surface", REAL),
-	  FIELD("velocity_mm_s", "mm/s", "speed of the tip", REAL)},
-	 "depth_mm"},
-	{"frames",
-	 "seq, t_ns, arrival_ns, pts, bytes, length_px, sd_px, depth_mm, quality",
-	 put_columns,
-	 {SEQ, TIME, ARRIVAL, FIELD("pts", "ms", "timestamp in camera.mkv", INT64),
-	  FIELD("bytes", "byte", "size of the coded frame", INT64),
-	  SEEN("length_px", "pixel", "exposed length of the blade"),
-	  SEEN("sd_px", "pixel", "standard deviation of the edge"),
-	  SEEN("depth_mm", "mm", "depth of the tip below the surface, from vision"),
-	  SEEN("quality", "1", "quality of the measurement, 0 to 1")},
-	 "depth_mm"},
-	{"events",
-	 "rowid, t_ns, kind, text",
-	 put_event,
-	 {FIELD("t_ns", "ns", "CLOCK_MONOTONIC", INT64),
-	  FIELD("kind", "1", "kind of the event", TEXT),
-	  FIELD("text", "1", "its description", TEXT)},
-	 NULL},
-};
-
-static int rows_next(struct incise_arrow_source *base, struct ArrowArray *array,
-		     struct incise_error *err)
-{
-	struct rows_source *source = (struct rows_source *)base;
-	struct incise_arrow_batch *batch = &source->batch;
-	int rc = incise_arrow_batch_start(batch);
-
-	while (!rc && batch->rows < BATCH_ROWS) {
-		int more = incise_rows_next(&source->rows, err);
-
-		if (more < 0)
-			return more;
-		if (!more)
-			break;
-		source->table->put(source);
-		batch->rows++;
+	pthread_mutex_lock(&stream->lock);
+	if (block) {
+		stream->block = *block;
+		stream->wanted = false;
 	}
-	return rc || !batch->rows ? rc : incise_arrow_batch_take(batch, array);
+	pthread_cond_broadcast(&stream->changed);
+	while (!stream->wanted && !stream->stop)
+		pthread_cond_wait(&stream->changed, &stream->lock);
+	stop = stream->stop;
+	pthread_mutex_unlock(&stream->lock);
+	return stop ? -ECANCELED : 0;
 }
 
-static void rows_close(struct incise_arrow_source *base)
+static int fail_memory(const struct stream *stream, struct incise_error *err)
 {
-	struct rows_source *source = (struct rows_source *)base;
-
-	incise_arrow_batch_close(&source->batch);
-	incise_rows_close(&source->rows);
-	incise_provenance_free(&source->time);
-	incise_provenance_free(&source->value);
-	incise_recording_close(source->recording);
-	free(source);
+	return incise_error_set(err, ENOMEM, "%s: out of memory",
+				stream->recording->path);
 }
+
+static int stream_open(struct incise_table *table, struct incise_error *err)
+{
+	struct stream *stream = stream_of(table);
+
+	stream->columns = calloc((size_t)table->n_columns, sizeof(*stream->columns));
+	if (!stream->columns)
+		return fail_memory(stream, err);
+	stream->n_columns = table->n_columns;
+	memcpy(stream->columns, table->columns,
+	       (size_t)table->n_columns * sizeof(*stream->columns));
+	signal_state(stream, &stream->started);
+	return hand_over(stream, NULL);
+}
+
+static int stream_put(struct incise_table *table, struct incise_error *err)
+{
+	struct stream *stream = stream_of(table);
+	struct ArrowArray block;
+
+	if (make_array(&block, table))
+		return fail_memory(stream, err);
+	return hand_over(stream, &block);
+}
+
+static int report_progress(void *context, double share)
+{
+	struct stream *stream = context;
+	bool stop;
+
+	pthread_mutex_lock(&stream->lock);
+	stop = stream->stop;
+	pthread_mutex_unlock(&stream->lock);
+	return stop || (stream->given.progress &&
+			stream->given.progress(stream->given.context, share));
+}
+
+/* --- what enters the values of a stream ------------------------------------------------ */
 
 /* A key of metadata, unless the number is not known. */
-static int add_known(struct incise_provenance *to, const char *key, double value)
+static void add_known(struct incise_provenance *to, const char *key, double value)
 {
-	return isnan(value) ? 0 : incise_provenance_add(to, key, "%.17g", value);
+	if (!isnan(value))
+		incise_provenance_add(to, key, "%.17g", value);
+}
+
+static void add_vector(struct incise_provenance *to, const char *key, const double v[3])
+{
+	incise_provenance_add(to, key, "%.17g %.17g %.17g", v[0], v[1], v[2]);
 }
 
 /* Standard uncertainties that the calibrations state, with their covariance. */
-static int describe_uncertainties(struct rows_source *source,
-				  const struct incise_export_options *options)
+static void describe_uncertainties(struct stream *stream)
 {
 	static const struct {
 		const char *table, *key;
@@ -304,213 +445,297 @@ static int describe_uncertainties(struct rows_source *source,
 		 INCISE_BUDGET_TIP_Z},
 	};
 	struct incise_budget *budget;
-	int rc = 0;
+	struct incise_provenance *to = &stream->value;
 
-	if (strcmp(source->table->name, "force") != 0 &&
-	    strcmp(source->table->name, "depth") != 0)
-		return 0;
+	if (strcmp(stream->what, "force") && strcmp(stream->what, "depth"))
+		return;
 	/* Rows are read even if the text of their calibration is damaged. */
-	budget = incise_budget_open(source->recording, options, false, NULL);
-	if (!budget)
-		return errno == ENOMEM ? -ENOMEM : 0;
-	for (size_t i = 0; i < sizeof(items) / sizeof(*items) && !rc; i++)
-		if (!strcmp(items[i].table, source->table->name))
-			rc = add_known(&source->value, items[i].key,
-				       items[i].a == items[i].b
-					       ? incise_budget_u(budget, items[i].a)
-					       : incise_budget_covariance(
-							 budget, items[i].a, items[i].b));
+	budget = incise_budget_open(stream->recording, &stream->options, false, NULL);
+	if (!budget && errno == ENOMEM)
+		to->rc = -ENOMEM;
+	for (size_t i = 0; i < sizeof(items) / sizeof(*items) && budget; i++)
+		if (!strcmp(items[i].table, stream->what))
+			add_known(to, items[i].key,
+				  items[i].a == items[i].b
+					  ? incise_budget_u(budget, items[i].a)
+					  : incise_budget_covariance(budget, items[i].a,
+								     items[i].b));
 	incise_budget_free(budget);
-	return rc;
 }
 
 /* The calibration of the values: scales, and the plane that depth is measured from. */
-static int describe_values(struct rows_source *source,
-			   const struct incise_calibration *given)
+static void describe_values(struct stream *stream)
 {
-	const struct incise_recording_info *meta = &source->recording->meta;
-	struct incise_provenance *to = &source->value;
-	const double *point = meta->surface_point_mm, *normal = meta->surface_normal;
-	int rc = 0;
+	const struct incise_calibration *given = stream->options.calibration;
+	const struct incise_recording_info *meta = &stream->recording->meta;
+	struct incise_provenance *to = &stream->value;
 
-	if (!strcmp(source->table->name, "force")) {
+	if (!strcmp(stream->what, "force")) {
 		if (meta->newtons)
 			given = NULL;
-		rc = add_known(to, "force_mV_N",
-			       given ? given->force_mV_N : meta->force_mV_N);
-		if (!rc)
-			rc = add_known(to, "force_zero_mV",
-				       given && !isnan(given->force_zero_mV)
-					       ? given->force_zero_mV
-					       : meta->zero_mV);
-	} else if (!strcmp(source->table->name, "frames")) {
-		rc = add_known(to, "depth_mm_px",
-			       given ? given->depth_mm_px : meta->depth_mm_px);
+		add_known(to, "force_mV_N", given ? given->force_mV_N : meta->force_mV_N);
+		add_known(to, "force_zero_mV",
+			  given && !isnan(given->force_zero_mV) ? given->force_zero_mV
+								: meta->zero_mV);
+	} else if (!strcmp(stream->what, "frames")) {
+		add_known(to, "depth_mm_px",
+			  given ? given->depth_mm_px : meta->depth_mm_px);
 	} else {
-		rc = incise_provenance_add(to, "surface_point_mm", "%.17g %.17g %.17g",
-					   point[0], point[1], point[2]);
-		if (!rc)
-			rc = incise_provenance_add(to, "surface_normal",
-						   "%.17g %.17g %.17g", normal[0],
-						   normal[1], normal[2]);
-		if (!rc)
-			rc = incise_provenance_add(to, "tip_mm", "%.17g %.17g %.17g",
-						   meta->tip_mm[0], meta->tip_mm[1],
-						   meta->tip_mm[2]);
+		add_vector(to, "surface_point_mm", meta->surface_point_mm);
+		add_vector(to, "surface_normal", meta->surface_normal);
+		add_vector(to, "tip_mm", meta->tip_mm);
 	}
+}
+
+/* The delay that times are corrected by, and their uncertainty; and what enters the calibrated column. */
+static int describe_stream(struct stream *stream, struct incise_stream_rows *rows)
+{
+	const struct incise_row_times *times = &rows->rows.times;
+	const char *calibrated =
+		!strcmp(stream->what, "force") ? "force_N"
+		: !strcmp(stream->what, "depth") || !strcmp(stream->what, "frames")
+			? "depth_mm"
+			: "";
+
+	if (times->source) {
+		add_known(&stream->time, "delay_ms",
+			  (times->source->delay_ns - (double)times->shift_ns) * 1e-6);
+		add_known(&stream->time, "offset_sd_ms",
+			  times->source->offset_sd_ns * 1e-6);
+	}
+	if (*calibrated) {
+		describe_values(stream);
+		describe_uncertainties(stream);
+	}
+	for (int i = 0; i < rows->n; i++)
+		if (!strcmp(rows->columns[i].name, "t_ns"))
+			rows->columns[i].calibration = &stream->time;
+		else if (!strcmp(rows->columns[i].name, calibrated))
+			rows->columns[i].calibration = &stream->value;
+	return stream->time.rc ? stream->time.rc : stream->value.rc;
+}
+
+static int export_stream(struct stream *stream)
+{
+	struct incise_stream_rows rows;
+	int rc = incise_stream_rows_open(&rows, stream->recording, stream->what,
+					 &stream->options, &stream->err);
+
+	if (!rc && describe_stream(stream, &rows))
+		rc = fail_memory(stream, &stream->err);
+	if (!rc)
+		rc = incise_export_stream(&rows, &stream->format, &stream->err);
+	incise_stream_rows_close(&rows);
 	return rc;
 }
 
-/* The delay that times are corrected by, and their uncertainty. */
-static int describe_times(struct rows_source *source)
+static void *run_export(void *argument)
 {
-	const struct incise_row_times *times = &source->rows.times;
+	struct stream *stream = argument;
+	struct incise_export_pass pass = {&stream->recording, 1, &stream->options,
+					  .err = &stream->err};
+
+	stream->rc = incise_stream_known(stream->what)
+			     ? export_stream(stream)
+			     : incise_export_rows(&pass, &stream->format, NULL, NULL);
+	signal_state(stream, &stream->ended);
+	return NULL;
+}
+
+/* --- in the caller's thread ----------------------------------------------------------- */
+
+/* Connections and threads are not those of a child. */
+static bool is_foreign(struct stream *stream)
+{
+	if (stream->owner == getpid())
+		return false;
+	incise_error_set(&stream->last, EINVAL,
+			 "this stream was opened by process %ld before a fork; open "
+			 "the recording again in this process",
+			 (long)stream->owner);
+	return true;
+}
+
+static int stream_schema(struct ArrowArrayStream *self, struct ArrowSchema *out)
+{
+	struct stream *stream = self->private_data;
+
+	memset(out, 0, sizeof(*out));
+	if (!make_schema(out, stream->columns, stream->n_columns, &stream->provenance))
+		return 0;
+	return -fail_memory(stream, &stream->last);
+}
+
+/* Wait for a block, the end or, of an error, its text, which is repeated. */
+static int stream_next(struct ArrowArrayStream *self, struct ArrowArray *out)
+{
+	struct stream *stream = self->private_data;
 	int rc = 0;
 
-	if (times->stream)
-		rc = add_known(&source->time, "delay_ms",
-			       (times->delay_ns - (double)times->shift_ns) * 1e-6);
-	if (!rc && times->stream)
-		rc = add_known(&source->time, "offset_sd_ms", times->offset_sd_ns * 1e-6);
-	return rc;
-}
-
-static int describe(struct rows_source *source,
-		    const struct incise_export_options *options)
-{
-	const struct table *table = source->table;
-	int rc = describe_times(source), n = 0;
-
-	if (!rc && table->calibrated)
-		rc = describe_values(source, options->calibration);
-	if (!rc && table->calibrated)
-		rc = describe_uncertainties(source, options);
-	for (; table->fields[n].name; n++) {
-		struct incise_arrow_field *field = &source->fields[n];
-
-		*field = table->fields[n];
-		if (!strcmp(field->name, "t_ns"))
-			field->calibration = &source->time;
-		else if (table->calibrated && !strcmp(field->name, table->calibrated))
-			field->calibration = &source->value;
+	memset(out, 0, sizeof(*out));
+	if (is_foreign(stream))
+		return EINVAL;
+	pthread_mutex_lock(&stream->lock);
+	stream->wanted = true;
+	pthread_cond_broadcast(&stream->changed);
+	while (!stream->block.release && !stream->ended)
+		pthread_cond_wait(&stream->changed, &stream->lock);
+	if (stream->block.release) {
+		*out = stream->block;
+		stream->block.release = NULL;
+	} else {
+		rc = stream->rc;
+		stream->last = stream->err;
 	}
-	source->base.fields = source->fields;
-	source->base.n_fields = n;
-	return rc;
+	pthread_mutex_unlock(&stream->lock);
+	return -rc;
 }
 
-static uint64_t rows_expected(const struct rows_source *source)
+static const char *stream_error(struct ArrowArrayStream *self)
 {
-	const struct incise_recording_info *meta = &source->recording->meta;
-	const char *name = source->table->name;
+	const struct stream *stream = self->private_data;
 
-	return !strcmp(name, "force")	  ? meta->force
-	       : !strcmp(name, "tracker") ? meta->tracker
-	       : !strcmp(name, "depth")	  ? meta->depth
-					  : UINT64_MAX;
+	return stream->last.code ? stream->last.text : NULL;
 }
 
-/* On an error nothing but the recording is left to close. */
-static int rows_open(struct rows_source *source,
-		     const struct incise_export_options *options,
-		     struct incise_error *err)
+static void stream_free(struct stream *stream)
 {
-	const struct incise_calibration *given = options->calibration;
-	struct incise_recording *recording = source->recording;
-	const struct table *table = source->table;
+	pthread_cond_destroy(&stream->changed);
+	pthread_mutex_destroy(&stream->lock);
+	incise_provenance_free(&stream->provenance);
+	incise_provenance_free(&stream->time);
+	incise_provenance_free(&stream->value);
+	incise_recording_close(stream->recording);
+	free(stream->columns);
+	free(stream->calibration_path);
+	free(stream);
+}
+
+static void stream_close(struct stream *stream)
+{
+	signal_state(stream, &stream->stop);
+	pthread_join(stream->thread, NULL);
+	if (stream->block.release)
+		stream->block.release(&stream->block);
+	stream_free(stream);
+}
+
+static void stream_release(struct ArrowArrayStream *self)
+{
+	struct stream *stream = self->private_data;
+
+	/* In a child what is the parent's stays as it is. */
+	if (stream->owner == getpid())
+		stream_close(stream);
+	self->release = NULL;
+}
+
+/* Wait for the columns, or for the export's error. Returns 0 or -errno. */
+static int wait_for_columns(struct stream *stream, struct incise_error *err)
+{
 	int rc;
 
-	rc = incise_rows_open(&source->rows, recording, table->name, table->columns,
-			      rows_expected(source), err);
+	pthread_mutex_lock(&stream->lock);
+	while (!stream->started && !stream->ended)
+		pthread_cond_wait(&stream->changed, &stream->lock);
+	rc = stream->started ? 0 : stream->rc;
+	if (rc && err)
+		*err = stream->err;
+	pthread_mutex_unlock(&stream->lock);
+	return rc;
+}
+
+/* Start the export. Returns 0 or -errno. */
+static int start_export(struct stream *stream,
+			const struct incise_export_options *options,
+			struct incise_error *err)
+{
+	const char *table = incise_stream_known(stream->what) ? stream->what : NULL;
+	int rc = table ? 0 : incise_export_check(options, err);
+
+	if (!rc)
+		rc = incise_provenance_of(&stream->provenance, &stream->recording, 1,
+					  options, table, err);
 	if (rc)
 		return rc;
-	if (given)
-		incise_row_times_calibrate(&source->rows.times, given);
-	incise_recording_force(recording, given, &source->scale);
-	source->depth_scale =
-		given ? given->depth_mm_px / recording->meta.depth_mm_px : 1;
-	rc = describe(source, options);
-	if (!rc)
-		rc = incise_arrow_batch_open(&source->batch, source->fields,
-					     source->base.n_fields, BATCH_ROWS);
+	stream->given = stream->options = *options;
+	stream->options.progress = report_progress;
+	stream->options.context = stream;
+	if (options->calibration) {
+		stream->calibration = *options->calibration;
+		stream->options.calibration = &stream->calibration;
+	}
+	if (options->calibration_path) {
+		stream->calibration_path = strdup(options->calibration_path);
+		stream->options.calibration_path = stream->calibration_path;
+		if (!stream->calibration_path)
+			return fail_memory(stream, err);
+	}
+	rc = incise_thread_start(&stream->thread, run_export, stream, NULL);
 	if (rc)
-		return incise_error_set(err, -rc, "%s: out of memory", recording->path);
-	return incise_provenance_of(&source->base.provenance, &recording, 1, options,
-				    table->name, err);
+		return incise_error_set(err, -rc, "%s: no thread to read it: %s",
+					stream->recording->path, strerror(-rc));
+	return 0;
+}
+
+static struct stream *make_stream(const char *path, const char *what,
+				  struct incise_error *err)
+{
+	struct stream *stream = calloc(1, sizeof(*stream));
+
+	if (!stream) {
+		incise_error_set(err, ENOMEM, "%s: out of memory", path);
+		return NULL;
+	}
+	*stream = (struct stream){
+		.format = {.abi = INCISE_TABLE_ABI,
+			   .open = stream_open,
+			   .put = stream_put},
+		.what = what,
+		.owner = getpid(),
+	};
+	pthread_mutex_init(&stream->lock, NULL);
+	pthread_cond_init(&stream->changed, NULL);
+	/* Of its own: a connection is for one thread at a time. */
+	stream->recording = incise_recording_open(path, err);
+	if (stream->recording)
+		return stream;
+	stream_free(stream);
+	return NULL;
 }
 
 /* --- opening ------------------------------------------------------------------------- */
-
-static const struct table *find_table(const char *what)
-{
-	for (size_t i = 0; i < sizeof(tables) / sizeof(*tables); i++)
-		if (!strcmp(tables[i].name, what))
-			return &tables[i];
-	return NULL;
-}
-
-static struct incise_arrow_source *open_rows(struct incise_recording *recording,
-					     const struct table *table,
-					     const struct incise_export_options *options,
-					     struct incise_error *err)
-{
-	struct rows_source *source = calloc(1, sizeof(*source));
-	int rc;
-
-	if (!source) {
-		incise_error_set(err, ENOMEM, "%s: out of memory", recording->path);
-		incise_recording_close(recording);
-		return NULL;
-	}
-	source->base.next = rows_next;
-	source->base.close = rows_close;
-	source->table = table;
-	source->recording = recording;
-	rc = rows_open(source, options, err);
-	if (!rc)
-		return &source->base;
-	source_close(&source->base);
-	errno = -rc;
-	return NULL;
-}
 
 int incise_recording_stream(struct incise_recording *recording, const char *what,
 			    const struct incise_export_options *options,
 			    struct ArrowArrayStream *stream, struct incise_error *err)
 {
-	const struct table *table = find_table(what);
 	struct incise_export_options defaults;
+	const char *name = incise_stream_known(what);
 	struct stream *made;
+	int rc;
 
 	*stream = (struct ArrowArrayStream){0};
-	if (!table && strcmp(what, "table"))
+	if (!name && strcmp(what, "table"))
 		return incise_error_set(
 			err, EINVAL,
 			"no stream '%s' in a recording; there are: force, tracker, "
 			"depth, frames, events, table",
 			what);
-	if (table && !strcmp(what, "frames") && recording->form < 2)
-		return incise_error_set(err, ENOTSUP,
-					"%s: has an older format, without frames",
-					recording->path);
 	incise_export_options_init(&defaults);
-	made = calloc(1, sizeof(*made));
+	made = make_stream(recording->path, name ? name : "table", err);
 	if (!made)
-		return incise_error_set(err, ENOMEM, "%s: out of memory",
-					recording->path);
-	/* Of its own: a connection is for one thread at a time. */
-	recording = incise_recording_open(recording->path, err);
-	if (recording)
-		made->source =
-			table ? open_rows(recording, table, options ? options : &defaults,
-					  err)
-			      : incise_arrow_table(recording,
-						   options ? options : &defaults, err);
-	if (!made->source) {
-		free(made);
 		return -errno;
+	rc = start_export(made, options ? options : &defaults, err);
+	if (rc) {
+		stream_free(made);
+		return rc;
 	}
-	made->owner = getpid();
+	rc = wait_for_columns(made, err);
+	if (rc) {
+		stream_close(made);
+		return rc;
+	}
 	*stream = (struct ArrowArrayStream){
 		.get_schema = stream_schema,
 		.get_next = stream_next,

@@ -389,12 +389,12 @@ static int measure_force(struct incise_budget *budget, const struct use *use,
 	struct incise_recording *force = use->force;
 	const struct incise_recording_info *meta = &force->meta;
 	double step_mV = meta->full_scale_V * 1e3 / (double)(1LL << meta->bits);
-	double sd_mV, samples, variance = NAN, times_ns2 = NAN;
-	int rc = incise_recording_number(force, "force_zero_sd_mV", &sd_mV, err);
+	const double sd_mV = force->numbers.zero_sd_mV;
+	const double samples = force->numbers.zero_samples;
+	double variance = NAN, times_ns2 = NAN;
+	int rc = 0;
 
-	if (!rc)
-		rc = incise_recording_number(force, "force_zero_samples", &samples, err);
-	if (!rc && use->rows)
+	if (use->rows)
 		rc = variances_of_blocks(force, &variance, &times_ns2, err);
 	if (!rc && !isnan(sd_mV) && samples >= 1)
 		rc = measure_zero(budget, force, sd_mV, samples, step_mV, measured, err);
@@ -548,9 +548,6 @@ static int find_times(struct incise_budget *budget, const struct use *use,
 
 	incise_calibration_nominal(&none);
 	for (int i = 0; i < n; i++) {
-		incise_recalibration_stream(
-			!strcmp(streams[i].name, "force") ? use->force : use->tracker,
-			&streams[i]);
 		if (!strcmp(streams[i].name, "force"))
 			force_s = delay_sd_s(&streams[i], given->force_delay_ms,
 					     given->force_delay_sd_ms);
@@ -692,13 +689,14 @@ static int read_tracker(struct tracker_sums *sums, struct incise_rows *rows,
 /* In a session: of the clock of the force's member, s; that of the tracker's is in its rows. */
 static double force_clock_s(struct incise_recording *force)
 {
+	const struct incise_session_map *map = force->own[INCISE_LEDGER_FORCE].map;
 	int64_t seq, t_ns;
 
-	if (!force->map ||
+	if (!map ||
 	    incise_source_end(force, "force", false, &seq, &t_ns, NULL, NULL) <= 0)
 		return 0;
 	/* Of a bounded error that is as likely anywhere within. */
-	return incise_session_bound(force->map, t_ns) / sqrt(3) * 1e-9;
+	return incise_session_bound(map, t_ns) / sqrt(3) * 1e-9;
 }
 
 static void keep_tracker(struct incise_budget *budget, const struct tracker_sums *sums,
@@ -730,11 +728,10 @@ static int measure_tracker(struct incise_budget *budget, const struct use *use,
 {
 	struct tracker_sums sums = {0};
 	struct incise_rows rows;
-	double rate_hz, delay_ns;
-	int rc = incise_recording_number(recording, "tracker_hz", &rate_hz, err);
+	const double rate_hz = recording->numbers.tracker_hz;
+	double delay_ns;
+	int rc;
 
-	if (rc)
-		return rc;
 	if (incise_smooth_init(&sums.smooth, rate_hz > 0 ? rate_hz : 120))
 		return incise_error_set(err, ENOMEM, "out of memory");
 	rc = incise_rows_open(&rows, recording, "depth",
@@ -744,7 +741,8 @@ static int measure_tracker(struct incise_budget *budget, const struct use *use,
 	if (!rc && use->given)
 		incise_row_times_calibrate(&rows.times, use->given);
 	/* Of the calibration in use: another one has added the difference. */
-	delay_ns = isnan(rows.times.delay_sd_ns) ? 0 : rows.times.delay_sd_ns;
+	delay_ns = rc ? 0 : rows.times.source->delay_sd_ns;
+	delay_ns = isnan(delay_ns) ? 0 : delay_ns;
 	delay_ns = sqrt(fmax(0, delay_ns * delay_ns + rows.times.variance_ns2));
 	if (!rc)
 		rc = read_tracker(&sums, &rows, recording->meta.tip_mm, delay_ns * 1e-9,
@@ -785,8 +783,8 @@ struct incise_budget *incise_budget_open(struct incise_recording *recording,
 	const char *given_path = options->calibration_path;
 	struct incise_budget *budget = calloc(1, sizeof(*budget));
 	struct use use = {
-		.force = incise_recording_member(recording, "force"),
-		.tracker = incise_recording_member(recording, "tracker"),
+		.force = recording->streams[INCISE_LEDGER_FORCE]->file,
+		.tracker = recording->streams[INCISE_LEDGER_TRACKER]->file,
 		.given = given,
 		.rows = rows,
 	};

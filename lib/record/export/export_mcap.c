@@ -1,62 +1,15 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * A recording as messages for viewers; see writers.h and messages.h.
+ * A recording as messages for viewers: every row of force, tracker, depth and events, in order
+ * of time, log_time = t_ns (CLOCK_MONOTONIC); see streams.h and messages.h.
  */
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
 #include <incise/clock.h>
-#include "../../base/c_locale.h"
 #include "decimal.h"
 #include "messages.h"
-#include "writers.h"
-
-#define STREAMS INCISE_MCAP_CHANNELS_MAX
-
-/* --- for the profiles ---------------------------------------------------------------- */
-
-int incise_messages_reserve(struct incise_messages *messages, size_t bytes)
-{
-	/* Each byte may be quoted. */
-	size_t capacity =
-		(16 + 4 * INCISE_BUDGET_COLUMNS) * INCISE_DECIMAL_MAX + 2 * bytes;
-	char *text;
-
-	if (capacity <= messages->capacity)
-		return 0;
-	text = realloc(messages->text, capacity);
-	if (!text)
-		return -ENOMEM;
-	messages->text = text;
-	messages->capacity = capacity;
-	return 0;
-}
-
-int64_t incise_message_force(struct incise_messages *messages,
-			     const struct incise_rows *rows, double *force_N,
-			     bool *clipped)
-{
-	const struct incise_recording_force *scale = &messages->scale;
-	int64_t code = incise_rows_int(rows, 2);
-
-	if (code < 0 || code > scale->top)
-		return -EINVAL;
-	*clipped = code == 0 || code == scale->top;
-	*force_N = code * scale->n_per_code - scale->zero_N;
-	messages->clipped += *clipped;
-	return code;
-}
-
-uint64_t incise_message_ns(const struct incise_messages *messages, int64_t t_ns)
-{
-	int64_t ns = t_ns + messages->wall_ns;
-
-	if (messages->wall && !incise_wall_tai(messages->wall, t_ns, &ns, NULL))
-		ns -= incise_wall_utc_offset_s(messages->wall, t_ns) * INCISE_NS_PER_S;
-
-	return ns > 0 ? (uint64_t)ns : 0;
-}
 
 /* --- wall time ----------------------------------------------------------------------- */
 
@@ -80,7 +33,7 @@ static int find_wall(struct incise_messages *messages, struct incise_error *err)
 {
 	/* Of a joined recording that of its clock, whatever is read of it. */
 	struct incise_recording *recording =
-		incise_recording_member(messages->recording, "wall");
+		messages->recording->streams[INCISE_LEDGER_WALL]->file;
 	struct incise_error none = {0};
 	int64_t start_ns;
 	const char *end;
@@ -116,13 +69,11 @@ static int find_wall(struct incise_messages *messages, struct incise_error *err)
 }
 
 /* The largest bound at any of the points. */
-static int add_points(struct incise_provenance *pairs, const struct incise_wall *wall)
+static int64_t find_bound(const struct incise_wall *wall)
 {
 	const struct incise_wall_point *points;
 	size_t n = incise_wall_points(wall, &points);
 	int64_t largest_ns = 0;
-	int rc = incise_provenance_add(pairs, "source", "%s, time of %s", points->source,
-				       points->reference);
 
 	for (size_t i = 0; i < n; i++) {
 		int64_t tai_ns, u_ns = 0;
@@ -130,82 +81,65 @@ static int add_points(struct incise_provenance *pairs, const struct incise_wall 
 		incise_wall_tai(wall, points[i].t_ns, &tai_ns, &u_ns);
 		largest_ns = u_ns > largest_ns ? u_ns : largest_ns;
 	}
-	if (rc)
-		return rc;
-	return largest_ns == INCISE_WALL_UNKNOWN
-		       ? incise_provenance_add(pairs, "uncertainty_s", "unknown")
-		       : incise_provenance_add(pairs, "uncertainty_s", "%.9g",
-					       (double)largest_ns * 1e-9);
+	return largest_ns;
 }
 
-static int write_wall(struct incise_mcap *mcap, const struct incise_messages *messages)
+static int write_wall(struct incise_messages *messages)
 {
 	struct incise_provenance pairs = {0};
-	int rc = incise_provenance_add(&pairs, "clock", "UTC");
+	const struct incise_wall_point *points;
 
-	if (!rc && messages->wall)
-		rc = add_points(&pairs, messages->wall);
-	if (!rc && !messages->wall)
-		rc = incise_provenance_add(&pairs, "source",
-					   "wall clock at the start, in whole seconds");
-	if (!rc && !messages->wall)
-		rc = incise_provenance_add(&pairs, "uncertainty_s", "1");
-	if (!rc && !messages->wall)
-		rc = incise_provenance_add(&pairs, "offset_ns", "%lld",
-					   (long long)messages->wall_ns);
-	if (!rc)
-		incise_mcap_metadata(mcap, "incise.wall", &pairs);
-	incise_provenance_free(&pairs);
-	return rc;
+	incise_provenance_add(&pairs, "clock", "UTC");
+	if (messages->wall) {
+		int64_t bound_ns = find_bound(messages->wall);
+
+		incise_wall_points(messages->wall, &points);
+		incise_provenance_add(&pairs, "source", "%s, time of %s", points->source,
+				      points->reference);
+		if (bound_ns == INCISE_WALL_UNKNOWN)
+			incise_provenance_add(&pairs, "uncertainty_s", "unknown");
+		else
+			incise_provenance_add(&pairs, "uncertainty_s", "%.9g",
+					      (double)bound_ns * 1e-9);
+	} else {
+		incise_provenance_add(&pairs, "source",
+				      "wall clock at the start, in whole seconds");
+		incise_provenance_add(&pairs, "uncertainty_s", "1");
+		incise_provenance_add(&pairs, "offset_ns", "%lld",
+				      (long long)messages->wall_ns);
+	}
+	return incise_messages_pairs(messages, "incise.wall", &pairs);
 }
 
 /* --- uncertainties ------------------------------------------------------------------- */
 
 /* In the style of the CF conventions: which members of a message are uncertainties of which. */
-static int write_uncertainties(struct incise_mcap *mcap,
-			       enum incise_export_uncertainty uncertainty)
+static int write_uncertainties(struct incise_messages *messages)
 {
 	const struct incise_budget_value *values = incise_budget_values();
 	const struct incise_budget_part *parts = incise_budget_parts();
+	bool with_parts = messages->pass->options->uncertainty == INCISE_EXPORT_PARTS;
 	struct incise_provenance pairs = {0};
-	int rc = 0;
 
 	/* The messages have their times in their headers. */
-	for (int q = 0; q < INCISE_BUDGET_TIME && !rc; q++) {
+	for (int q = 0; q < INCISE_BUDGET_TIME; q++) {
 		const struct incise_budget_value *value = &values[q];
-		int n = uncertainty == INCISE_EXPORT_PARTS ? value->n : 0;
+		int end = value->first + (with_parts ? value->n : 0);
 		char text[600];
 		int used = snprintf(text, sizeof(text), "%s", value->total);
 
-		for (int i = value->first; i < value->first + n; i++)
+		for (int i = value->first; i < end; i++)
 			used += snprintf(text + used, sizeof(text) - (size_t)used, " %s",
 					 parts[i].column);
-		rc = incise_provenance_add(&pairs, value->value, "%s", text);
-		for (int i = value->first; i < value->first + n && !rc; i++)
-			rc = incise_provenance_add(
-				&pairs, parts[i].column, "%s",
-				incise_budget_correlations[parts[i].scope]);
+		incise_provenance_add(&pairs, value->value, "%s", text);
+		for (int i = value->first; i < end; i++)
+			incise_provenance_add(&pairs, parts[i].column, "%s",
+					      incise_budget_correlations[parts[i].scope]);
 	}
-	if (!rc)
-		incise_mcap_metadata(mcap, "incise.uncertainty_variables", &pairs);
-	incise_provenance_free(&pairs);
-	return rc;
+	return incise_messages_pairs(messages, "incise.uncertainty_variables", &pairs);
 }
 
 /* --- writing ------------------------------------------------------------------------- */
-
-/* An export under way; of the profile's streams, those that exist. */
-struct export
-{
-	const struct incise_message_profile *profile;
-	const struct incise_export_options *options;
-	struct incise_messages messages;
-	struct incise_mcap mcap;
-	struct incise_rows rows[STREAMS];
-	int channels[STREAMS];
-	int selected;	  /* a bit for each */
-	int64_t first_ns; /* of the range */
-};
 
 static int fail_write(int rc, struct incise_error *err)
 {
@@ -216,235 +150,176 @@ static int fail_write(int rc, struct incise_error *err)
 		strerror(-rc));
 }
 
-/* Write the message of a row of a stream. Returns 0 or -errno. */
-static int write_row(struct export *export, int i, struct incise_error *err)
+/* Whether the rig had it; a topic without any message looks like a loss. */
+static bool is_present(const struct incise_recording *recording, const char *table)
 {
-	const struct incise_message_stream *stream = &export->profile->streams[i];
-	struct incise_messages *messages = &export->messages;
-	const struct incise_rows *rows = &export->rows[i];
-	int64_t length = stream->encode(messages, rows);
-	long long row = incise_rows_seq(rows);
+	return !strcmp(table, "force")	   ? incise_recording_has_force(recording)
+	       : !strcmp(table, "tracker") ? recording->meta.tracker > 0
+	       : !strcmp(table, "depth")   ? recording->meta.depth > 0
+					   : true;
+}
+
+/* Open the streams that exist, and announce their topics. Returns 0 or -errno. */
+static int open_streams(struct incise_messages *messages, struct incise_error *err)
+{
+	const struct incise_message_profile *profile = messages->profile;
+	int rc = 0, selected = (1 << profile->n) - 1;
+
+	if (profile->select)
+		selected = profile->select(messages, err);
+	if (selected < 0)
+		return selected;
+	for (int i = 0; i < profile->n && !rc; i++) {
+		const struct incise_message_stream *kind = &profile->streams[i];
+
+		if (!(selected & 1 << i) || !is_present(messages->recording, kind->table))
+			continue;
+		messages->kinds[messages->n] = kind;
+		rc = incise_stream_rows_open(&messages->streams[messages->n++],
+					     messages->recording, kind->table,
+					     messages->pass->options, err);
+		incise_mcap_channel(&messages->mcap,
+				    &(struct incise_mcap_channel){
+					    .topic = kind->topic,
+					    .encoding = profile->encoding,
+					    .schema_name = kind->schema_name,
+					    .schema_encoding = profile->schema_encoding,
+					    .schema = kind->schema,
+					    .qos = profile->qos,
+				    });
+	}
+	return rc;
+}
+
+/* Read what the messages depend on. Returns 0 or -errno. */
+static int prepare_messages(struct incise_messages *messages, struct incise_error *err)
+{
+	struct incise_recording *recording = messages->recording;
+	const struct incise_calibration *given = messages->pass->options->calibration;
+	struct incise_recording_force scale;
+	int rc = 0;
+
+	if (incise_messages_reserve(messages, 0))
+		return incise_error_set(err, ENOMEM, "out of memory");
+	incise_recording_force(recording, given, &scale);
+	if (incise_recording_has_force(recording))
+		rc = incise_recording_need_zero(recording, &scale, err);
+	if (!rc && messages->profile->wall)
+		rc = find_wall(messages, err);
+	if (!rc)
+		rc = incise_export_budgets(messages->pass);
+	if (!rc && messages->pass->budgets)
+		rc = incise_blade_pose_open(&messages->blade, recording, given, err);
+	return rc ? rc : incise_messages_limit(messages->pass);
+}
+
+static int mcap_open(struct incise_table *table, struct incise_error *err)
+{
+	struct incise_messages *messages = calloc(1, sizeof(*messages));
 	int rc;
 
-	if (!length)
-		messages->omitted++;
-	if (!length)
-		return 0;
-	if (length == -EINVAL)
-		return incise_error_set(err, EINVAL,
-					"%s: damaged: table %s, row %lld is invalid",
-					messages->recording->path, stream->table, row);
-	if (length < 0)
-		return incise_error_set(err, (int)-length, "%s: table %s, row %lld: %s",
-					messages->recording->path, stream->table, row,
-					strerror((int)-length));
-	rc = incise_mcap_message(&export->mcap, export->channels[i],
-				 incise_message_ns(messages, rows->t_ns), messages->text,
-				 (size_t)length);
+	if (!messages)
+		return incise_error_set(err, ENOMEM, "out of memory");
+	table->state = messages;
+	messages->locale = incise_c_locale_begin();
+	messages->pass = table->pass;
+	messages->recording = table->pass->recordings[0];
+	messages->profile = table->pass->options->ros2 ? &incise_messages_ros2
+						       : &incise_messages_json;
+	incise_mcap_begin(&messages->mcap, table->out, messages->profile->name);
+	rc = prepare_messages(messages, err);
+	if (!rc)
+		rc = open_streams(messages, err);
+	if (rc)
+		return rc;
+	table->streams = messages->streams;
+	table->n_streams = messages->n;
+	incise_mcap_metadata(&messages->mcap, "incise", table->provenance);
+	if (messages->profile->wall)
+		rc = write_wall(messages);
+	if (!rc && table->pass->budgets)
+		rc = write_uncertainties(messages);
 	return rc ? fail_write(rc, err) : 0;
 }
 
-/* Write all rows, the earliest first. Returns their number, or -errno. */
-static int64_t each_row(struct export *export, uint64_t all, struct incise_error *err)
+/* Encode the row of a stream. Returns as encode(); -EINVAL: the row is impossible. */
+static int64_t encode_row(struct incise_messages *messages,
+			  const struct incise_message_stream *kind,
+			  const struct incise_stream_rows *stream)
 {
-	struct incise_rows *rows = export->rows;
-	int64_t n = 0;
-	int rc = 0;
+	const union incise_cell *cells = stream->cells;
+	int64_t code = cells[INCISE_CELL_CODE].integer;
 
-	for (int i = 0; i < export->profile->n && rc >= 0; i++)
-		if (export->selected & 1 << i)
-			rc = incise_rows_next(&rows[i], err);
-	while (rc >= 0) {
-		int next = -1;
-
-		for (int i = 0; i < export->profile->n; i++)
-			if (rows[i].live && (next < 0 || rows[i].t_ns < rows[next].t_ns))
-				next = i;
-		if (next < 0)
-			return n;
-		rc = 0;
-		if (incise_range_has(&export->messages.recording->range,
-				     rows[next].t_ns - export->first_ns, 0))
-			rc = write_row(export, next, err);
-		else
-			export->messages.omitted++;
-		if (!rc && (++n & 0xffff) == 0)
-			rc = incise_export_progress(export->options, (double)n,
-						    (double)all, err);
-		if (!rc)
-			rc = incise_rows_next(&rows[next], err);
+	if (!strcmp(kind->table, "force")) {
+		if (code < 0 || code > stream->scale.top)
+			return -EINVAL;
+		messages->pass->report.clipped += cells[INCISE_CELL_CLIPPED].flag;
 	}
-	return rc;
+	if (!strcmp(kind->table, "events") &&
+	    incise_messages_reserve(messages,
+				    strlen(cells[INCISE_CELL_KIND].text) +
+					    strlen(cells[INCISE_CELL_TEXT].text)))
+		return -ENOMEM;
+	return kind->encode(messages, stream);
 }
 
-/* Rows of a table as meta has them; not known of events and frames. */
-static uint64_t expected(const struct incise_recording_info *meta, const char *table)
+/* Write the message of a row; a row without one is omitted. Returns 0 or -errno. */
+static int mcap_put(struct incise_table *table, struct incise_error *err)
 {
-	return !strcmp(table, "force")	   ? meta->force
-	       : !strcmp(table, "tracker") ? meta->tracker
-	       : !strcmp(table, "depth")   ? meta->depth
-					   : UINT64_MAX;
+	struct incise_messages *messages = table->state;
+	const struct incise_stream_rows *stream = table->stream;
+	int channel = (int)(stream - messages->streams);
+	const struct incise_message_stream *kind = messages->kinds[channel];
+	int64_t length = encode_row(messages, kind, stream);
+	long long row = incise_rows_seq(&stream->rows);
+	int rc;
+
+	if (length == -EINVAL)
+		return incise_error_set(err, EINVAL,
+					"%s: damaged: table %s, row %lld is invalid",
+					messages->recording->path, kind->table, row);
+	if (length < 0)
+		return incise_error_set(err, (int)-length, "%s: table %s, row %lld: %s",
+					messages->recording->path, kind->table, row,
+					strerror((int)-length));
+	if (!length)
+		return 0;
+	rc = incise_mcap_message(&messages->mcap, channel,
+				 incise_message_ns(messages, stream->rows.t_ns),
+				 messages->text, (size_t)length);
+	messages->pass->report.rows++;
+	return rc ? fail_write(rc, err) : 0;
 }
 
-/* Whether the rig had it; a topic without any message looks like a loss. */
-static bool exists(const struct incise_recording *recording, const char *table)
+static int mcap_end(struct incise_table *table, struct incise_error *err)
 {
-	return strcmp(table, "force") ? expected(&recording->meta, table) > 0
-				      : incise_recording_has_force(recording);
-}
+	struct incise_messages *messages = table->state;
+	int rc = messages->profile->finish ? messages->profile->finish(messages) : 0;
 
-/* To a part, whose times count from the first sample, by the calibration in use. */
-static int limit(struct export *export, struct incise_error *err)
-{
-	const struct incise_calibration *given = export->options->calibration;
-	struct incise_recording *recording = export->messages.recording;
-	struct incise_rows rows;
-	int rc = incise_recording_limit(recording, export->options, err);
-
-	if (rc || !recording->range.limited)
-		return rc;
-	rc = incise_rows_open(&rows, recording,
-			      incise_recording_has_force(recording) ? "force" : "tracker",
-			      "seq, t_ns", UINT64_MAX, err);
-	if (!rc && given)
-		incise_row_times_calibrate(&rows.times, given);
 	if (!rc)
-		rc = incise_rows_first(&rows, &export->first_ns, err);
-	incise_rows_close(&rows);
-	return rc;
+		rc = incise_mcap_finish(&messages->mcap);
+	return rc ? fail_write(rc, err) : 0;
 }
 
-/* Open the tables, and announce their topics. Returns 0 or -errno. */
-static int open_streams(struct export *export, struct incise_error *err)
+static void mcap_close(struct incise_table *table)
 {
-	const struct incise_message_profile *profile = export->profile;
-	const struct incise_calibration *given = export->options->calibration;
-	struct incise_recording *recording = export->messages.recording;
-	int rc = 0;
+	struct incise_messages *messages = table->state;
 
-	export->selected = (1 << profile->n) - 1;
-	if (profile->select)
-		export->selected = profile->select(&export->messages, err);
-	if (export->selected < 0)
-		return export->selected;
-	for (int i = 0; i < profile->n && !rc; i++) {
-		const struct incise_message_stream *stream = &profile->streams[i];
-
-		if (!exists(recording, stream->table))
-			export->selected &= ~(1 << i);
-		if (!(export->selected & 1 << i))
-			continue;
-		rc = incise_rows_open(&export->rows[i], recording, stream->table,
-				      stream->columns,
-				      expected(&recording->meta, stream->table), err);
-		if (!rc && given)
-			incise_row_times_calibrate(&export->rows[i].times, given);
-		export->channels[i] = incise_mcap_channel(
-			&export->mcap,
-			&(struct incise_mcap_channel){
-				.topic = stream->topic,
-				.encoding = profile->encoding,
-				.schema_name = stream->schema_name,
-				.schema_encoding = profile->schema_encoding,
-				.schema = stream->schema,
-				.qos = profile->qos,
-			});
-	}
-	return rc;
+	for (int i = 0; i < messages->n; i++)
+		incise_stream_rows_close(&messages->streams[i]);
+	incise_mcap_free(&messages->mcap);
+	incise_frames_reader_close(messages->frames);
+	incise_wall_free(messages->wall);
+	incise_blade_pose_close(&messages->blade);
+	incise_c_locale_end(messages->locale);
+	free(messages->text);
+	free(messages);
 }
 
-/* Write everything. Returns the number of rows, or -errno. */
-static int64_t write_messages(struct export *export,
-			      const struct incise_provenance *provenance,
-			      struct incise_error *err)
-{
-	const struct incise_message_profile *profile = export->profile;
-	struct incise_messages *messages = &export->messages;
-	struct incise_recording *recording = messages->recording;
-	const struct incise_recording_info *meta = &recording->meta;
-	int64_t n = 0;
-	int rc = incise_messages_reserve(messages, 0);
-
-	if (rc)
-		return incise_error_set(err, ENOMEM, "out of memory");
-	incise_recording_force(recording, export->options->calibration, &messages->scale);
-	if (incise_recording_has_force(recording))
-		rc = incise_recording_need_zero(recording, &messages->scale, err);
-	if (!rc && profile->wall)
-		rc = find_wall(messages, err);
-	if (!rc && export->options->uncertainty) {
-		messages->uncertainty = export->options->uncertainty;
-		messages->budget =
-			incise_budget_open(recording, export->options, true, err);
-		rc = messages->budget
-			     ? incise_blade_pose_open(&messages->blade, recording,
-						      export->options->calibration, err)
-			     : -errno;
-	}
-	if (!rc)
-		rc = limit(export, err);
-	if (!rc)
-		rc = open_streams(export, err);
-	if (rc)
-		return rc;
-	incise_mcap_metadata(&export->mcap, "incise", provenance);
-	if (profile->wall)
-		rc = write_wall(&export->mcap, messages);
-	if (!rc && messages->budget)
-		rc = write_uncertainties(&export->mcap, messages->uncertainty);
-	if (rc)
-		return fail_write(rc, err);
-	n = each_row(export, meta->force + meta->tracker + meta->depth, err);
-	if (n < 0)
-		return n;
-	if (profile->finish)
-		rc = profile->finish(profile, &export->mcap);
-	if (!rc)
-		rc = incise_mcap_finish(&export->mcap);
-	n -= (int64_t)messages->omitted;
-	if (!rc && !n && recording->range.limited)
-		return incise_error_set(
-			err, ENODATA,
-			"%s: has nothing in this part; give another --from "
-			"and --to",
-			recording->path);
-	return rc ? fail_write(rc, err) : n;
-}
-
-int incise_export_mcap(struct incise_recording *recording,
-		       const struct incise_export_options *options, FILE *out,
-		       const struct incise_provenance *provenance,
-		       struct incise_export_report *report, struct incise_error *err)
-{
-	struct export export = {
-		.profile = options->ros2 ? &incise_messages_ros2 : &incise_messages_json,
-		.options = options,
-		.messages = {.recording = recording},
-	};
-	struct incise_c_locale locale = incise_c_locale_begin();
-	int64_t n;
-
-	incise_mcap_begin(&export.mcap, out, export.profile->name);
-	n = write_messages(&export, provenance, err);
-	incise_c_locale_end(locale);
-	for (int i = 0; i < STREAMS; i++)
-		incise_rows_close(&export.rows[i]);
-	incise_mcap_free(&export.mcap);
-	incise_frames_reader_close(export.messages.frames);
-	incise_wall_free(export.messages.wall);
-	free(export.messages.text);
-	if (n >= 0 && report) {
-		*report = (struct incise_export_report){
-			.rows = (uint64_t)n,
-			.clipped = export.messages.clipped,
-		};
-		if (export.messages.budget)
-			incise_report_unstated(report, export.messages.budget);
-	}
-	if (export.messages.budget)
-		incise_blade_pose_close(&export.messages.blade);
-	incise_budget_free(export.messages.budget);
-	if (n < 0)
-		return (int)n;
-	return 0;
-}
+const struct incise_table_format incise_table_mcap = {
+	.abi = INCISE_TABLE_ABI,
+	.open = mcap_open,
+	.put = mcap_put,
+	.end = mcap_end,
+	.close = mcap_close,
+};

@@ -780,21 +780,16 @@ int incise_blade_pose_open(struct incise_blade_pose *blade,
 			   struct incise_error *err)
 {
 	struct incise_tracker_info tracker = {0};
-	double rate_hz, latency_ns = 0;
-	int rc = incise_recording_number(recording, "tracker_hz", &rate_hz, err);
+	const struct incise_recording_numbers *numbers = &recording->numbers;
+	int rc;
 
 	*blade = (struct incise_blade_pose){.cut.count = recording->range.cuts};
 	memcpy(blade->tip_mm, recording->meta.tip_mm, sizeof(blade->tip_mm));
 	v3_unit(blade->progress.normal, recording->meta.surface_normal, 0);
 	for (int i = 0; i < 2; i++)
 		blade->pose[i].t_ns = blade->deep[i].t_ns = INCISE_TIME_NONE;
-	if (rc)
-		return rc;
-	rc = incise_recording_number(recording, "tracker_latency_ns", &latency_ns, err);
-	if (rc)
-		return rc;
-	tracker.rate_hz = rate_hz > 0 ? rate_hz : 120;
-	tracker.latency_ns = (int64_t)fmin(fmax(latency_ns, 0), 1e9);
+	tracker.rate_hz = numbers->tracker_hz > 0 ? numbers->tracker_hz : 120;
+	tracker.latency_ns = (int64_t)fmin(fmax(numbers->tracker_latency_ns, 0), 1e9);
 	incise_predict_init(&blade->loop.predict, &tracker, 0);
 	/* The gains of the loop's filter are made for the nominal rate. */
 	if (incise_smooth_init(&blade->smooth, tracker.rate_hz))
@@ -815,9 +810,10 @@ int incise_blade_pose_open(struct incise_blade_pose *blade,
 	}
 	/* Rows are dated by the calibrated delay, the loop knows that of the device. */
 	blade->loop.late_ns = blade->loop.predict.latency_ns;
-	if (!rc && !isnan(blade->depth.times.delay_ns))
+	if (!rc && !isnan(blade->depth.times.source->delay_ns))
 		blade->loop.late_ns =
-			(int64_t)fmax(fmin(blade->depth.times.delay_ns, 1e12), -1e12) -
+			(int64_t)fmax(fmin(blade->depth.times.source->delay_ns, 1e12),
+				      -1e12) -
 			blade->depth.times.shift_ns;
 	if (!rc)
 		rc = more_pose(blade, err);
@@ -982,10 +978,7 @@ int incise_camera_interpolator_any(struct incise_recording *recording,
 {
 	int64_t seq, t_ns;
 
-	recording = incise_recording_member(recording, "frames");
-	return recording->form < 2 ? 0
-				   : incise_source_end(recording, "frames", false, &seq,
-						       &t_ns, NULL, err);
+	return incise_source_end(recording, "frames", false, &seq, &t_ns, NULL, err);
 }
 
 /* Second derivative of the depth at a frame by its neighbours, mm/s²; NAN: not known. */

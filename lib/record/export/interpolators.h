@@ -227,7 +227,7 @@ struct incise_blade_pose_value {
 	double depth_mm, depth_u_mm, velocity_mm_s;
 	/* As in the haptic loop; see ../../control/model_input.h. Outside of tissue the time is 0. */
 	double acceleration_mm_s2, tilt_deg, time_in_tissue_s;
-	int station, cut; /* 0: not known; outside cuts */
+	int64_t station, cut; /* 0: not known; outside cuts */
 	bool button, interpolated, error;
 	bool advancing; /* at both records around; false where depth is not known */
 };

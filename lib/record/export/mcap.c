@@ -163,13 +163,27 @@ static void write_channel(struct incise_mcap *mcap, int i)
 	end(mcap, NULL);
 }
 
+/* A map from the channels to a number each; those of 0 may be left out. */
+static void put_channels(struct incise_mcap_bytes *to, const struct incise_mcap *mcap,
+			 const uint64_t *numbers, bool zeros)
+{
+	size_t at = to->n;
+
+	put_number(to, 0, 4);
+	for (int i = 0; i < mcap->n_channels; i++)
+		if (zeros || numbers[i]) {
+			put_number(to, i, 2);
+			put_number(to, numbers[i], 8);
+		}
+	close_length(to, at, 4);
+}
+
 /* Write the chunk, and its indexes behind it. */
 static void write_chunk(struct incise_mcap *mcap)
 {
 	uint64_t start = mcap->at, length, indexes;
 	uint64_t offsets[INCISE_MCAP_CHANNELS_MAX];
 	struct incise_mcap_bytes *to = begin(mcap, CHUNK);
-	size_t at;
 
 	put_number(to, mcap->chunk_first_ns, 8);
 	put_number(to, mcap->chunk_last_ns, 8);
@@ -199,14 +213,7 @@ static void write_chunk(struct incise_mcap *mcap)
 	put_number(to, mcap->chunk_last_ns, 8);
 	put_number(to, start, 8);
 	put_number(to, length, 8);
-	at = to->n;
-	put_number(to, 0, 4);
-	for (int i = 0; i < mcap->n_channels; i++)
-		if (offsets[i]) {
-			put_number(to, i, 2);
-			put_number(to, offsets[i], 8);
-		}
-	close_length(to, at, 4);
+	put_channels(to, mcap, offsets, false);
 	put_number(to, mcap->at - indexes, 8);
 	put_text(to, "");
 	put_number(to, mcap->chunk.n, 8);
@@ -289,11 +296,10 @@ void incise_mcap_metadata(struct incise_mcap *mcap, const char *name,
 static void write_statistics(struct incise_mcap *mcap)
 {
 	struct incise_mcap_bytes *to = begin(mcap, STATISTICS);
-	uint64_t messages = 0;
-	size_t at;
+	uint64_t counts[INCISE_MCAP_CHANNELS_MAX], messages = 0;
 
 	for (int i = 0; i < mcap->n_channels; i++)
-		messages += mcap->channels[i].messages;
+		messages += counts[i] = mcap->channels[i].messages;
 	put_number(to, messages, 8);
 	put_number(to, mcap->n_channels, 2);
 	put_number(to, mcap->n_channels, 4);
@@ -302,59 +308,44 @@ static void write_statistics(struct incise_mcap *mcap)
 	put_number(to, mcap->chunks, 4);
 	put_number(to, mcap->first_ns, 8);
 	put_number(to, mcap->last_ns, 8);
-	at = to->n;
-	put_number(to, 0, 4);
-	for (int i = 0; i < mcap->n_channels; i++) {
-		put_number(to, i, 2);
-		put_number(to, mcap->channels[i].messages, 8);
-	}
-	close_length(to, at, 4);
+	put_channels(to, mcap, counts, true);
 	end(mcap, NULL);
 }
 
-/* Records of one kind in the summary. */
-struct group {
-	enum opcode opcode;
-	uint64_t start, length;
-};
-
+/* The records of each kind, and behind them where those of a kind are. */
 static void write_summary(struct incise_mcap *mcap)
 {
-	struct group groups[5];
-	uint64_t start = mcap->at, offsets, before;
+	static const enum opcode order[] = {SCHEMA, CHANNEL, STATISTICS, CHUNK_INDEX,
+					    METADATA_INDEX};
+	uint64_t starts[6];
 	struct incise_mcap_bytes *to;
 
 	mcap->crc = 0;
+	starts[0] = mcap->at;
+	for (int i = 0; i < mcap->n_channels; i++)
+		write_schema(mcap, i);
+	starts[1] = mcap->at;
+	for (int i = 0; i < mcap->n_channels; i++)
+		write_channel(mcap, i);
+	starts[2] = mcap->at;
+	write_statistics(mcap);
+	starts[3] = mcap->at;
+	write_bytes(mcap, mcap->chunk_indexes.data, mcap->chunk_indexes.n);
+	starts[4] = mcap->at;
+	write_bytes(mcap, mcap->metadata_index.data, mcap->metadata_index.n);
+	starts[5] = mcap->at;
 	for (int k = 0; k < 5; k++) {
-		static const enum opcode order[] = {SCHEMA, CHANNEL, STATISTICS,
-						    CHUNK_INDEX, METADATA_INDEX};
-
-		before = mcap->at;
-		for (int i = 0; i < mcap->n_channels && k < 2; i++)
-			(k ? write_channel : write_schema)(mcap, i);
-		if (order[k] == STATISTICS)
-			write_statistics(mcap);
-		else if (order[k] == CHUNK_INDEX)
-			write_bytes(mcap, mcap->chunk_indexes.data,
-				    mcap->chunk_indexes.n);
-		else if (order[k] == METADATA_INDEX)
-			write_bytes(mcap, mcap->metadata_index.data,
-				    mcap->metadata_index.n);
-		groups[k] = (struct group){order[k], before, mcap->at - before};
-	}
-	offsets = mcap->at;
-	for (int k = 0; k < 5; k++) {
-		if (!groups[k].length)
+		if (starts[k] == starts[k + 1])
 			continue;
 		to = begin(mcap, SUMMARY_OFFSET);
-		put_number(to, groups[k].opcode, 1);
-		put_number(to, groups[k].start, 8);
-		put_number(to, groups[k].length, 8);
+		put_number(to, order[k], 1);
+		put_number(to, starts[k], 8);
+		put_number(to, starts[k + 1] - starts[k], 8);
 		end(mcap, NULL);
 	}
 	to = begin(mcap, FOOTER);
-	put_number(to, start, 8);
-	put_number(to, offsets, 8);
+	put_number(to, starts[0], 8);
+	put_number(to, starts[5], 8);
 	put_number(to, 0, 4);
 	close_length(to, 1, 8);
 	if (to->failed)

@@ -11,14 +11,31 @@
 #define NUMBER(about) "{\"type\":\"number\",\"description\":\"" about "\"}"
 #define OBJECT(properties) "{\"type\":\"object\",\"properties\":{" properties "}}"
 
+/* A member of a message: what stands before its value, and the cell of that. */
+struct incise_json_member {
+	const char *before; /* NULL: the end */
+	int cell;
+};
+
 static char *add(char *to, const char *text)
 {
 	return stpcpy(to, text);
 }
 
-static char *add_real(char *to, const char *before, double value, int decimals)
+/* A value as its column says. */
+static char *add_value(char *to, const struct incise_table_column *column,
+		       const union incise_cell *cell)
 {
-	return incise_decimal_real(add(to, before), value, decimals);
+	switch (column->type) {
+	case INCISE_COLUMN_REAL:
+		return incise_decimal_real(to, cell->real, column->decimals);
+	case INCISE_COLUMN_FLAG:
+		return add(to, cell->flag ? "true" : "false");
+	case INCISE_COLUMN_TEXT:
+		return add(utf8_copy_printable(add(to, "\""), cell->text, "\"\\"), "\"");
+	default:
+		return incise_decimal_integer(to, cell->integer);
+	}
 }
 
 /* Uncertainties of a quantity, as further members. */
@@ -27,7 +44,8 @@ static char *add_uncertainties(char *to, const struct incise_messages *messages,
 			       const double part[INCISE_BUDGET_PARTS])
 {
 	const struct incise_budget_value *value = &incise_budget_values()[quantity];
-	int n = messages->uncertainty == INCISE_EXPORT_PARTS ? value->n : 0;
+	int n = messages->pass->options->uncertainty == INCISE_EXPORT_PARTS ? value->n
+									    : 0;
 
 	for (int i = -1; i < n; i++) {
 		double u = i < 0 ? incise_budget_total(quantity, part)
@@ -43,123 +61,96 @@ static char *add_uncertainties(char *to, const struct incise_messages *messages,
 	return to;
 }
 
-static int64_t force_message(struct incise_messages *messages,
-			     const struct incise_rows *rows)
+/* Find the parts of the uncertainties of a row. Returns 0 or -errno. */
+static int find_parts(struct incise_messages *messages,
+		      const struct incise_stream_rows *stream, bool in_depth,
+		      double part[INCISE_BUDGET_PARTS])
 {
-	char *to = messages->text;
-	double force_N;
-	bool clipped;
-	int64_t code = incise_message_force(messages, rows, &force_N, &clipped);
+	struct incise_budget_row row = {.tracker_time = in_depth};
+	struct incise_blade_pose_value value;
+	int64_t t_ns = stream->rows.t_ns;
 
-	if (code < 0)
-		return code;
-	to = add_real(to, "{\"force_N\":", force_N, 5);
-	to = incise_decimal_integer(add(to, ",\"code\":"), code);
-	to = add(to, clipped ? ",\"clipped\":true" : ",\"clipped\":false");
-	if (messages->budget) {
-		double part[INCISE_BUDGET_PARTS];
-
-		incise_budget_row(messages->budget,
-				  &(struct incise_budget_row){.force_N = force_N,
-							      .force_share = 1},
-				  part);
-		to = add_uncertainties(to, messages, INCISE_BUDGET_FORCE, part);
-	}
-	return add(to, "}") - messages->text;
-}
-
-/* A text in JSON's quotes; bytes that are not UTF-8 become '?'. */
-static char *add_text(char *to, const char *before, const char *text)
-{
-	to = add(to, before);
-	*to++ = '"';
-	while (*text) {
-		int length = utf8_printable(text);
-
-		if (*text == '"' || *text == '\\')
-			*to++ = '\\';
-		*to++ = length ? *text : '?';
-		text++;
-		for (int i = 1; i < length; i++)
-			*to++ = *text++;
-	}
-	*to++ = '"';
-	return to;
-}
-
-static int64_t tracker_message(struct incise_messages *messages,
-			       const struct incise_rows *rows)
-{
-	static const char *const before[] = {"{\"position_mm\":{\"x\":",
-					     ",\"y\":",
-					     ",\"z\":",
-					     "},\"orientation\":{\"w\":",
-					     ",\"x\":",
-					     ",\"y\":",
-					     ",\"z\":"};
-	const char status[] = {incise_rows_char(rows, 9), 0};
-	char *to = messages->text;
-
-	for (int i = 0; i < 7; i++)
-		to = add_real(to, before[i], incise_rows_real(rows, 2 + i),
-			      i < 3 ? 4 : 6);
-	to = add_text(to, "},\"status\":", status);
-	return add(to, "}") - messages->text;
-}
-
-static int64_t depth_message(struct incise_messages *messages,
-			     const struct incise_rows *rows)
-{
-	char *to = messages->text;
-
-	to = add_real(to, "{\"depth_mm\":", incise_rows_real(rows, 2), 4);
-	to = add_real(to, ",\"velocity_mm_s\":", incise_rows_real(rows, 3), 3);
-	if (messages->budget) {
-		struct incise_budget_row row = {.tracker_time = true};
-		struct incise_blade_pose_value value;
-		double part[INCISE_BUDGET_PARTS];
-		int rc = incise_blade_pose_at(&messages->blade, rows->t_ns, 0, &value,
-					      NULL);
+	if (!in_depth) {
+		row.force_N = stream->cells[INCISE_CELL_FORCE].real;
+		row.force_share = 1;
+	} else {
+		int rc = incise_blade_pose_at(&messages->blade, t_ns, 0, &value, NULL);
 
 		if (rc)
 			return rc;
-		incise_blade_pose_budget(&messages->blade, rows->t_ns, &value, &row);
-		incise_budget_row(messages->budget, &row, part);
-		to = add_uncertainties(to, messages, INCISE_BUDGET_DEPTH, part);
-		to = add_uncertainties(to, messages, INCISE_BUDGET_VELOCITY, part);
+		incise_blade_pose_budget(&messages->blade, t_ns, &value, &row);
+	}
+	incise_budget_row(messages->pass->budgets[0], &row, part);
+	return 0;
+}
+
+static int64_t encode_members(struct incise_messages *messages,
+			      const struct incise_stream_rows *stream)
+{
+	const struct incise_message_stream *kind =
+		messages->kinds[stream - messages->streams];
+	bool in_force = !strcmp(kind->table, "force");
+	bool in_depth = !strcmp(kind->table, "depth");
+	double part[INCISE_BUDGET_PARTS];
+	char *to = messages->text;
+
+	for (const struct incise_json_member *m = kind->members; m->before; m++)
+		to = add_value(add(to, m->before), &stream->columns[m->cell],
+			       &stream->cells[m->cell]);
+	if (messages->pass->budgets && (in_force || in_depth)) {
+		int rc = find_parts(messages, stream, in_depth, part);
+
+		if (rc)
+			return rc;
+		for (int q = in_depth ? INCISE_BUDGET_DEPTH : INCISE_BUDGET_FORCE;
+		     q <= (in_depth ? INCISE_BUDGET_VELOCITY : INCISE_BUDGET_FORCE); q++)
+			to = add_uncertainties(to, messages, q, part);
 	}
 	return add(to, "}") - messages->text;
 }
 
-static int64_t event_message(struct incise_messages *messages,
-			     const struct incise_rows *rows)
-{
-	size_t kind_bytes, text_bytes;
-	const char *kind = incise_rows_text(rows, 2, &kind_bytes);
-	const char *text = incise_rows_text(rows, 3, &text_bytes);
-	int rc = incise_messages_reserve(messages, kind_bytes + text_bytes);
-	char *to = messages->text;
+static const struct incise_json_member force[] = {
+	{"{\"force_N\":", INCISE_CELL_FORCE},
+	{",\"code\":", INCISE_CELL_CODE},
+	{",\"clipped\":", INCISE_CELL_CLIPPED},
+	{NULL},
+};
 
-	if (rc)
-		return rc;
-	to = add_text(to, "{\"kind\":", kind);
-	to = add_text(to, ",\"text\":", text);
-	return add(to, "}") - messages->text;
-}
+static const struct incise_json_member tracker[] = {
+	{"{\"position_mm\":{\"x\":", INCISE_CELL_POSITION},
+	{",\"y\":", INCISE_CELL_POSITION + 1},
+	{",\"z\":", INCISE_CELL_POSITION + 2},
+	{"},\"orientation\":{\"w\":", INCISE_CELL_QUATERNION},
+	{",\"x\":", INCISE_CELL_QUATERNION + 1},
+	{",\"y\":", INCISE_CELL_QUATERNION + 2},
+	{",\"z\":", INCISE_CELL_QUATERNION + 3},
+	{"},\"status\":", INCISE_CELL_STATUS},
+	{NULL},
+};
+
+static const struct incise_json_member depth[] = {
+	{"{\"depth_mm\":", INCISE_CELL_DEPTH},
+	{",\"velocity_mm_s\":", INCISE_CELL_VELOCITY},
+	{NULL},
+};
+
+static const struct incise_json_member events[] = {
+	{"{\"kind\":", INCISE_CELL_KIND},
+	{",\"text\":", INCISE_CELL_TEXT},
+	{NULL},
+};
 
 static const struct incise_message_stream streams[] = {
-	{"force", "seq, t_ns, code", force_message, "/force", "incise.Force",
+	{"force", encode_members, force, "/force", "incise.Force",
 	 OBJECT("\"force_N\":" NUMBER("N") ",\"code\":{\"type\":\"integer\"},"
 					   "\"clipped\":{\"type\":\"boolean\"}")},
-	{"tracker", "seq, t_ns, x_mm, y_mm, z_mm, qw, qx, qy, qz, status",
-	 tracker_message, "/tracker", "incise.Pose",
+	{"tracker", encode_members, tracker, "/tracker", "incise.Pose",
 	 OBJECT("\"position_mm\":" OBJECT("\"x\":" NUMBER("mm") ",\"y\":" NUMBER("mm") ",\"z\":" NUMBER("mm")) ",\"orientation\":" OBJECT(
 		 "\"w\":" NUMBER("unit quaternion") ",\"x\":" NUMBER("unit quaternion") ",\"y\":" NUMBER(
 			 "unit quaternion") ",\"z\":" NUMBER("unit quaternion")) ",\"status\":{\"type\":\"string\"}")},
-	{"depth", "seq, t_ns, depth_mm, velocity_mm_s", depth_message, "/depth",
-	 "incise.Depth",
+	{"depth", encode_members, depth, "/depth", "incise.Depth",
 	 OBJECT("\"depth_mm\":" NUMBER("mm") ",\"velocity_mm_s\":" NUMBER("mm/s"))},
-	{"events", "rowid, t_ns, kind, text", event_message, "/events", "incise.Event",
+	{"events", encode_members, events, "/events", "incise.Event",
 	 OBJECT("\"kind\":{\"type\":\"string\"},\"text\":{\"type\":\"string\"}")},
 };
 

@@ -79,18 +79,10 @@ static void put_data(struct cdr *cdr, const void *data, size_t n)
 	cdr->at += n;
 }
 
-/* Bytes that are not UTF-8, and control characters, become '?'. */
 static void put_text(struct cdr *cdr, const char *text)
 {
 	put_u32(cdr, (uint32_t)strlen(text) + 1);
-	while (*text) {
-		int length = utf8_printable(text);
-
-		*cdr->at++ = length ? *text : '?';
-		text++;
-		for (int i = 1; i < length; i++)
-			*cdr->at++ = *text++;
-	}
+	cdr->at = utf8_copy_printable(cdr->at, text, "");
 	*cdr->at++ = 0;
 }
 
@@ -104,11 +96,11 @@ static void put_time(struct cdr *cdr, uint64_t ns)
 }
 
 static struct cdr header_begin(struct incise_messages *messages,
-			       const struct incise_rows *rows, const char *frame)
+			       const struct incise_stream_rows *stream, const char *frame)
 {
 	struct cdr cdr = cdr_begin(messages);
 
-	put_time(&cdr, incise_message_ns(messages, rows->t_ns));
+	put_time(&cdr, incise_message_ns(messages, stream->rows.t_ns));
 	put_text(&cdr, frame);
 	return cdr;
 }
@@ -117,15 +109,11 @@ static struct cdr header_begin(struct incise_messages *messages,
 
 /* The scalpel lies along z of its frame. */
 static int64_t force_message(struct incise_messages *messages,
-			     const struct incise_rows *rows)
+			     const struct incise_stream_rows *stream)
 {
-	struct cdr cdr = header_begin(messages, rows, FRAME_SCALPEL);
-	double wrench[6] = {0};
-	bool clipped;
-	int64_t code = incise_message_force(messages, rows, &wrench[2], &clipped);
+	struct cdr cdr = header_begin(messages, stream, FRAME_SCALPEL);
+	double wrench[6] = {0, 0, stream->cells[INCISE_CELL_FORCE].real};
 
-	if (code < 0)
-		return code;
 	for (int i = 0; i < 6; i++)
 		put_f64(&cdr, wrench[i]);
 	return cdr_end(&cdr, messages);
@@ -133,41 +121,34 @@ static int64_t force_message(struct incise_messages *messages,
 
 /* Pose of the calibrated tip; a pose that the tracker flags as unusable has no message. */
 static int64_t tracker_message(struct incise_messages *messages,
-			       const struct incise_rows *rows)
+			       const struct incise_stream_rows *stream)
 {
-	struct cdr cdr = header_begin(messages, rows, FRAME_TRACKER);
-	double position_mm[3], q[4], arm_mm[3];
+	struct cdr cdr = header_begin(messages, stream, FRAME_TRACKER);
+	const union incise_cell *cells = stream->cells;
+	double q[4], arm_mm[3];
 
-	if (!incise_pose_usable(incise_rows_char(rows, 9)))
+	if (!incise_pose_usable(*cells[INCISE_CELL_STATUS].text))
 		return 0;
-	for (int i = 0; i < 3; i++)
-		position_mm[i] = incise_rows_real(rows, 2 + i);
 	for (int i = 0; i < 4; i++)
-		q[i] = incise_rows_real(rows, 5 + i);
+		q[i] = cells[INCISE_CELL_QUATERNION + i].real;
 	v3_rotate(arm_mm, q, messages->recording->meta.tip_mm);
 	for (int i = 0; i < 3; i++)
-		put_f64(&cdr, (position_mm[i] + arm_mm[i]) * M_PER_MM);
+		put_f64(&cdr,
+			(cells[INCISE_CELL_POSITION + i].real + arm_mm[i]) * M_PER_MM);
 	for (int i = 0; i < 4; i++)
 		put_f64(&cdr, q[(i + 1) % 4]); /* x, y, z, w */
 	return cdr_end(&cdr, messages);
 }
 
 static int64_t event_message(struct incise_messages *messages,
-			     const struct incise_rows *rows)
+			     const struct incise_stream_rows *stream)
 {
-	size_t kind_bytes, text_bytes;
-	const char *kind = incise_rows_text(rows, 2, &kind_bytes);
-	const char *text = incise_rows_text(rows, 3, &text_bytes);
-	int rc = incise_messages_reserve(messages, kind_bytes + text_bytes);
-	struct cdr cdr;
+	struct cdr cdr = cdr_begin(messages);
 
-	if (rc)
-		return rc;
-	cdr = cdr_begin(messages);
-	put_time(&cdr, incise_message_ns(messages, rows->t_ns));
+	put_time(&cdr, incise_message_ns(messages, stream->rows.t_ns));
 	put_u8(&cdr, 20); /* INFO */
-	put_text(&cdr, kind);
-	put_text(&cdr, text);
+	put_text(&cdr, stream->cells[INCISE_CELL_KIND].text);
+	put_text(&cdr, stream->cells[INCISE_CELL_TEXT].text);
 	put_text(&cdr, "");
 	put_text(&cdr, "");
 	put_u32(&cdr, 0);
@@ -207,10 +188,10 @@ static const char *encoding_of(enum incise_pixels pixels)
 }
 
 static int64_t frame_message(struct incise_messages *messages,
-			     const struct incise_rows *rows)
+			     const struct incise_stream_rows *stream)
 {
 	const struct incise_camera_frame *frame = &messages->frame;
-	int rc = find_frame(messages, (uint64_t)incise_rows_seq(rows));
+	int rc = find_frame(messages, (uint64_t)incise_rows_seq(&stream->rows));
 	struct cdr cdr;
 
 	if (rc <= 0)
@@ -218,7 +199,7 @@ static int64_t frame_message(struct incise_messages *messages,
 	rc = incise_messages_reserve(messages, frame->size);
 	if (rc)
 		return rc;
-	cdr = header_begin(messages, rows, FRAME_CAMERA);
+	cdr = header_begin(messages, stream, FRAME_CAMERA);
 	if (frame->pixels != INCISE_PIXELS_MJPEG) {
 		put_u32(&cdr, (uint32_t)frame->height);
 		put_u32(&cdr, (uint32_t)frame->width);
@@ -244,25 +225,22 @@ static int64_t frame_message(struct incise_messages *messages,
 #define TIME MSG("builtin_interfaces/Time") "int32 sec\nuint32 nanosec\n"
 
 static const struct incise_message_stream streams[] = {
-	{"force", "seq, t_ns, code", force_message, "/force",
-	 "geometry_msgs/msg/WrenchStamped",
+	{"force", force_message, NULL, "/force", "geometry_msgs/msg/WrenchStamped",
 	 "std_msgs/Header header\nWrench wrench\n" /**/
 	 MSG("geometry_msgs/Wrench") "Vector3 force\nVector3 torque\n" MSG(
 		 "geometry_msgs/Vector3") "float64 x\nfloat64 y\nfloat64 z\n" HEADER},
-	{"tracker", "seq, t_ns, x_mm, y_mm, z_mm, qw, qx, qy, qz, status",
-	 tracker_message, "/tip", "geometry_msgs/msg/PoseStamped",
+	{"tracker", tracker_message, NULL, "/tip", "geometry_msgs/msg/PoseStamped",
 	 "std_msgs/Header header\nPose pose\n" /**/
 	 MSG("geometry_msgs/Pose") "Point position\nQuaternion orientation\n" MSG("geometry_msgs/Point") "float64 x\nfloat64 y\nfloat64 z\n" MSG(
 		 "geometry_msgs/Quaternion") "float64 x 0\nfloat64 y 0\nfloat64 z 0\nfloat64 w 1\n" HEADER},
-	{"events", "rowid, t_ns, kind, text", event_message, "/events",
-	 "rcl_interfaces/msg/Log",
+	{"events", event_message, NULL, "/events", "rcl_interfaces/msg/Log",
 	 "byte DEBUG=10\nbyte INFO=20\nbyte WARN=30\nbyte ERROR=40\nbyte FATAL=50\n"
 	 "builtin_interfaces/Time stamp\nuint8 level\nstring name\nstring msg\n"
 	 "string file\nstring function\nuint32 line\n" TIME},
-	{"frames", "seq, t_ns", frame_message, "/camera/image/compressed",
+	{"frames", frame_message, NULL, "/camera/image/compressed",
 	 "sensor_msgs/msg/CompressedImage",
 	 "std_msgs/Header header\nstring format\nuint8[] data\n" HEADER},
-	{"frames", "seq, t_ns", frame_message, "/camera/image", "sensor_msgs/msg/Image",
+	{"frames", frame_message, NULL, "/camera/image", "sensor_msgs/msg/Image",
 	 "std_msgs/Header header\nuint32 height\nuint32 width\nstring encoding\n"
 	 "uint8 is_bigendian\nuint32 step\nuint8[] data\n" HEADER},
 };
@@ -272,7 +250,8 @@ enum { ALWAYS = 0x7, COMPRESSED = 1 << 3, RAW = 1 << 4 };
 /* The camera's topic is that of its first undamaged frame. */
 static int select_streams(struct incise_messages *messages, struct incise_error *err)
 {
-	const char *folder = incise_recording_member(messages->recording, "frames")->path;
+	const char *folder =
+		messages->recording->streams[INCISE_LEDGER_CAMERA]->file->path;
 	int rc = incise_camera_interpolator_any(messages->recording, err);
 	char *path;
 
@@ -298,46 +277,43 @@ static int select_streams(struct incise_messages *messages, struct incise_error 
 }
 
 /* The metadata of `ros2 bag info`, in YAML on one line; version 5 is that of the oldest readers. */
-static int add_metadata(const struct incise_message_profile *profile,
-			struct incise_mcap *mcap)
+static int add_metadata(struct incise_messages *messages)
 {
+	struct incise_mcap *mcap = &messages->mcap;
 	struct incise_provenance pairs = {0};
-	uint64_t messages = 0;
+	uint64_t n = 0;
 	char *topics = NULL;
 	size_t size;
 	FILE *out = open_memstream(&topics, &size);
-	int rc;
 
 	if (!out)
 		return -ENOMEM;
 	for (int i = 0; i < mcap->n_channels; i++) {
 		const struct incise_mcap_channel *channel = &mcap->channels[i];
 
-		messages += channel->messages;
+		n += channel->messages;
 		fprintf(out,
 			"%s{topic_metadata: {name: %s, type: %s, serialization_format: "
 			"%s, offered_qos_profiles: \"%s\"}, message_count: %llu}",
 			i ? ", " : "", channel->topic, channel->schema_name,
-			profile->encoding, profile->qos,
+			channel->encoding, channel->qos,
 			(unsigned long long)channel->messages);
 	}
-	rc = fclose(out) ? -ENOMEM : 0;
-	if (!rc)
-		rc = incise_provenance_add(
-			&pairs, "serialized_metadata",
-			"{version: 5, storage_identifier: mcap, duration: {nanoseconds: "
-			"%llu}, starting_time: {nanoseconds_since_epoch: %llu}, "
-			"message_count: %llu, topics_with_message_count: [%s], "
-			"compression_format: \"\", compression_mode: \"\", "
-			"relative_file_paths: [], files: []}",
-			(unsigned long long)(mcap->last_ns - mcap->first_ns),
-			(unsigned long long)mcap->first_ns, (unsigned long long)messages,
-			topics);
-	if (!rc)
-		incise_mcap_metadata(mcap, "rosbag2", &pairs);
-	incise_provenance_free(&pairs);
+	if (fclose(out)) {
+		free(topics);
+		return -ENOMEM;
+	}
+	incise_provenance_add(
+		&pairs, "serialized_metadata",
+		"{version: 5, storage_identifier: mcap, duration: {nanoseconds: "
+		"%llu}, starting_time: {nanoseconds_since_epoch: %llu}, "
+		"message_count: %llu, topics_with_message_count: [%s], "
+		"compression_format: \"\", compression_mode: \"\", "
+		"relative_file_paths: [], files: []}",
+		(unsigned long long)(mcap->last_ns - mcap->first_ns),
+		(unsigned long long)mcap->first_ns, (unsigned long long)n, topics);
 	free(topics);
-	return rc;
+	return incise_messages_pairs(messages, "rosbag2", &pairs);
 }
 
 const struct incise_message_profile incise_messages_ros2 = {

@@ -20,49 +20,56 @@
 #include "../read/recording.h"
 #include "../read/session.h"
 
-int incise_provenance_add(struct incise_provenance *provenance, const char *key,
-			  const char *fmt, ...)
+void incise_provenance_add(struct incise_provenance *provenance, const char *key,
+			   const char *fmt, ...)
 {
 	struct incise_provenance_item *item = &provenance->items[provenance->n];
 	va_list args;
 	int length;
 
-	if (provenance->n == INCISE_PROVENANCE_MAX)
-		return -E2BIG;
+	if (!provenance->rc && provenance->n == INCISE_PROVENANCE_MAX)
+		provenance->rc = -E2BIG;
+	if (provenance->rc)
+		return;
 	va_start(args, fmt);
 	length = vasprintf(&item->value, fmt, args);
 	va_end(args);
 	if (length < 0)
-		return -ENOMEM;
-	if (!length) {
+		provenance->rc = -ENOMEM;
+	if (!length)
 		free(item->value);
-		return 0;
-	}
+	if (length <= 0)
+		return;
 	/* A single line in CSV, whatever characters a recording's name has. */
 	for (char *c = item->value; *c; c++)
 		if ((unsigned char)*c < ' ' || *c == 0x7f)
 			*c = '_';
 	item->key = key;
 	provenance->n++;
-	return 0;
 }
 
-/* "a, b, c" of one text per recording; to be freed. */
-static char *join(struct incise_recording *const *recordings, int n,
-		  const char *(*text)(const struct incise_recording *recording))
+/* Add to the value of the last pair, with ", " between, if that has this key; else a pair. */
+INCISE_PRINTF(3, 4)
+static void append_value(struct incise_provenance *to, const char *key, const char *fmt,
+			 ...)
 {
-	size_t size = 1;
-	char *all, *to;
+	char *before = NULL, *text;
+	va_list args;
+	int length;
 
-	for (int i = 0; i < n; i++)
-		size += strlen(text(recordings[i])) + 2;
-	all = to = malloc(size);
-	if (!all)
-		return NULL;
-	*to = 0;
-	for (int i = 0; i < n; i++)
-		to += sprintf(to, "%s%s", i ? ", " : "", text(recordings[i]));
-	return all;
+	va_start(args, fmt);
+	length = vasprintf(&text, fmt, args);
+	va_end(args);
+	if (length < 0)
+		to->rc = -ENOMEM;
+	if (to->rc)
+		return;
+	if (to->n && !strcmp(to->items[to->n - 1].key, key))
+		before = to->items[--to->n].value;
+	incise_provenance_add(to, key, "%s%s%s", before ? before : "", before ? ", " : "",
+			      text);
+	free(before);
+	free(text);
 }
 
 static const char *path_of(const struct incise_recording *recording)
@@ -90,26 +97,21 @@ static const char *rig_of(const struct incise_recording *recording)
 	return recording->meta.rig;
 }
 
-static int add_sources(struct incise_provenance *provenance,
-		       struct incise_recording *const *recordings, int n)
+static void add_sources(struct incise_provenance *provenance,
+			struct incise_recording *const *recordings, int n)
 {
-	const struct {
+	static const struct {
 		const char *key;
 		const char *(*text)(const struct incise_recording *recording);
 	} items[] = {{"source", path_of},
 		     {"recorded", start_of},
 		     {"rig", rig_of},
 		     {"state", state_of}};
-	int rc = 0;
 
-	for (size_t i = 0; i < sizeof(items) / sizeof(*items) && !rc; i++) {
-		char *text = join(recordings, n, items[i].text);
-
-		rc = text ? incise_provenance_add(provenance, items[i].key, "%s", text)
-			  : -ENOMEM;
-		free(text);
-	}
-	return rc;
+	for (size_t i = 0; i < sizeof(items) / sizeof(*items); i++)
+		for (int k = 0; k < n; k++)
+			append_value(provenance, items[i].key, "%s",
+				     items[i].text(recordings[k]));
 }
 
 /* Append an origin; nothing if it does not fit. */
@@ -175,23 +177,24 @@ static size_t put_given(const char *path, char *text, size_t size, size_t at)
 	struct stat st;
 
 	if (stat(path, &st) || !S_ISREG(st.st_mode) ||
-	    incise_sha256_file(path, origin.sha256, NULL))
+	    incise_sha256_file(path, origin.sha256, NULL, NULL, NULL))
 		return at;
 	snprintf(origin.name, sizeof(origin.name), "%s", basename(path));
 	return put_token(&origin, text, size, at);
 }
 
 /* The origins of an export. */
-static int add_origins(struct incise_provenance *provenance,
-		       struct incise_recording *const *recordings, int n,
-		       const char *calibration_path)
+static void add_origins(struct incise_provenance *provenance,
+			struct incise_recording *const *recordings, int n,
+			const char *calibration_path)
 {
 	const size_t most = INCISE_SESSION_MEMBERS_MAX * INCISE_ORIGIN_TEXT;
 	char *all = malloc((size_t)n * most + INCISE_ORIGIN_TEXT), *to = all;
-	int rc;
 
-	if (!all)
-		return -ENOMEM;
+	if (!all) {
+		provenance->rc = -ENOMEM;
+		return;
+	}
 	*all = 0;
 	for (int i = 0; i < n; i++) {
 		if (to > all)
@@ -201,14 +204,13 @@ static int add_origins(struct incise_provenance *provenance,
 	if (calibration_path)
 		put_given(calibration_path, all, (size_t)n * most + INCISE_ORIGIN_TEXT,
 			  (size_t)(to - all));
-	rc = incise_provenance_add(provenance, "origin", "%s", all);
+	incise_provenance_add(provenance, "origin", "%s", all);
 	free(all);
-	return rc;
 }
 
 /* The mapping to TAI of one recording: its first and last point, which have all that is constant. */
-static int add_wall(struct incise_provenance *provenance,
-		    struct incise_recording *recording)
+static void add_wall(struct incise_provenance *provenance,
+		     struct incise_recording *recording)
 {
 	static const char *const keys[][4] = {{"wall_start_t_ns", "wall_start_tai_ns",
 					       "wall_start_u_ns", "wall_start_utc"},
@@ -218,58 +220,58 @@ static int add_wall(struct incise_provenance *provenance,
 	struct incise_wall *wall = incise_recording_wall(recording, &none);
 	const struct incise_wall_point *points;
 	size_t n;
-	int rc = 0;
 
 	/* A damaged table stops the export only where its times are asked for. */
+	if (!wall && errno == ENOMEM)
+		provenance->rc = -ENOMEM;
 	if (!wall)
-		return errno == ENOMEM ? -ENOMEM : 0;
+		return;
 	n = incise_wall_points(wall, &points);
-	for (int i = 0; i < 2 && !rc; i++) {
+	for (int i = 0; i < 2; i++) {
 		const struct incise_wall_point *p = &points[i ? n - 1 : 0];
 		char utc[INCISE_WALL_TEXT];
 		int64_t tai_ns, u_ns;
 
 		incise_wall_tai(wall, p->t_ns, &tai_ns, &u_ns);
 		incise_wall_utc_text(tai_ns, p->utc_offset_s, utc);
-		rc = incise_provenance_add(provenance, keys[i][0], "%lld",
-					   (long long)p->t_ns);
-		if (!rc)
-			rc = incise_provenance_add(provenance, keys[i][1], "%lld",
-						   (long long)tai_ns);
-		if (!rc)
-			rc = u_ns == INCISE_WALL_UNKNOWN
-				     ? incise_provenance_add(provenance, keys[i][2],
-							     "unknown")
-				     : incise_provenance_add(provenance, keys[i][2],
-							     "%lld", (long long)u_ns);
-		if (!rc)
-			rc = incise_provenance_add(provenance, keys[i][3], "%s", utc);
+		incise_provenance_add(provenance, keys[i][0], "%lld", (long long)p->t_ns);
+		incise_provenance_add(provenance, keys[i][1], "%lld", (long long)tai_ns);
+		if (u_ns == INCISE_WALL_UNKNOWN)
+			incise_provenance_add(provenance, keys[i][2], "unknown");
+		else
+			incise_provenance_add(provenance, keys[i][2], "%lld",
+					      (long long)u_ns);
+		incise_provenance_add(provenance, keys[i][3], "%s", utc);
 	}
-	if (!rc)
-		rc = incise_provenance_add(provenance, "wall_source", "%s, time of %s",
-					   points->source, points->reference);
+	incise_provenance_add(provenance, "wall_source", "%s, time of %s", points->source,
+			      points->reference);
 	incise_wall_free(wall);
-	return rc;
 }
 
-/* Add which calibration of a recording is active; of a joined one, of each member. */
-static int describe_active(const struct incise_recording *recording, FILE *out)
+/* Say which calibration of each recording is active; of a joined one, of each member. */
+static void add_active(struct incise_provenance *provenance,
+		       struct incise_recording *const *recordings, int n)
 {
-	const struct incise_session *session = recording->session;
-	int n = session ? session->n : 1;
-
 	for (int i = 0; i < n; i++) {
-		const struct incise_recording *member =
-			session ? session->members[i] : recording;
-		char *text = incise_recalibration_text(member);
+		const struct incise_session *session = recordings[i]->session;
+		int members = session ? session->n : 1;
 
-		if (!text)
-			return -ENOMEM;
-		fprintf(out, "%s%s%s%s", i ? ", " : "", n > 1 ? member->name : "",
-			n > 1 ? ": " : "", text);
-		free(text);
+		for (int k = 0; k < members; k++) {
+			const struct incise_recording *member =
+				session ? session->members[k] : recordings[i];
+			char *text = incise_recalibration_text(member);
+
+			if (!text)
+				provenance->rc = -ENOMEM;
+			else
+				append_value(provenance, "calibration", "%s%s%s%s%s",
+					     n > 1 && !k ? recordings[i]->name : "",
+					     n > 1 && !k ? ": " : "",
+					     members > 1 ? member->name : "",
+					     members > 1 ? ": " : "", text);
+			free(text);
+		}
 	}
-	return 0;
 }
 
 static bool is_recalibrated(const struct incise_recording *recording)
@@ -282,38 +284,27 @@ static bool is_recalibrated(const struct incise_recording *recording)
 	return is;
 }
 
-/* The calibration in use, in words: to be freed, NULL: no memory. */
-static char *calibration_text(struct incise_recording *const *recordings, int n,
-			      const struct incise_calibration *given)
+/* Say which calibration is in use. */
+static void add_choice(struct incise_provenance *provenance,
+		       struct incise_recording *const *recordings, int n,
+		       const struct incise_calibration *given)
 {
 	bool any = false;
-	char *text = NULL;
-	size_t size = 0;
-	FILE *out;
-	int rc = 0;
 
 	for (int i = 0; i < n; i++)
 		any |= is_recalibrated(recordings[i]);
-	if (given || !any)
-		return strdup(given ? "given for the export" : "of the recording");
-	out = open_memstream(&text, &size);
-	for (int i = 0; i < n && out && !rc; i++) {
-		if (i)
-			fputs(", ", out);
-		if (n > 1)
-			fprintf(out, "%s: ", recordings[i]->name);
-		rc = describe_active(recordings[i], out);
-	}
-	if (out && !fclose(out) && !rc)
-		return text;
-	free(text);
-	return NULL;
+	if (any && !given)
+		add_active(provenance, recordings, n);
+	else
+		incise_provenance_add(provenance, "calibration", "%s",
+				      given ? "given for the export"
+					    : "of the recording");
 }
 
 /* Add the camera's scale, and delays of a given calibration, or of an active one. */
-static int add_lengths(struct incise_provenance *provenance,
-		       struct incise_recording *const *recordings, int n,
-		       const struct incise_calibration *given)
+static void add_lengths(struct incise_provenance *provenance,
+			struct incise_recording *const *recordings, int n,
+			const struct incise_calibration *given)
 {
 	double mm_px = given ? given->depth_mm_px : recordings[0]->meta.depth_mm_px;
 	const struct incise_calibration *of =
@@ -328,52 +319,44 @@ static int add_lengths(struct incise_provenance *provenance,
 		{"tracker_delay_ms", of ? of->tracker_delay_ms : NAN},
 		{"camera_delay_ms", of ? of->camera_delay_ms : NAN},
 	};
-	int rc;
 
 	for (int i = 1; i < n && !given; i++)
 		if (recordings[i]->meta.depth_mm_px != mm_px)
-			return 0;
-	rc = incise_provenance_add(provenance, "depth_mm_px", "%.9g", mm_px);
-	for (size_t i = 0; i < sizeof(delays) / sizeof(*delays) && !rc; i++)
+			return;
+	incise_provenance_add(provenance, "depth_mm_px", "%.9g", mm_px);
+	for (size_t i = 0; i < sizeof(delays) / sizeof(*delays); i++)
 		if (!isnan(delays[i].ms))
-			rc = incise_provenance_add(provenance, delays[i].key, "%.9g",
-						   delays[i].ms);
-	return rc;
+			incise_provenance_add(provenance, delays[i].key, "%.9g",
+					      delays[i].ms);
 }
 
 /* Add the given calibration, or the recordings' own if all have the same. */
-static int add_calibration(struct incise_provenance *provenance,
-			   struct incise_recording *const *recordings, int n,
-			   const struct incise_calibration *given)
+static void add_calibration(struct incise_provenance *provenance,
+			    struct incise_recording *const *recordings, int n,
+			    const struct incise_calibration *given)
 {
 	/* A device in newtons was not calibrated in mV/N. */
 	bool volts = given && !recordings[0]->meta.newtons;
 	double mV_N = volts ? given->force_mV_N : recordings[0]->meta.force_mV_N;
 	double zero_mV = recordings[0]->meta.zero_mV;
 	bool own = !volts || isnan(given->force_zero_mV);
-	char *text = calibration_text(recordings, n, given);
-	int rc;
 
 	if (!own)
 		zero_mV = given->force_zero_mV;
-
-	rc = text ? incise_provenance_add(provenance, "calibration", "%s", text)
-		  : -ENOMEM;
-	free(text);
+	add_choice(provenance, recordings, n, given);
 	for (int i = 1; i < n && own; i++) {
 		if (!given && recordings[i]->meta.force_mV_N != mV_N)
-			return rc;
+			return;
 		if (recordings[i]->meta.zero_mV != zero_mV)
 			zero_mV = NAN;
 	}
-	if (!rc)
-		rc = incise_provenance_add(provenance, "force_mV_N", "%.17g", mV_N);
-	if (!rc)
-		rc = isnan(zero_mV) ? incise_provenance_add(provenance, "force_zero_mV",
-							    "each recording's own")
-				    : incise_provenance_add(provenance, "force_zero_mV",
-							    "%.17g", zero_mV);
-	return rc ? rc : add_lengths(provenance, recordings, n, given);
+	incise_provenance_add(provenance, "force_mV_N", "%.17g", mV_N);
+	if (isnan(zero_mV))
+		incise_provenance_add(provenance, "force_zero_mV",
+				      "each recording's own");
+	else
+		incise_provenance_add(provenance, "force_zero_mV", "%.17g", zero_mV);
+	add_lengths(provenance, recordings, n, given);
 }
 
 static const struct {
@@ -389,40 +372,37 @@ static const struct {
 	[INCISE_BUDGET_DELAY] = {"delay_s", "s"},
 };
 
-/* Standard uncertainties and covariances of the common sources, as two texts to be freed. */
-static int describe_budget(const struct incise_budget *budget, char **u,
-			   char **covariance)
+/* Add standard uncertainties and covariances of the common sources. */
+static void describe_budget(struct incise_provenance *to,
+			    const struct incise_budget *budget)
 {
-	size_t size[2];
-	FILE *text[2] = {open_memstream(u, &size[0]),
-			 open_memstream(covariance, &size[1])};
-	bool failed = !text[0] || !text[1];
+	for (int i = 0; i < INCISE_BUDGET_SOURCES; i++) {
+		double u = incise_budget_u(budget, i);
 
-	for (int i = 0; i < INCISE_BUDGET_SOURCES && !failed; i++) {
-		double value = incise_budget_u(budget, (enum incise_budget_source)i);
-
-		if (!sources[i].name)
-			continue;
-		if (isnan(value))
-			fprintf(text[0], "%s%s not stated", i ? ", " : "",
-				sources[i].name);
-		else
-			fprintf(text[0], "%s%s %.9g %s", i ? ", " : "", sources[i].name,
-				value, sources[i].unit);
-		for (int k = 0; k < i; k++) {
-			value = incise_budget_covariance(budget,
-							 (enum incise_budget_source)k,
-							 (enum incise_budget_source)i);
-			if (sources[k].name && !isnan(value) && value != 0)
-				fprintf(text[1], "%s%s %s %.9g",
-					ftell(text[1]) > 0 ? ", " : "", sources[k].name,
-					sources[i].name, value);
-		}
+		if (sources[i].name && isnan(u))
+			append_value(to, "calibration_u", "%s not stated",
+				     sources[i].name);
+		else if (sources[i].name)
+			append_value(to, "calibration_u", "%s %.9g %s", sources[i].name,
+				     u, sources[i].unit);
 	}
-	for (int i = 0; i < 2; i++)
-		if (text[i] && fclose(text[i]))
-			failed = true;
-	return failed ? -ENOMEM : 0;
+	for (int i = 0; i < INCISE_BUDGET_SOURCES; i++)
+		for (int k = 0; k < i && sources[i].name; k++) {
+			double value = incise_budget_covariance(budget, k, i);
+
+			if (sources[k].name && !isnan(value) && value != 0)
+				append_value(to, "calibration_covariance", "%s %s %.9g",
+					     sources[k].name, sources[i].name, value);
+		}
+}
+
+static bool are_same(const struct incise_provenance *a, const struct incise_provenance *b)
+{
+	bool same = a->n == b->n;
+
+	for (int i = 0; i < a->n && same; i++)
+		same = !strcmp(a->items[i].value, b->items[i].value);
+	return same;
 }
 
 /* The uncertainties that the calibrations state, with their covariances; of several recordings
@@ -433,7 +413,7 @@ static int add_budget(struct incise_provenance *provenance,
 		      struct incise_error *err)
 {
 	static const char *const words[] = {"none", "total", "parts"};
-	char *u[2] = {NULL}, *covariance[2] = {NULL};
+	struct incise_provenance first = {0}, other = {0};
 	bool same = true;
 	int rc = 0;
 
@@ -443,71 +423,59 @@ static int add_budget(struct incise_provenance *provenance,
 		struct incise_budget *budget =
 			incise_budget_open(recordings[i], options, false, err);
 
-		if (!budget)
-			rc = -errno;
-		else
-			rc = describe_budget(budget, &u[i > 0], &covariance[i > 0]);
+		rc = budget ? 0 : -errno;
+		if (budget)
+			describe_budget(i ? &other : &first, budget);
+		same = !i || are_same(&first, &other);
 		incise_budget_free(budget);
-		if (i && !rc) {
-			same = !strcmp(u[0], u[1]) &&
-			       !strcmp(covariance[0], covariance[1]);
-			free(u[1]);
-			free(covariance[1]);
-			u[1] = covariance[1] = NULL;
-		}
+		incise_provenance_free(&other);
 	}
-	if (!rc)
-		rc = incise_provenance_add(provenance, "uncertainty",
-					   "%s: standard uncertainties, 2 u holds 95 %%",
-					   words[options->uncertainty]);
-	if (!rc)
-		rc = incise_provenance_add(provenance, "calibration_u", "%s",
-					   same ? u[0] : "each recording's own");
-	if (!rc && same)
-		rc = incise_provenance_add(provenance, "calibration_covariance", "%s",
-					   covariance[0]);
-	for (int i = 0; i < 2; i++) {
-		free(u[i]);
-		free(covariance[i]);
-	}
+	incise_provenance_add(provenance, "uncertainty",
+			      "%s: standard uncertainties, 2 u holds 95 %%",
+			      words[options->uncertainty]);
+	if (!same)
+		incise_provenance_add(provenance, "calibration_u",
+				      "each recording's own");
+	for (int i = 0; i < first.n && same; i++)
+		incise_provenance_add(provenance, first.items[i].key, "%s",
+				      first.items[i].value);
+	rc = rc ? rc : first.rc;
+	incise_provenance_free(&first);
 	return rc;
 }
 
 /* Seconds from the first sample; no end: to that of the recording. */
-static int add_part(struct incise_provenance *provenance,
-		    const struct incise_export_options *o)
+static void add_part(struct incise_provenance *provenance,
+		     const struct incise_export_options *o)
 {
 	char end[40] = "", cut[40] = "";
 
 	if (!(o->from_s > 0) && !(o->to_s > 0) && !o->cut)
-		return 0;
+		return;
 	if (o->to_s > 0)
 		snprintf(end, sizeof(end), " to %.9g s", o->to_s);
 	if (o->cut)
 		snprintf(cut, sizeof(cut), ", cut %d", o->cut);
-	return incise_provenance_add(provenance, "part", "from %.9g s%s%s", o->from_s,
-				     end, cut);
+	incise_provenance_add(provenance, "part", "from %.9g s%s%s", o->from_s, end, cut);
 }
 
-static int add_options(struct incise_provenance *provenance,
-		       const struct incise_export_options *o)
+static void add_options(struct incise_provenance *provenance,
+			const struct incise_export_options *o)
 {
 	const char *rows = o->resample ? "resampled" : "raw";
-	int rc = add_part(provenance, o);
 
-	if (rc)
-		return rc;
+	add_part(provenance, o);
 	if (o->depth_bins)
-		return incise_provenance_add(provenance, "options",
-					     "averaged in %dx%d bins, at least %d "
-					     "samples%s",
-					     o->depth_bins, o->velocity_bins,
-					     o->min_count, o->by_cut ? ", by cut" : "");
-	if (o->rate_hz > 0)
-		return incise_provenance_add(provenance, "options", "%s at %.9g Hz", rows,
-					     o->rate_hz);
-	return incise_provenance_add(provenance, "options", "%s, every force sample",
-				     rows);
+		incise_provenance_add(provenance, "options",
+				      "averaged in %dx%d bins, at least %d samples%s",
+				      o->depth_bins, o->velocity_bins, o->min_count,
+				      o->by_cut ? ", by cut" : "");
+	else if (o->rate_hz > 0)
+		incise_provenance_add(provenance, "options", "%s at %.9g Hz", rows,
+				      o->rate_hz);
+	else
+		incise_provenance_add(provenance, "options", "%s, every force sample",
+				      rows);
 }
 
 int incise_provenance_of(struct incise_provenance *provenance,
@@ -515,24 +483,22 @@ int incise_provenance_of(struct incise_provenance *provenance,
 			 const struct incise_export_options *options, const char *table,
 			 struct incise_error *err)
 {
-	int rc = incise_provenance_add(provenance, "incise", "%s", incise_version());
+	int rc = 0;
 
 	/* The time of the export is left out: equal rows are equal bytes. */
-	if (!rc)
-		rc = add_sources(provenance, recordings, n);
-	if (!rc)
-		rc = add_origins(provenance, recordings, n,
-				 table ? NULL : options->calibration_path);
-	if (!rc)
-		rc = table ? incise_provenance_add(provenance, "options",
-						   "rows of table %s", table)
-			   : add_options(provenance, options);
-	if (!rc)
-		rc = add_calibration(provenance, recordings, n, options->calibration);
-	if (!rc && !table)
+	incise_provenance_add(provenance, "incise", "%s", incise_version());
+	add_sources(provenance, recordings, n);
+	add_origins(provenance, recordings, n, table ? NULL : options->calibration_path);
+	if (table)
+		incise_provenance_add(provenance, "options", "rows of table %s", table);
+	else
+		add_options(provenance, options);
+	add_calibration(provenance, recordings, n, options->calibration);
+	if (!table)
 		rc = add_budget(provenance, recordings, n, options, err);
-	if (!rc && n == 1)
-		rc = add_wall(provenance, recordings[0]);
+	if (n == 1)
+		add_wall(provenance, recordings[0]);
+	rc = rc ? rc : provenance->rc;
 	return rc ? incise_error_set(err, -rc, "lineage: %s", strerror(-rc)) : 0;
 }
 

@@ -20,11 +20,12 @@ struct incise_provenance {
 		char *value;	 /* UTF-8, no control characters */
 	} items[INCISE_PROVENANCE_MAX];
 	int n;
+	int rc; /* of the first addition that failed: -ENOMEM, -E2BIG */
 };
 
-/* Add a pair, unless its value is empty. Returns 0 or -ENOMEM, -E2BIG. */
-int incise_provenance_add(struct incise_provenance *provenance, const char *key,
-			  const char *fmt, ...) INCISE_PRINTF(3, 4);
+/* Add a pair, unless its value is empty; nothing after a failure. */
+void incise_provenance_add(struct incise_provenance *provenance, const char *key,
+			   const char *fmt, ...) INCISE_PRINTF(3, 4);
 
 /*
  * The provenance of an export: incise, date, sources, options, calibration; of the rows of a

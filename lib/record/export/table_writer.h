@@ -1,40 +1,51 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * A table on its way into a file: columns with name, unit and type, rows that are written in
- * blocks, provenance. The format is chosen when the table is opened. Memory is that of one
- * block.
+ * A table on its way into a file or a stream: columns with name, unit and type, rows that are written
+ * in blocks, provenance. The format is chosen when the table is opened. Memory is that of one block.
  *
- *     rows ──► block ──► format ──► outfile ──► FILE.csv, FILE.h5
+ *     rows ──► block ──► format ──► FILE.csv, FILE.h5, Arrow's arrays
+ *     messages ────────► format ──► FILE.mcap
  *
  * Units stand in the columns. Not for several threads.
  */
 #ifndef INCISE_TABLE_WRITER_H
 #define INCISE_TABLE_WRITER_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <incise/error.h>
+#include "formats.h"
 #include "provenance.h"
 
 #define INCISE_TABLE_BLOCK 16384 /* rows; of HDF5 a chunk, 128 KiB of doubles */
+/* From column to column in a block: at a power of two the cells of a row would compete for one place in caches. */
+#define INCISE_TABLE_STRIDE (INCISE_TABLE_BLOCK + 8)
 
+/* The type of a value, in a row and in a cell of a block. */
 enum incise_column_type {
-	INCISE_COLUMN_REAL,
-	INCISE_COLUMN_SINGLE, /* real, with seven digits in a binary file */
-	INCISE_COLUMN_INTEGER,
-	INCISE_COLUMN_FLAG, /* integer, 0 or 1 */
-	INCISE_COLUMN_NAME, /* integer, from incise_table_name(); in one column only */
+	INCISE_COLUMN_REAL,   /* double */
+	INCISE_COLUMN_SINGLE, /* the same, with seven digits in a binary file */
+	INCISE_COLUMN_COARSE, /* the same of an uncertainty, of which twelve bits are kept */
+	INCISE_COLUMN_SEEN,    /* double; NaN: missing */
+	INCISE_COLUMN_INTEGER, /* int64_t */
+	INCISE_COLUMN_SHORT,   /* the same, of 32 bits in a binary file */
+	INCISE_COLUMN_FLAG,    /* bool; in a block an integer */
+	INCISE_COLUMN_NAME,    /* int64_t of incise_table_name(); in one column only */
+	INCISE_COLUMN_TEXT, /* const char *; in a block its place in the table's texts */
 };
 
 struct incise_table_column {
 	const char *name, *unit, *about; /* unit "1": none */
 	enum incise_column_type type;
 	int decimals; /* of a real in text; -1: nine digits in all */
+	size_t at;    /* of its value in a row, bytes */
 	/* Of an uncertainty: the column that it is of, and the rows that share it; else NULL. */
 	const char *of, *correlation;
+	const struct incise_provenance *calibration; /* that enters the values, or NULL */
 };
 
 /* Names of the uncertainties of a column, with spaces between them, to be freed; NULL: none. */
@@ -58,56 +69,59 @@ static inline char *incise_column_uncertainties(const struct incise_table_column
 union incise_cell {
 	double real;
 	int64_t integer;
+	bool flag;	  /* of a row … */
+	const char *text; /* … that is not in a block */
 };
 
 struct incise_table;
 
-/* A file format. All but close return 0 or a negative errno. */
+/* A format of files or streams. All but close return 0 or a negative errno. */
 struct incise_table_format {
 	unsigned int abi;
-	int (*begin)(struct incise_table *table, struct incise_error *err);
-	/* Write the block's rows, table->filled of them. */
-	int (*rows)(struct incise_table *table, struct incise_error *err);
-	int (*end)(struct incise_table *table, struct incise_error *err);
-	void (*close)(struct incise_table *table); /* if begin made a state */
+	int (*open)(struct incise_table *table, struct incise_error *err); /* or NULL */
+	/* Write the block's rows, table->filled of them; of messages the row of table->stream. */
+	int (*put)(struct incise_table *table, struct incise_error *err);
+	int (*end)(struct incise_table *table, struct incise_error *err); /* or NULL */
+	void (*close)(struct incise_table *table); /* if open made a state */
 };
 
-#define INCISE_TABLE_ABI 3 /* changes when a struct of this header does */
+#define INCISE_TABLE_ABI 4 /* changes when a struct of this header does */
 
 struct incise_table {
+	/* By the caller; columns and provenance must outlive the table, whose stream stays open. */
 	const struct incise_table_format *format;
-	const struct incise_table_column *columns;
+	FILE *out;
+	const struct incise_table_column *columns; /* of rows */
 	int n_columns;
 	const struct incise_provenance *provenance; /* or NULL */
-	union incise_cell *block; /* column by column, INCISE_TABLE_BLOCK each */
+	struct incise_export_pass *pass;	    /* of messages; see writers.h */
+
+	union incise_cell *block; /* column by column, INCISE_TABLE_STRIDE apart */
 	size_t filled;		  /* rows in it */
 	uint64_t rows;		  /* in blocks before */
 	char **names;
 	int n_names;
-	FILE *out;
+	char *texts; /* of the block, each with its NUL */
+	size_t texts_size, texts_used;
+	/* Of messages: what open() has opened, and the one that has the present row; see streams.h. */
+	struct incise_stream_rows *streams, *stream;
+	int n_streams;
 	void *state; /* of the format */
 };
 
-extern const struct incise_table_format incise_table_csv;
+/* The formats; that of a module is its symbol. */
+#define INCISE_TABLE_FORMAT(id, ...) \
+	INCISE_API extern const struct incise_table_format incise_table_##id;
+INCISE_FORMATS(INCISE_TABLE_FORMAT, INCISE_TABLE_FORMAT)
 
-/* HDF5, from its module; NULL with errno: ENOENT (not built or not found), ENOEXEC. */
-const struct incise_table_format *incise_table_hdf5(struct incise_error *err);
-
-/*
- * Open a table on a stream, which the caller closes. Columns and provenance must outlive it.
- * Returns 0 or -errno.
- */
-int incise_table_open(struct incise_table *table,
-		      const struct incise_table_format *format, FILE *out,
-		      const struct incise_table_column *columns, int n_columns,
-		      const struct incise_provenance *provenance,
-		      struct incise_error *err);
+/* Returns 0 or -errno; then there is nothing to close. */
+int incise_table_open(struct incise_table *table, struct incise_error *err);
 
 /* Number of a name, from 1; the last name is not entered twice. Or -ENOMEM. */
 int incise_table_name(struct incise_table *table, const char *name);
 
-/* Add a row of n_columns cells. Returns 0 or -errno: ENOSPC, EIO, …. */
-int incise_table_add(struct incise_table *table, const union incise_cell *cells,
+/* Add a row, a struct with the columns' values. Returns 0 or -errno: ENOSPC, EIO, …. */
+int incise_table_add(struct incise_table *table, const void *row,
 		     struct incise_error *err);
 
 /* Write the last block and the end of the format; then close. */

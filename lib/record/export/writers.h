@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Inside an export; for lib/record/export/ only.
+ * Inside an export; for lib/record/export/ and lib/record/arrow/ only.
  */
 #ifndef INCISE_EXPORT_PRIVATE_H
 #define INCISE_EXPORT_PRIVATE_H
@@ -15,36 +15,67 @@
 #include "provenance.h"
 #include "table_writer.h"
 
-/* Report progress, @done of @all. 0, or -EINTR if the callback stops the export. */
-static inline int incise_export_progress(const struct incise_export_options *options,
-					 double done, double all,
-					 struct incise_error *err)
-{
-	if (options->progress &&
-	    options->progress(options->context, fmin(1, done / fmax(1, all))))
-		return incise_error_set(err, EINTR, "interrupted");
-	return 0;
-}
+/* An export of some recordings. */
+struct incise_export_pass {
+	struct incise_recording *const *recordings;
+	int n;
+	const struct incise_export_options *options;
+	struct incise_table *table;
+	struct incise_export_report report;
+	struct incise_error *err;
 
-/* The column by which incise train takes the part of a cut that a model describes. */
-#define INCISE_ADVANCING_COLUMN                                        \
-	{                                                              \
-		"advancing", "1", "1: the blade went into new tissue", \
-			INCISE_COLUMN_FLAG, 0, NULL, NULL              \
+	int recording;		       /* the present one, from 0 */
+	char *name;		       /* of it, unique */
+	uint64_t samples, samples_all; /* of force, read and to be read */
+	struct incise_wall *wall;      /* of the present recording; NULL: without TAI */
+	bool camera;		       /* resampled rows have the columns of the camera */
+	struct incise_budget **budgets; /* of each recording, or NULL */
+	void *state;			/* of the kind of rows */
+	int64_t first_ns; /* of messages: of the first sample, if a part is asked for */
+};
+
+/* --- columns.c ---------------------------------------------------------------------- */
+
+/* A column of a list, whose value is in a row of this type. */
+#define INCISE_COLUMN(type, member, kind, decimals, /* name, unit, about */...)      \
+	{                                                                            \
+		__VA_ARGS__, INCISE_COLUMN_##kind, decimals, offsetof(type, member), \
+			NULL, NULL, NULL                                             \
 	}
 
-/* --- columns_tai.c ------------------------------------------------------------------ */
+/* The column by which incise train takes the part of a cut that a model describes. */
+#define INCISE_ADVANCING_COLUMN "advancing", "1", "1: the blade went into new tissue"
 
-#define INCISE_TAI_COLUMNS 2
+#define INCISE_BUDGET_COLUMNS (INCISE_BUDGET_QUANTITIES + INCISE_BUDGET_PARTS)
 
-/* A copy of columns, to be freed, with those of TAI behind them. NULL: no memory. */
-struct incise_table_column *incise_tai_columns(const struct incise_table_column *columns,
-					       int n);
+/* What rows have where it is asked for. */
+struct incise_row_extra {
+	double u[INCISE_BUDGET_COLUMNS]; /* uncertainties: totals, then parts */
+	int64_t tai_ns;
+	double tai_u_ns;
+};
 
-/* Their cells at a time of CLOCK_MONOTONIC; the mapping must reach to it. Returns 0 or -ENODATA. */
-int incise_tai_cells(const struct incise_wall *wall, int64_t t_ns,
-		     union incise_cell cells[INCISE_TAI_COLUMNS],
-		     struct incise_error *err);
+/*
+ * A copy of @n columns, to be freed, with those of uncertainties of the values among them, which replace columns
+ * of their names, and with those of TAI, by the options. @at: of struct incise_row_extra in a row. NULL: no memory.
+ */
+struct incise_table_column *incise_extra_columns(
+	const struct incise_table_column *columns, int *n, size_t at,
+	const struct incise_export_options *options);
+
+/* The uncertainties of a row with these parts. */
+void incise_extra_budget(struct incise_row_extra *extra,
+			 const double part[INCISE_BUDGET_PARTS]);
+
+/*
+ * TAI at a time of CLOCK_MONOTONIC, to which the mapping must reach; nothing without one. Returns 0 or
+ * -ENODATA.
+ */
+int incise_extra_tai(struct incise_row_extra *extra, const struct incise_wall *wall,
+		     int64_t t_ns, struct incise_error *err);
+
+/* The words of correlation of a part: of whom else it is the error. */
+extern const char *const incise_budget_correlations[];
 
 /* --- budget.c ---------------------------------------------------------------------- */
 
@@ -81,92 +112,62 @@ void incise_budget_mean_add(struct incise_budget_mean *mean,
 void incise_budget_mean_parts(const struct incise_budget_mean *mean,
 			      double part[INCISE_BUDGET_PARTS]);
 
-/* --- columns_budget.c ---------------------------------------------------------------- */
-
-#define INCISE_BUDGET_COLUMNS (INCISE_BUDGET_QUANTITIES + INCISE_BUDGET_PARTS)
-
-/* Columns of a table with those of uncertainties, which replace columns of their names. */
-struct incise_budget_columns {
-	struct incise_table_column *columns; /* to be freed */
-	int n;
-	int at[INCISE_BUDGET_COLUMNS]; /* totals, then parts; -1: not there */
-};
-
-/* Of quantities that have a column. Returns 0 or -ENOMEM. */
-int incise_budget_columns(struct incise_budget_columns *to,
-			  const struct incise_table_column *columns, int n,
-			  enum incise_export_uncertainty uncertainty);
-
-void incise_budget_cells(const struct incise_budget_columns *columns,
-			 const double part[INCISE_BUDGET_PARTS],
-			 union incise_cell *cells);
-
-/* Twelve bits of an uncertainty are enough, and make a file that is smaller and faster to write. */
-double incise_coarse(double u);
-
-/* The words of correlation of a part: of whom else it is the error. */
-extern const char *const incise_budget_correlations[];
-
-/* --- export.c ---------------------------------------------------------------------- */
+/* --- formats.c --------------------------------------------------------------------- */
 
 /* Returns 0 or -EINVAL. */
 int incise_export_check(const struct incise_export_options *options,
 			struct incise_error *err);
 
-/*
- * Write what incise_export() does as a table of this format; the options were checked.
- * @provenance and @report may be NULL. Returns 0 or -errno.
- */
-int incise_export_table(struct incise_recording *const *recordings, int n,
-			const struct incise_export_options *options,
-			const struct incise_table_format *format, FILE *out,
-			const struct incise_provenance *provenance,
-			struct incise_export_report *report, struct incise_error *err);
+/* --- pass.c ------------------------------------------------------------------------ */
 
-/* Say in a report which uncertainties are not stated, each cause once. */
-void incise_report_unstated(struct incise_export_report *report,
-			    const struct incise_budget *budget);
+/* Go through the recordings, in order, with the name of each and its wall time. Returns 0 or -errno. */
+int incise_export_each(struct incise_export_pass *pass,
+		       int (*visit)(struct incise_export_pass *pass,
+				    struct incise_recording *recording));
+
+/* Report progress, @done of @all. 0, or -EINTR if the callback stops the export. */
+int incise_export_progress(const struct incise_export_pass *pass, uint64_t done,
+			   uint64_t all);
+
+/*
+ * Open the budgets of all recordings, if uncertainties are asked for, and report which are not stated. Returns 0
+ * or -errno.
+ */
+int incise_export_budgets(struct incise_export_pass *pass);
+
+/* Returns -ENODATA if the part that is asked for gave no row, else 0. */
+int incise_export_check_part(const struct incise_export_pass *pass);
+
+/* Free what the pass holds, and read the recordings to their ends again. */
+void incise_export_close(struct incise_export_pass *pass);
+
+/* --- export.c ---------------------------------------------------------------------- */
+
+/*
+ * Write the rows of what incise_export() does in this format; the options were checked. @provenance
+ * may be NULL. Returns 0 or -errno.
+ */
+int incise_export_rows(struct incise_export_pass *pass,
+		       const struct incise_table_format *format, FILE *out,
+		       const struct incise_provenance *provenance);
+
+/* A kind of rows. */
+struct incise_row_kind {
+	const struct incise_table_column *columns;
+	int n;
+	size_t extra; /* where a row has struct incise_row_extra */
+	int (*write)(struct incise_export_pass *pass); /* all rows; 0 or -errno */
+};
 
 /* --- resample.c -------------------------------------------------------------------- */
 
 /*
  * All of a recording on one grid of time, or at the times of the force samples: force, pose of
  * the blade, depth and speed, depth by the camera, each with its uncertainty and flags. The last
- * columns are of the camera.
+ * columns are of the camera, if any recording has one.
  */
-#define INCISE_RESAMPLE_COLUMNS 25
 #define INCISE_RESAMPLE_CAMERA_COLUMNS 5
 
-extern const struct incise_table_column
-	incise_resample_columns[INCISE_RESAMPLE_COLUMNS + INCISE_RESAMPLE_CAMERA_COLUMNS];
-
-/* Number of columns for these recordings: 25 or 30, or -errno. */
-int incise_resample_width(struct incise_recording *const *recordings, int n,
-			  struct incise_error *err);
-
-/*
- * Add the rows of a recording under a name, with TAI if @wall is not NULL, with uncertainties if
- * @budget is not. For the progress, @samples of force were read
- * before, of @all. Returns 0 or -errno.
- */
-int incise_resample(struct incise_recording *recording, const char *name,
-		    const struct incise_export_options *options,
-		    const struct incise_budget *budget,
-		    const struct incise_budget_columns *columns,
-		    const struct incise_wall *wall, struct incise_table *table,
-		    struct incise_export_report *report, uint64_t samples, uint64_t all,
-		    struct incise_error *err);
-
-/* --- export_mcap.c ----------------------------------------------------------------- */
-
-/*
- * A recording as messages for viewers: every row of force, tracker, depth and events, in order
- * of time, log_time = t_ns (CLOCK_MONOTONIC). Rows of the report are messages. Returns 0,
- * -EINVAL, -EIO, -ENOSPC, -ENOMEM, -EINTR.
- */
-int incise_export_mcap(struct incise_recording *recording,
-		       const struct incise_export_options *options, FILE *out,
-		       const struct incise_provenance *provenance,
-		       struct incise_export_report *report, struct incise_error *err);
+extern const struct incise_row_kind incise_resample;
 
 #endif

@@ -8,7 +8,6 @@
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
-#include <ftw.h>
 #include <limits.h>
 #include <linux/fs.h>
 #include <math.h>
@@ -23,8 +22,11 @@
 #include <incise/wall.h>
 #include "../frames.h"
 #include "../ledger.h"
+#include "../read/database.h"
 #include "../read/session.h"
+#include "../read/source.h"
 #include "../schema.h"
+#include "../verify/seal_walk.h"
 #include "align.h"
 
 #define NS_PER_S 1000000000LL
@@ -54,11 +56,6 @@ struct join {
 	int n;
 	struct incise_error *err;
 };
-
-static int no_memory(struct join *join, const char *path)
-{
-	return incise_error_set(join->err, ENOMEM, "%s: out of memory", path);
-}
 
 static void note(struct join *join, const char *fmt, ...) INCISE_PRINTF(2, 3);
 static void note(struct join *join, const char *fmt, ...)
@@ -99,19 +96,9 @@ static void name_member(struct join *join, int at)
 static void read_text(const struct member *member, const char *key, char *text,
 		      size_t size)
 {
-	sqlite3_stmt *stmt = NULL;
-
-	text[0] = '\0';
-	if (sqlite3_prepare_v2(member->recording->db,
-			       "SELECT value FROM meta WHERE key = ?", -1, &stmt,
-			       NULL) == SQLITE_OK &&
-	    sqlite3_bind_text(stmt, 1, key, -1, SQLITE_STATIC) == SQLITE_OK &&
-	    sqlite3_step(stmt) == SQLITE_ROW && sqlite3_column_text(stmt, 0))
-		snprintf(text, size, "%s", (const char *)sqlite3_column_text(stmt, 0));
-	sqlite3_finalize(stmt);
+	incise_seal_key(member->recording, key, text, size, NULL);
 	for (char *c = text; *c; c++)
-		if ((unsigned char)*c < ' ' || *c == 0x7f ||
-		    ((unsigned char)*c == 0xc2 && (c[1] & 0xe0) == 0x80))
+		if ((unsigned char)*c == 0xc2 && (c[1] & 0xe0) == 0x80)
 			*c = '?';
 }
 
@@ -123,8 +110,8 @@ static int read_span(struct join *join, struct member *member)
 	for (int i = 0; i < INCISE_LEDGER_STREAMS; i++) {
 		int64_t first, last;
 
-		if (!incise_session_span(member->recording, incise_ledger_forms[i].table,
-					 &first, &last))
+		if (!incise_source_span(member->recording, incise_ledger_forms[i].table,
+					&first, &last))
 			continue;
 		member->first_ns = first < member->first_ns ? first : member->first_ns;
 		member->last_ns = last > member->last_ns ? last : member->last_ns;
@@ -142,7 +129,8 @@ static int read_span(struct join *join, struct member *member)
 static int open_member(struct join *join, const char *path)
 {
 	struct member *member = &join->members[join->n];
-	struct incise_recording *recording = incise_recording_open_any(path, join->err);
+	struct incise_recording *recording =
+		incise_recording_open_as(path, INCISE_RECORDING_ACTIVE, join->err);
 	int rc;
 
 	if (!recording)
@@ -156,12 +144,6 @@ static int open_member(struct join *join, const char *path)
 			"%s: is a joined recording; give those in it, for "
 			"example %s",
 			path, recording->session->members[0]->path);
-	if (recording->form < 2)
-		return incise_error_set(
-			join->err, EINVAL,
-			"%s: made by an older incise (format 1), which had "
-			"no ledger and no wall time; it cannot be joined",
-			recording->path);
 	if (!recording->meta.complete && incise_recording_is_written(recording->path))
 		return incise_error_set(join->err, EBUSY,
 					"%s: is being recorded; wait for its end",
@@ -260,7 +242,8 @@ static int add_time(struct join *join, int64_t **times, size_t *n, int64_t t_ns)
 	int64_t *more = realloc(*times, (*n + 1) * sizeof(**times));
 
 	if (!more)
-		return no_memory(join, join->members[0].recording->path);
+		return incise_schema_no_memory(join->members[0].recording->path,
+					       join->err);
 	*times = more;
 	more[(*n)++] = t_ns;
 	return 0;
@@ -320,7 +303,7 @@ static int add_knot(struct join *join, struct member *member, int64_t t_ns, int6
 		realloc(map->knots, (map->n + 1) * sizeof(*knots));
 
 	if (!knots)
-		return no_memory(join, member->recording->path);
+		return incise_schema_no_memory(member->recording->path, join->err);
 	map->knots = knots;
 	if (map->n && to_ns <= knots[map->n - 1].to_ns)
 		return incise_error_set(
@@ -554,28 +537,6 @@ static int map_clock(struct join *join, int at)
 
 /* --- writing ------------------------------------------------------------------------- */
 
-/* The rest of a file. Returns 0 or -errno. */
-static int copy(int in, int out)
-{
-	char bytes[1 << 16];
-	ssize_t n;
-
-	while ((n = copy_file_range(in, NULL, out, NULL, 1 << 30, 0)) > 0)
-		;
-	if (!n)
-		return 0;
-	/* From one kind of file system to another the kernel does not copy. */
-	if (errno != EXDEV && errno != EINVAL && errno != ENOSYS && errno != EOPNOTSUPP)
-		return -errno;
-	while ((n = read(in, bytes, sizeof(bytes))) > 0)
-		for (ssize_t done = 0, part; done < n; done += part) {
-			part = write(out, bytes + done, (size_t)(n - done));
-			if (part < 0)
-				return -errno;
-		}
-	return n < 0 ? -errno : 0;
-}
-
 /*
  * Clone, link or copy a file that exists; bit for bit. A link is the same file, which nothing changes
  * once it is complete; of a symbolic link it is one to its target. Returns 0 or -errno.
@@ -595,7 +556,7 @@ static int bring(const char *from, const char *to, bool complete)
 		rc = -errno;
 	} else {
 		if (ioctl(out, FICLONE, in))
-			rc = copy(in, out);
+			rc = incise_database_copy(in, out);
 		if (!rc && fsync(out))
 			rc = -errno;
 		if (close(out) && !rc)
@@ -607,12 +568,6 @@ static int bring(const char *from, const char *to, bool complete)
 
 static const char *const files[] = {INCISE_SCHEMA_DB, INCISE_SCHEMA_DB "-wal",
 				    INCISE_FRAMES_FILE};
-
-static int remove_one(const char *path, const struct stat *st, int type, struct FTW *at)
-{
-	(void)st, (void)type, (void)at;
-	return remove(path) && errno != ENOENT;
-}
 
 /* A file of a member. Returns 0, also if there is none, or -errno. */
 static int bring_file(const struct member *member, const char *own, const char *name,
@@ -669,7 +624,7 @@ static int bring_member(struct join *join, const struct member *member,
 	int rc = 0;
 
 	if (asprintf(&own, "%s/%s", folder, member->name) < 0)
-		return no_memory(join, folder);
+		return incise_schema_no_memory(folder, join->err);
 	if (mkdir(own, 0777))
 		rc = -errno;
 	for (size_t i = 0; i < sizeof(files) / sizeof(*files) && !rc; i++)
@@ -685,12 +640,6 @@ static int bring_member(struct join *join, const struct member *member,
 				      strerror(-rc));
 	free(own);
 	return rc;
-}
-
-static int step_and_reset(sqlite3_stmt *stmt)
-{
-	sqlite3_step(stmt);
-	return sqlite3_reset(stmt);
 }
 
 static int bind_known(sqlite3_stmt *stmt, int at, double value)
@@ -713,7 +662,7 @@ static int put_member(const struct member *member, int at, sqlite3_stmt *members
 	sqlite3_bind_int(members, 6, member->fit.matches);
 	bind_known(members, 7, member->agreement_ns);
 	bind_known(members, 8, member->agreement_bound_ns);
-	rc = step_and_reset(members);
+	rc = incise_schema_run(members);
 	for (size_t i = 0; i < member->map.n && rc == SQLITE_OK; i++) {
 		const struct incise_session_knot *knot = &member->map.knots[i];
 
@@ -722,7 +671,7 @@ static int put_member(const struct member *member, int at, sqlite3_stmt *members
 		sqlite3_bind_int64(maps, 3, knot->t_ns);
 		sqlite3_bind_int64(maps, 4, knot->to_ns);
 		sqlite3_bind_double(maps, 5, knot->bound_ns);
-		rc = step_and_reset(maps);
+		rc = incise_schema_run(maps);
 	}
 	return rc;
 }
@@ -737,7 +686,7 @@ static int write_tables(struct join *join, sqlite3 *db)
 	uint32_t crc;
 	int rc = sqlite3_exec(
 		db,
-		"PRAGMA application_id=" TEXT_OF(INCISE_SESSION_APPLICATION) ";PRAGMA user_version=" TEXT_OF(
+		"PRAGMA application_id=" TEXT_OF(INCISE_SCHEMA_JOINED) ";PRAGMA user_version=" TEXT_OF(
 			INCISE_SESSION_VERSION) ";BEGIN",
 		NULL, NULL, NULL);
 
@@ -758,14 +707,14 @@ static int write_tables(struct join *join, sqlite3 *db)
 	if (rc == SQLITE_OK) {
 		sqlite3_bind_text(pairs, 1, "incise", -1, SQLITE_STATIC);
 		sqlite3_bind_text(pairs, 2, incise_version(), -1, SQLITE_STATIC);
-		rc = step_and_reset(pairs);
+		rc = incise_schema_run(pairs);
 	}
 	if (rc == SQLITE_OK)
 		rc = incise_session_seal(db, &crc);
 	if (rc == SQLITE_OK) {
 		sqlite3_bind_text(pairs, 1, "seal", -1, SQLITE_STATIC);
 		sqlite3_bind_int64(pairs, 2, crc);
-		rc = step_and_reset(pairs);
+		rc = incise_schema_run(pairs);
 	}
 	sqlite3_finalize(members);
 	sqlite3_finalize(maps);
@@ -780,7 +729,7 @@ static int write_database(struct join *join, const char *folder)
 	int rc;
 
 	if (asprintf(&path, "%s/%s", folder, INCISE_SCHEMA_DB) < 0)
-		return no_memory(join, folder);
+		return incise_schema_no_memory(folder, join->err);
 	rc = sqlite3_open_v2(
 		path, &db,
 		SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX, NULL);
@@ -795,17 +744,6 @@ static int write_database(struct join *join, const char *folder)
 	return rc;
 }
 
-/* Nothing that cannot be read gets the final name. */
-static int try_session(struct join *join, const char *folder)
-{
-	struct incise_recording *recording = incise_recording_open_any(folder, join->err);
-
-	if (!recording)
-		return -errno;
-	incise_recording_close(recording);
-	return 0;
-}
-
 static int write_session(struct join *join, const char *output)
 {
 	char *part;
@@ -816,7 +754,7 @@ static int write_session(struct join *join, const char *output)
 		return incise_error_set(join->err, EEXIST,
 					"%s: exists; give another name", output);
 	if (asprintf(&part, "%s.part", output) < 0)
-		return no_memory(join, output);
+		return incise_schema_no_memory(output, join->err);
 	if (mkdir(part, 0777))
 		rc = incise_error_set(
 			join->err, errno, "%s: cannot be made: %s; %s",
@@ -830,12 +768,12 @@ static int write_session(struct join *join, const char *output)
 	if (!rc)
 		rc = write_database(join, part);
 	if (!rc)
-		rc = try_session(join, part);
+		rc = incise_recording_try(part, join->err);
 	if (!rc && rename(part, output))
 		rc = incise_error_set(join->err, errno, "%s: %s", output,
 				      strerror(errno));
 	if (rc && made)
-		nftw(part, remove_one, 16, FTW_DEPTH | FTW_PHYS);
+		incise_database_remove(part);
 	free(part);
 	return rc;
 }
@@ -853,7 +791,7 @@ int incise_session_join(const char *const *paths, int n,
 					INCISE_SESSION_MEMBERS_MAX);
 	join.members = calloc((size_t)n, sizeof(*join.members));
 	if (!join.members)
-		return no_memory(&join, output);
+		return incise_schema_no_memory(output, err);
 	for (int i = 0; i < n && !rc; i++)
 		rc = open_member(&join, paths[i]);
 	for (int i = 0; i < n && !rc; i++)

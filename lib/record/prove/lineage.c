@@ -171,7 +171,7 @@ int incise_origins_file(struct incise_origins *origins, const char *path,
 		return 0;
 	snprintf(origin.kind, sizeof(origin.kind), "%s", kind);
 	snprintf(origin.name, sizeof(origin.name), "%s", basename(path));
-	rc = incise_sha256_file(path, origin.sha256, err);
+	rc = incise_sha256_file(path, origin.sha256, NULL, NULL, err);
 	if (!rc)
 		rc = incise_origins_read(&below, path, !strcmp(kind, "model"), err);
 	if (!rc)

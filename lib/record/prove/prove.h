@@ -4,6 +4,7 @@
  *
  *     prove.c        the recording, its statements, and who vouches for them
  *     sign.c         a statement, a signature and a time-stamp of the recording as it is
+ *     seal_files.c   the folder seal/, and the text of a statement in it
  *     signature.c    ssh-keygen
  *     timestamp.c    RFC 3161, by libcrypto
  *     lineage.c      the files that a file was made of
@@ -31,20 +32,7 @@ struct incise_bytes {
 /* The folder of a recording, without its choice: free(3). NULL and the reason. */
 char *incise_proof_folder(const char *path, struct incise_error *err);
 
-/*
- * A line for each calibration after the fact of a recording (incise/recalibration.h), which stand
- * behind the end of its statement; the last one is that by which it is read:
- *
- *     calibration calibration/0001-20261127T054012Z.conf 0123…    SHA-256 of the file
- *
- * free(3); NULL and the reason.
- */
-char *incise_proof_calibrations(const char *recording, struct incise_error *err);
-
-/* The bytes of a statement before these lines; 0: it has no end. */
-size_t incise_proof_statement_length(const struct incise_bytes *text);
-
-/* --- sign.c ----------------------------------------------------------------------------- */
+/* --- seal_files.c ----------------------------------------------------------------------- */
 
 struct incise_seal_file {
 	char name[100]; /* letters, digits, '.', '_' and '-' */
@@ -59,6 +47,30 @@ struct incise_seal_files {
 		*all; /* by number: the statement, signatures, time-stamps */
 	int n;
 };
+
+/*
+ * Read the files in a folder of a recording. Those of other names are passed over; links, devices and
+ * too large ones are listed, but not read. Returns 0, also if there is no such folder, or -errno;
+ * incise_seal_files_free() in both cases.
+ */
+int incise_seal_files_read(struct incise_seal_files *files, const char *recording,
+			   const char *name, struct incise_error *err);
+void incise_seal_files_free(struct incise_seal_files *files);
+
+/*
+ * A line for each calibration after the fact of a recording (incise/recalibration.h), which stand
+ * behind the end of its statement; the last one is that by which it is read:
+ *
+ *     calibration calibration/0001-20261127T054012Z.conf 0123…    SHA-256 of the file
+ *
+ * free(3); NULL and the reason.
+ */
+char *incise_proof_calibrations(const char *recording, struct incise_error *err);
+
+/* The bytes of a statement before these lines; 0: it has no end. */
+size_t incise_proof_statement_length(const struct incise_bytes *text);
+
+/* --- sign.c ----------------------------------------------------------------------------- */
 
 /*
  * Sign and time-stamp a recording, a member of a joined one, or a join, whose statement is @join. Adds

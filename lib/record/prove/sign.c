@@ -11,6 +11,7 @@
 #include <unistd.h>
 #include <incise/infile.h>
 #include <incise/outfile.h>
+#include "../read/database.h"
 #include "../read/recording.h"
 #include "prove.h"
 

@@ -9,7 +9,6 @@
 #include <incise/clock.h>
 #include "cut.h"
 #include "recalibration.h"
-#include "session.h"
 #include "../schema.h"
 
 bool incise_cut_step(struct incise_cut_count *cut, double depth_mm)
@@ -180,46 +179,32 @@ static int check_tracker(struct incise_recording *rec, struct incise_error *err)
 
 /*
  * The wall clock was read at the event "start", when the recorder started: samples come later,
- * after a trigger by any time. 0 or -errno.
+ * after a trigger by any time.
  */
-static int find_started(struct incise_recording *rec, struct incise_recording_info *info,
-			struct incise_error *err)
+static void find_started(struct incise_recording *rec, struct incise_recording_info *info)
 {
-	const struct incise_recording *member =
-		incise_recording_member(rec, info->force ? "force" : "tracker");
+	const struct incise_stream_source *source =
+		rec->streams[info->force ? INCISE_LEDGER_FORCE : INCISE_LEDGER_TRACKER];
 	struct tm utc = {0};
-	const char *end = strptime(member->meta.started, "%Y-%m-%dT%H:%M:%SZ", &utc);
-	int64_t read_s = end && !*end ? (int64_t)timegm(&utc) : 0, after_ns;
-	sqlite3_stmt *stmt = NULL;
+	const char *end =
+		strptime(source->file->meta.started, "%Y-%m-%dT%H:%M:%SZ", &utc);
+	int64_t read_s = end && !*end ? (int64_t)timegm(&utc) : 0, start_ns, after_ns;
 	time_t started;
-	int rc = 0;
 
-	if (read_s <= 0 || read_s > UINT32_MAX)
-		return 0;
-	if (sqlite3_prepare_v2(member->db,
-			       "SELECT t_ns FROM events WHERE kind = 'start' "
-			       "ORDER BY rowid LIMIT 1",
-			       -1, &stmt, NULL) != SQLITE_OK)
-		return incise_schema_fail(member->db, member->path, err);
-	rc = sqlite3_step(stmt);
+	start_ns = incise_schema_ask(source->file->db, -1,
+				     "SELECT t_ns FROM events WHERE kind = 'start' "
+				     "ORDER BY rowid LIMIT 1");
 	/* A time that is damaged, or later than the samples, leaves the text as it is. */
-	if (rc == SQLITE_ROW &&
-	    !__builtin_sub_overflow(info->start_ns,
-				    incise_session_time(member->map,
-							sqlite3_column_int64(stmt, 0)),
-				    &after_ns) &&
-	    after_ns >= 0 && after_ns < INT64_MAX / 4) {
-		info->start_utc_ns = read_s * INCISE_NS_PER_S + after_ns;
-		started = (time_t)(info->start_utc_ns / INCISE_NS_PER_S);
-		strftime(info->started, sizeof(info->started), "%Y-%m-%dT%H:%M:%SZ",
-			 gmtime_r(&started, &utc));
-	}
-	if (rc == SQLITE_ROW || rc == SQLITE_DONE)
-		rc = 0;
-	else
-		rc = incise_schema_fail(member->db, member->path, err);
-	sqlite3_finalize(stmt);
-	return rc;
+	if (read_s <= 0 || read_s > UINT32_MAX || start_ns < 0 ||
+	    __builtin_sub_overflow(info->start_ns,
+				   incise_session_time(source->map, start_ns),
+				   &after_ns) ||
+	    after_ns < 0 || after_ns >= INT64_MAX / 4)
+		return;
+	info->start_utc_ns = read_s * INCISE_NS_PER_S + after_ns;
+	started = (time_t)(info->start_utc_ns / INCISE_NS_PER_S);
+	strftime(info->started, sizeof(info->started), "%Y-%m-%dT%H:%M:%SZ",
+		 gmtime_r(&started, &utc));
 }
 
 /* Count the cuts by the rows of the depth alone, and find the largest depth in them. */
@@ -268,18 +253,15 @@ static int read_cuts(struct incise_recording *rec, struct incise_recording_info 
 static int take_summary(struct incise_recording *rec, struct incise_recording_info *info,
 			struct incise_error *err)
 {
+	const struct incise_recording_numbers *numbers = &rec->numbers;
 	struct incise_row_times times;
 	int64_t seq[2], t_ns[2];
-	double cuts, depth_mm, force_N;
 	int rc;
 
-	if (rec->session || rec->form < 5 || !rec->meta.complete || rec->recalibrated)
+	if (rec->session || rec->old || !rec->meta.complete || rec->recalibrated)
 		return 0;
-	if (incise_recording_number(rec, "cuts", &cuts, err) ||
-	    incise_recording_number(rec, "depth_max_mm", &depth_mm, err) ||
-	    incise_recording_number(rec, "force_max_N", &force_N, err))
-		return -errno;
-	if (!(cuts >= 0 && cuts < 1e9) || isnan(depth_mm) || isnan(force_N))
+	if (!(numbers->cuts >= 0 && numbers->cuts < 1e9) ||
+	    isnan(numbers->depth_max_mm) || isnan(numbers->force_max_N))
 		return 0;
 	for (int i = 0; i < 2 && info->force; i++) {
 		rc = incise_source_end(rec, "force", i, &seq[i], &t_ns[i], NULL, err);
@@ -293,9 +275,9 @@ static int take_summary(struct incise_recording *rec, struct incise_recording_in
 	    (!incise_row_times_next(&times, seq[0], t_ns[0], &info->start_ns) ||
 	     !incise_row_times_next(&times, seq[1], t_ns[1], &info->end_ns)))
 		return 0;
-	info->cuts = (int)cuts;
-	info->depth_max_mm = depth_mm;
-	info->force_max_N = force_N;
+	info->cuts = (int)numbers->cuts;
+	info->depth_max_mm = numbers->depth_max_mm;
+	info->force_max_N = numbers->force_max_N;
 	info->summary = true;
 	return 1;
 }
@@ -310,13 +292,6 @@ static int find_info(struct incise_recording *rec, bool samples,
 	if (rc < 0)
 		return rc;
 	info->n_streams = rc;
-	for (int i = 0; i < info->n_streams; i++)
-		incise_recalibration_stream(
-			incise_recording_member(rec,
-						!strcmp(info->streams[i].name, "camera")
-							? "frames"
-							: info->streams[i].name),
-			&info->streams[i]);
 	info->depth_max_mm = 0;
 	info->force_max_N = 0;
 	rc = samples ? 0 : take_summary(rec, info, err);
@@ -326,15 +301,15 @@ static int find_info(struct incise_recording *rec, bool samples,
 		return rc;
 	/* Without a force channel, the tracker's. */
 	if (!info->force &&
-	    incise_session_span(incise_recording_member(rec, "tracker"), "tracker",
-				&info->start_ns, &info->end_ns)) {
+	    incise_source_span(rec, "tracker", &info->start_ns, &info->end_ns)) {
 		const struct incise_session_map *map =
-			incise_recording_member(rec, "tracker")->map;
+			rec->streams[INCISE_LEDGER_TRACKER]->map;
 
 		info->start_ns = incise_session_time(map, info->start_ns);
 		info->end_ns = incise_session_time(map, info->end_ns);
 	}
-	return find_started(rec, info, err);
+	find_started(rec, info);
+	return 0;
 }
 
 int incise_recording_info(struct incise_recording *rec,

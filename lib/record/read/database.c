@@ -4,17 +4,18 @@
  */
 #include <errno.h>
 #include <fcntl.h>
+#include <ftw.h>
 #include <limits.h>
 #include <pthread.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
 #include "database.h"
-#include "recording.h"
 #include "../frames.h"
 #include "../schema.h"
 
@@ -123,21 +124,27 @@ static int find_files(struct found *found, const char *path, struct incise_error
 
 /* --- copies --- */
 
-/* Returns 0 or -errno. */
-static int copy_bytes(int from, int to)
+int incise_database_copy(int in, int out)
 {
-	char bytes[65536];
+	char bytes[1 << 16];
 	ssize_t n;
 
-	while ((n = read(from, bytes, sizeof(bytes))) != 0) {
+	while ((n = copy_file_range(in, NULL, out, NULL, 1 << 30, 0)) > 0)
+		;
+	if (!n)
+		return 0;
+	/* From one kind of file system to another the kernel does not copy. */
+	if (errno != EXDEV && errno != EINVAL && errno != ENOSYS && errno != EOPNOTSUPP &&
+	    errno != EINTR)
+		return -errno;
+	while ((n = read(in, bytes, sizeof(bytes))) != 0) {
 		if (n < 0 && errno != EINTR)
 			return -errno;
 		for (ssize_t done = 0, put; done < n; done += put) {
-			put = write(to, bytes + done, (size_t)(n - done));
+			put = write(out, bytes + done, (size_t)(n - done));
 			if (put < 0 && errno != EINTR)
 				return -errno;
-			if (put < 0)
-				put = 0;
+			put = put < 0 ? 0 : put;
 		}
 	}
 	return 0;
@@ -151,7 +158,7 @@ static int copy_file(int in, const char *to, mode_t mode)
 	if (in < 0)
 		return in;
 	out = open(to, O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC, mode);
-	rc = out < 0 ? -errno : copy_bytes(in, out);
+	rc = out < 0 ? -errno : incise_database_copy(in, out);
 	if (out >= 0 && close(out) && !rc)
 		rc = -errno;
 	close(in);
@@ -330,6 +337,43 @@ static int open_copy(const struct found *found, bool written, sqlite3 **db, int 
 
 /* --- opening --- */
 
+/* Without trailing slashes. */
+char *incise_recording_folder(const char *path, struct incise_error *err)
+{
+	size_t length = strlen(path);
+	char *folder;
+	struct stat st;
+
+	while (length > 1 && path[length - 1] == '/')
+		length--;
+	if (asprintf(&folder, "%.*s.part", (int)length, path) < 0) {
+		incise_schema_no_memory(path, err);
+		return NULL;
+	}
+	folder[length] = 0;
+	if (stat(folder, &st) && errno == ENOENT) {
+		folder[length] = '.';
+		if (stat(folder, &st) && errno == ENOENT) {
+			incise_error_set(err, ENOENT,
+					 "%s: no such recording; check name and folder",
+					 path);
+			free(folder);
+			return NULL;
+		}
+	}
+	return folder;
+}
+
+bool incise_recording_is_written(const char *folder)
+{
+	int fd = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+	bool is = fd >= 0 && flock(fd, LOCK_SH | LOCK_NB) && errno == EWOULDBLOCK;
+
+	if (fd >= 0)
+		close(fd);
+	return is;
+}
+
 /* A line for a database that cannot be copied. */
 static int say_why(const char *path, bool written, int why, struct incise_error *err)
 {
@@ -420,4 +464,15 @@ int incise_database_recover(const char *path, const char *file, struct incise_er
 	       : rc	    ? incise_error_set(err, -rc, "%s: %s", file, strerror(-rc))
 			    : incise_error_set(err, EINVAL, "%s: damaged: %s", path,
 					       sqlite3_errstr(code));
+}
+
+static int remove_one(const char *path, const struct stat *st, int type, struct FTW *at)
+{
+	(void)st, (void)type, (void)at;
+	return remove(path) && errno != ENOENT;
+}
+
+void incise_database_remove(const char *folder)
+{
+	nftw(folder, remove_one, 16, FTW_DEPTH | FTW_PHYS);
 }

@@ -10,13 +10,15 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include "../frames.h"
+#include "../schema.h"
 #include "recording.h"
-#include "session.h"
+#include "rows.h"
 #include "source.h"
 
 struct incise_frame_reader {
 	struct incise_recording *opened;
 	struct incise_recording *recording; /* with the frames: that one, or its member */
+	const struct incise_session_map *map;
 	struct incise_frames_reader *file;
 	uint64_t passed; /* frames of the file */
 };
@@ -26,8 +28,7 @@ static int open_file(struct incise_frame_reader *reader, struct incise_error *er
 	char *path;
 
 	if (asprintf(&path, "%s/%s", reader->recording->path, INCISE_FRAMES_FILE) < 0)
-		return incise_error_set(err, ENOMEM, "%s: out of memory",
-					reader->recording->path);
+		return incise_schema_no_memory(reader->recording->path, err);
 	incise_frames_reader_close(reader->file);
 	reader->file = incise_frames_reader_new(path, err);
 	reader->passed = 0;
@@ -42,16 +43,16 @@ struct incise_frame_reader *incise_frame_reader_new(struct incise_recording *rec
 	int rc = 0;
 
 	if (!reader)
-		rc = incise_error_set(err, ENOMEM, "%s: out of memory", recording->path);
-	else if (recording->form < 2)
-		rc = incise_error_set(err, ENOTSUP,
-				      "%s: is of an older form, which has no frames",
-				      recording->path);
+		rc = incise_schema_no_memory(recording->path, err);
 	if (!rc) {
 		reader->opened = incise_recording_open(recording->path, err);
-		if (reader->opened)
-			reader->recording =
-				incise_recording_member(reader->opened, "frames");
+		if (reader->opened) {
+			const struct incise_stream_source *camera =
+				reader->opened->streams[INCISE_LEDGER_CAMERA];
+
+			reader->recording = camera->file;
+			reader->map = camera->map;
+		}
 		rc = reader->recording ? open_file(reader, err) : -errno;
 	}
 	if (!rc)
@@ -117,9 +118,8 @@ int incise_frame_reader_at(struct incise_frame_reader *reader, int64_t t_ns,
 	int64_t t = t_ns > INT64_MAX / 4    ? INT64_MAX / 4
 		    : t_ns < -INT64_MAX / 4 ? -INT64_MAX / 4
 					    : t_ns;
-	const struct incise_session_map *map = reader->recording->map;
-	int rc = find_row(reader->recording, incise_session_member_time(map, t), &seq,
-			  &row_ns, &number, err);
+	int rc = find_row(reader->recording, incise_session_member_time(reader->map, t),
+			  &seq, &row_ns, &number, err);
 
 	if (!rc && number < reader->passed)
 		rc = open_file(reader, err);
@@ -139,6 +139,6 @@ int incise_frame_reader_at(struct incise_frame_reader *reader, int64_t t_ns,
 			"has all findings",
 			reader->recording->path, (unsigned long long)seq,
 			INCISE_FRAMES_FILE, reader->recording->path);
-	frame->t_ns = incise_session_time(map, row_ns);
+	frame->t_ns = incise_session_time(reader->map, row_ns);
 	return 0;
 }

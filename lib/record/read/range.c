@@ -4,6 +4,8 @@
  */
 #include <errno.h>
 #include <math.h>
+#include <stdlib.h>
+#include <string.h>
 #include <incise/clock.h>
 #include "cut.h"
 #include "range.h"
@@ -57,43 +59,104 @@ static void note(struct walk *walk, int64_t t_ns, double depth_mm)
 	walk->place[walk->n++] = (struct place){t_ns, walk->cut.count};
 }
 
-/* Follow the depths to where the range begins, or to the end of the cut that is asked for. */
-static int follow(struct incise_recording *recording,
-		  struct incise_recording_range *range, int64_t from_ns,
-		  struct incise_error *err)
+static void init_walk(struct walk *walk, double tracker_hz)
 {
-	struct walk walk = {.settled_ns = SETTLED_NS, .begin.t_ns = INT64_MIN};
+	*walk = (struct walk){.settled_ns = SETTLED_NS, .begin.t_ns = INT64_MIN};
+	if (tracker_hz > 0 && SETTLED_RECORDS / tracker_hz * 1e9 > SETTLED_NS)
+		walk->settled_ns =
+			(int64_t)fmin(SETTLED_RECORDS / tracker_hz * 1e9, 1e12);
+}
+
+/* Add a depth. Returns whether the range begins there, or the cut that is asked for has ended. */
+static bool step(struct walk *walk, struct incise_recording_range *range, int64_t from_ns,
+		 int64_t t_ns, double depth_mm)
+{
+	const bool inside = walk->cut.inside;
+
+	incise_cut_step(&walk->cut, depth_mm);
+	if (!inside)
+		note(walk, t_ns, depth_mm);
+	else
+		walk->clear_ns = t_ns;
+	if (!range->cut)
+		return t_ns >= from_ns;
+	range->end_ns = t_ns + BEHIND_NS;
+	return inside && !walk->cut.inside && walk->cut.count == range->cut;
+}
+
+/* Follow the depths behind a time, when the blade was outside, to where the range begins. */
+static int follow(struct incise_recording *recording, struct walk *walk,
+		  int64_t behind_ns, struct incise_recording_range *range,
+		  int64_t from_ns, struct incise_error *err)
+{
 	struct incise_source source;
 	bool found = false;
-	double hz;
-	int rc = incise_recording_number(recording, "tracker_hz", &hz, err);
+	int rc = incise_source_open_at(&source, recording, INCISE_SOURCE_DEPTH,
+				       incise_source_seek(recording, "depth", behind_ns),
+				       err);
 
-	if (!rc && hz > 0 && SETTLED_RECORDS / hz * 1e9 > SETTLED_NS)
-		walk.settled_ns = (int64_t)fmin(SETTLED_RECORDS / hz * 1e9, 1e12);
-	if (!rc)
-		rc = incise_source_open(&source, recording, INCISE_SOURCE_DEPTH, err);
 	if (rc)
 		return rc;
 	while (!found && (rc = incise_source_next(&source, err)) > 0)
 		for (size_t k = 0; k < source.batch.n && !found; k++) {
 			const int64_t t_ns = source.batch.column[1].i[k];
-			const bool inside = walk.cut.inside;
 
-			incise_cut_step(&walk.cut, source.batch.column[2].r[k]);
-			if (!inside)
-				note(&walk, t_ns, source.batch.column[2].r[k]);
-			else
-				walk.clear_ns = t_ns;
-			if (range->cut) {
-				found = inside && !walk.cut.inside &&
-					walk.cut.count == range->cut;
-				range->end_ns = t_ns + BEHIND_NS;
-			} else {
-				found = t_ns >= from_ns;
-			}
+			found = t_ns > behind_ns && step(walk, range, from_ns, t_ns,
+							 source.batch.column[2].r[k]);
 		}
 	incise_source_close(&source);
-	if (rc < 0)
+	return rc < 0 ? rc : 0;
+}
+
+/* When cuts ended, as the recorder has noted it; without, none. To be freed. */
+static size_t read_cut_ends(struct incise_recording *recording, int64_t **ends_ns)
+{
+	sqlite3_stmt *stmt = NULL;
+	size_t n = 0;
+
+	*ends_ns = NULL;
+	if (sqlite3_prepare_v2(recording->db,
+			       "SELECT value FROM meta WHERE key = 'cut_ends_ns'", -1,
+			       &stmt, NULL) == SQLITE_OK &&
+	    sqlite3_step(stmt) == SQLITE_ROW &&
+	    sqlite3_column_type(stmt, 0) == SQLITE_BLOB)
+		n = (size_t)sqlite3_column_bytes(stmt, 0) / sizeof(**ends_ns);
+	if (n)
+		*ends_ns = malloc(n * sizeof(**ends_ns));
+	if (*ends_ns)
+		memcpy(*ends_ns, sqlite3_column_blob(stmt, 0), n * sizeof(**ends_ns));
+	sqlite3_finalize(stmt);
+	return *ends_ns ? n : 0;
+}
+
+/*
+ * Find where the range begins to be read, or the end of the cut that is asked for: from the end of a cut on that
+ * is far enough before it, else from one before that, at last from the first sample on.
+ */
+static int find_begin(struct incise_recording *recording,
+		      struct incise_recording_range *range, int64_t from_ns,
+		      struct incise_error *err)
+{
+	struct walk walk;
+	int64_t *ends_ns;
+	size_t n = read_cut_ends(recording, &ends_ns), at = 0;
+	int rc = 0;
+
+	while (at < n &&
+	       (range->cut ? at + 1 < (size_t)range->cut : ends_ns[at] < from_ns))
+		at++;
+	for (size_t back = 1; !rc; back *= 8) {
+		at = at > back ? at - back : 0;
+		init_walk(&walk, recording->numbers.tracker_hz);
+		walk.cut.count = (int)at;
+		walk.clear_ns = at ? ends_ns[at - 1] : 0;
+		rc = follow(recording, &walk, at ? ends_ns[at - 1] : INT64_MIN, range,
+			    from_ns, err);
+		if (!at || walk.begin.t_ns != INT64_MIN)
+			break;
+	}
+	free(ends_ns);
+	if (rc)
 		return rc;
 	/* A cut may go on to the end of the recording. */
 	if (range->cut > walk.cut.count)
@@ -109,15 +172,12 @@ static int follow(struct incise_recording *recording,
 static bool is_read_whole(struct incise_recording *recording,
 			  const struct incise_export_options *options)
 {
-	double force_hz = NAN, tracker_hz = NAN;
+	const struct incise_recording_numbers *numbers = &recording->numbers;
 
-	if (incise_recording_number(recording, "force_hz", &force_hz, NULL) ||
-	    incise_recording_number(recording, "tracker_hz", &tracker_hz, NULL))
-		return true;
 	return recording->meta.force_lost || options->calibration ||
 	       recording->recalibrated ||
 	       (incise_recording_has_force(recording) &&
-		!(force_hz >= FORCE_LEAST * tracker_hz));
+		!(numbers->force_hz >= FORCE_LEAST * numbers->tracker_hz));
 }
 
 static int64_t after(double s)
@@ -150,7 +210,7 @@ int incise_recording_limit(struct incise_recording *recording,
 	if (rc < 0)
 		return rc;
 	if (rc) {
-		rc = follow(recording, &range, first_ns + range.from_ns, err);
+		rc = find_begin(recording, &range, first_ns + range.from_ns, err);
 		if (!range.cut)
 			range.end_ns = first_ns + range.to_ns + BEHIND_NS;
 		/* Cuts count by the force, and delays move its rows: then all are read. */

@@ -10,22 +10,17 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/file.h>
-#include <sys/stat.h>
-#include <time.h>
 #include <unistd.h>
 #include <incise/infile.h>
-#include <incise/outfile.h>
 #include "../../base/crypto/sha256.h"
 #include "../schema.h"
+#include "database.h"
 #include "recalibration.h"
 #include "session.h"
 
-#define FOLDER "calibration"
-#define NUMBER_MAX 9999
+#define DELAY_MAX_NS 1e12 /* a quarter of an hour; shifts do not overflow */
 
-/* As the recorder keeps of one: with the history of years. */
-static const struct incise_infile_kind file_kind = {
+const struct incise_infile_kind incise_recalibration_kind = {
 	.name = "a calibration of a recording",
 	.advice = "give a calibration.conf of incise calibrate",
 	.size_max = 1 << 20,
@@ -42,8 +37,7 @@ static bool has_form(const char *text, const char *form)
 	return true;
 }
 
-/* "0001-20261127T054012Z.conf"; false: no calibration. */
-static bool parse_name(const char *name, struct incise_recalibration *entry)
+bool incise_recalibration_parse(const char *name, struct incise_recalibration *entry)
 {
 	const char *end = name + strlen("0001-20261127T054012Z"), *d = name + 5;
 
@@ -51,15 +45,11 @@ static bool parse_name(const char *name, struct incise_recalibration *entry)
 	    (strcmp(end, ".conf") && strcmp(end, ".original")))
 		return false;
 	*entry = (struct incise_recalibration){.original = !strcmp(end, ".original")};
-	snprintf(entry->file, sizeof(entry->file), FOLDER "/%s", name);
+	snprintf(entry->file, sizeof(entry->file), INCISE_RECALIBRATION_FOLDER "/%s",
+		 name);
 	snprintf(entry->date, sizeof(entry->date), "%.4s-%.2s-%.2sT%.2s:%.2s:%.2sZ", d,
 		 d + 4, d + 6, d + 9, d + 11, d + 13);
 	return true;
-}
-
-static int number_of(const struct incise_recalibration *entry)
-{
-	return *entry->file ? atoi(entry->file + strlen(FOLDER "/")) : 0;
 }
 
 static int compare(const void *a, const void *b)
@@ -70,19 +60,14 @@ static int compare(const void *a, const void *b)
 
 /* --- the folder ---------------------------------------------------------------------- */
 
-static int no_memory(const char *path, struct incise_error *err)
-{
-	return incise_error_set(err, ENOMEM, "%s: out of memory", path);
-}
-
-/* A link would lead out of the recording. -ENOENT is no error. */
-static int open_folder(const char *folder, struct incise_error *err)
+/* A link would lead out of the recording. */
+int incise_recalibration_folder(const char *folder, struct incise_error *err)
 {
 	char *path;
 	int fd;
 
-	if (asprintf(&path, "%s/" FOLDER, folder) < 0)
-		return no_memory(folder, err);
+	if (asprintf(&path, "%s/" INCISE_RECALIBRATION_FOLDER, folder) < 0)
+		return incise_schema_no_memory(folder, err);
 	fd = open(path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
 	if (fd < 0 && errno != ENOENT)
 		incise_error_set(err, errno, "%s: %s", path,
@@ -93,25 +78,25 @@ static int open_folder(const char *folder, struct incise_error *err)
 	return fd < 0 ? -errno : fd;
 }
 
-/* The entries of the folder behind that of the capture, in order; returns how many there are. */
-static int read_folder(const char *folder, struct incise_recalibration **list,
-		       struct incise_error *err)
+int incise_recalibration_list(const char *folder, struct incise_recalibration **list,
+			      struct incise_error *err)
 {
-	int fd = open_folder(folder, err), n = fd < 0 && fd != -ENOENT ? fd : 1;
+	int fd = incise_recalibration_folder(folder, err),
+	    n = fd < 0 && fd != -ENOENT ? fd : 1;
 	struct dirent *found;
 	DIR *dir = fd < 0 ? NULL : fdopendir(fd);
 
 	*list = calloc(1, sizeof(**list));
 	if (!*list || (fd >= 0 && !dir))
-		n = no_memory(folder, err);
+		n = incise_schema_no_memory(folder, err);
 	while (dir && n > 0 && (found = readdir(dir))) {
 		struct incise_recalibration entry, *more;
 
-		if (!parse_name(found->d_name, &entry))
+		if (!incise_recalibration_parse(found->d_name, &entry))
 			continue;
 		more = realloc(*list, (size_t)(n + 1) * sizeof(*more));
 		if (!more) {
-			n = no_memory(folder, err);
+			n = incise_schema_no_memory(folder, err);
 			break;
 		}
 		*list = more;
@@ -137,14 +122,14 @@ static char *read_text(const char *folder, struct incise_recalibration *entry,
 	size_t size;
 
 	if (asprintf(&path, "%s/%s", folder, entry->file) < 0) {
-		no_memory(folder, err);
+		incise_schema_no_memory(folder, err);
 		return NULL;
 	}
-	text = incise_infile_read(path, &file_kind, &size, err);
+	text = incise_infile_read(path, &incise_recalibration_kind, &size, err);
 	free(path);
 	if (text && incise_sha256_text(text, size, entry->sha256)) {
 		free(text);
-		no_memory(folder, err);
+		incise_schema_no_memory(folder, err);
 		return NULL;
 	}
 	return text;
@@ -159,7 +144,7 @@ int incise_recalibrations(const char *path, struct incise_recalibration **list,
 	*list = NULL;
 	if (!folder)
 		return -errno;
-	n = read_folder(folder, list, err);
+	n = incise_recalibration_list(folder, list, err);
 	for (int i = 1; i < n; i++)
 		if (!(*list)[i].original) {
 			char *text = read_text(folder, &(*list)[i], err);
@@ -190,7 +175,7 @@ static int run(struct incise_recording *rec, char *sql, struct incise_error *err
 	if (rc == SQLITE_OK)
 		return 0;
 	return sql ? incise_schema_fail(rec->db, rec->path, err)
-		   : no_memory(rec->path, err);
+		   : incise_schema_no_memory(rec->path, err);
 }
 
 static int put_number(struct incise_recording *rec, const char *key, double value,
@@ -258,7 +243,7 @@ static int load(struct incise_recording *rec, struct incise_recalibrated *to,
 
 	to->calibration = own_calibration(&rec->meta);
 	if (asprintf(&path, "%s/%s", rec->path, to->entry.file) < 0)
-		return no_memory(rec->path, err);
+		return incise_schema_no_memory(rec->path, err);
 	rc = incise_calibration_update(path, &to->calibration, &why);
 	free(path);
 	if (rc)
@@ -282,14 +267,14 @@ static int load(struct incise_recording *rec, struct incise_recalibrated *to,
 int incise_recalibration_apply(struct incise_recording *rec, struct incise_error *err)
 {
 	struct incise_recalibration *list = NULL;
-	int n = read_folder(rec->path, &list, err), rc = n < 0 ? n : 0;
+	int n = incise_recalibration_list(rec->path, &list, err), rc = n < 0 ? n : 0;
 	char *text = NULL;
 
 	if (rc || list[0].active)
 		goto out;
 	rec->recalibrated = calloc(1, sizeof(*rec->recalibrated));
 	if (!rec->recalibrated) {
-		rc = no_memory(rec->path, err);
+		rc = incise_schema_no_memory(rec->path, err);
 		goto out;
 	}
 	rec->recalibrated->entry = list[n - 1];
@@ -303,22 +288,46 @@ out:
 	return rc;
 }
 
-void incise_recalibration_stream(const struct incise_recording *rec,
+/* The delay of a stream by a calibration, and its uncertainty; NAN: it has none. */
+static void find_delay(const struct incise_calibration *c, int stream, double *ms,
+		       double *sd_ms)
+{
+	const double delays[][2] = {
+		[INCISE_LEDGER_FORCE] = {c->force_delay_ms, c->force_delay_sd_ms},
+		[INCISE_LEDGER_TRACKER] = {c->tracker_delay_ms, c->tracker_delay_sd_ms},
+		[INCISE_LEDGER_CAMERA] = {c->camera_delay_ms, c->camera_delay_sd_ms},
+		[INCISE_LEDGER_WALL] = {NAN, NAN},
+	};
+
+	*ms = delays[stream][0];
+	*sd_ms = delays[stream][1];
+}
+
+void incise_recalibration_shift(const struct incise_calibration *calibration,
+				const struct incise_stream_source *source,
+				int64_t *shift_ns, double *variance_ns2)
+{
+	double old_ns = isnan(source->delay_ns) ? 0 : source->delay_ns;
+	double old_sd_ns = isnan(source->delay_sd_ns) ? 0 : source->delay_sd_ns;
+	double ms, sd_ms;
+
+	find_delay(calibration, source->stream, &ms, &sd_ms);
+	if (isnan(ms))
+		return;
+	*shift_ns = (int64_t)fmax(fmin(old_ns - ms * 1e6, DELAY_MAX_NS), -DELAY_MAX_NS);
+	if (!isnan(sd_ms))
+		*variance_ns2 = sd_ms * 1e6 * sd_ms * 1e6 - old_sd_ns * old_sd_ns;
+}
+
+void incise_recalibration_stream(const struct incise_calibration *calibration,
 				 struct incise_stream *stream)
 {
-	const struct incise_calibration *c;
-	double ms, sd_ms,
-		old_sd_ms = isnan(stream->delay_sd_ms) ? 0 : stream->delay_sd_ms;
+	double ms = NAN, sd_ms = NAN,
+	       old_sd_ms = isnan(stream->delay_sd_ms) ? 0 : stream->delay_sd_ms;
 
-	if (!rec->recalibrated)
-		return;
-	c = &rec->recalibrated->calibration;
-	if (!strcmp(stream->name, "force"))
-		ms = c->force_delay_ms, sd_ms = c->force_delay_sd_ms;
-	else if (!strcmp(stream->name, "tracker"))
-		ms = c->tracker_delay_ms, sd_ms = c->tracker_delay_sd_ms;
-	else
-		ms = c->camera_delay_ms, sd_ms = c->camera_delay_sd_ms;
+	for (int i = 0; i < INCISE_LEDGER_STREAMS; i++)
+		if (!strcmp(stream->name, incise_ledger_forms[i].stream))
+			find_delay(calibration, i, &ms, &sd_ms);
 	if (isnan(ms))
 		return;
 	stream->offset_ms += ms - stream->delay_ms;
@@ -362,143 +371,4 @@ void incise_recording_recalibration(const struct incise_recording *rec,
 		snprintf(active->file, sizeof(active->file), "%.63s/%.90s",
 			 session->info[i].name, of->entry.file);
 	}
-}
-
-/* --- recalibrating -------------------------------------------------------------------- */
-
-/* A recording that can be recalibrated. Returns 0 or -errno. */
-static int check(const char *path, struct incise_error *err)
-{
-	struct incise_recording *rec = incise_recording_open_original(path, err);
-	int rc = 0;
-
-	if (!rec)
-		return -errno;
-	if (rec->session)
-		rc = incise_error_set(err, EINVAL,
-				      "%s: is a joined recording, whose members have "
-				      "calibrations of their own; give one of them, for "
-				      "example %s",
-				      path, rec->session->members[0]->path);
-	else if (!rec->meta.complete && incise_recording_is_written(rec->path))
-		rc = incise_error_set(
-			err, EBUSY, "%s: is being recorded; wait for its end", rec->path);
-	incise_recording_close(rec);
-	return rc;
-}
-
-/* The name of the next entry; @list has at least one. */
-static int next_name(const char *path, const struct incise_recalibration *last,
-		     bool original, struct incise_recalibration *made,
-		     struct incise_error *err)
-{
-	const time_t now = time(NULL);
-	char date[32], name[64];
-	struct tm utc;
-	int number = number_of(last) + 1;
-
-	if (number > NUMBER_MAX)
-		return incise_error_set(err, E2BIG,
-					"%s: has %d calibrations, the most that a "
-					"recording can have",
-					path, NUMBER_MAX);
-	strftime(date, sizeof(date), "%Y%m%dT%H%M%SZ", gmtime_r(&now, &utc));
-	snprintf(name, sizeof(name), "%04d-%.16s.%s", number, date,
-		 original ? "original" : "conf");
-	if (!parse_name(name, made))
-		return incise_error_set(
-			err, EINVAL, "%s: the wall clock is at %s; set it", path, date);
-	made->active = true;
-	return 0;
-}
-
-static int write_entry(const char *folder, const struct incise_recalibration *entry,
-		       const char *text, size_t size, struct incise_error *err)
-{
-	struct incise_outfile *out;
-	char *path;
-
-	if (asprintf(&path, "%s/%s", folder, entry->file) < 0)
-		return no_memory(folder, err);
-	out = incise_outfile_open(path, err);
-	free(path);
-	if (!out)
-		return -errno;
-	/* A failed write is found by the commit. */
-	fwrite(text, 1, size, incise_outfile_stream(out));
-	return incise_outfile_commit(out, err);
-}
-
-/* Two that add at once would take one number; the lock ends with the file that is returned. */
-static int lock_folder(const char *folder, bool make, struct incise_error *err)
-{
-	char *path;
-	int fd;
-
-	if (asprintf(&path, "%s/" FOLDER, folder) < 0)
-		return no_memory(folder, err);
-	if (make && mkdir(path, 0777) && errno != EEXIST)
-		fd = incise_error_set(err, errno, "%s: %s", path, strerror(errno));
-	else
-		fd = open_folder(folder, err);
-	free(path);
-	if (fd >= 0)
-		flock(fd, LOCK_EX); /* some file systems have no locks */
-	return fd;
-}
-
-static int add(const char *folder, const char *calibration,
-	       struct incise_recalibration *made, struct incise_error *err)
-{
-	struct incise_recalibration *list = NULL;
-	size_t size = 0;
-	char *text = calibration ? incise_infile_read(calibration, &file_kind, &size, err)
-				 : NULL;
-	int fd, n = 0, rc = calibration && !text ? -errno : 0;
-
-	if (rc)
-		return rc;
-	fd = lock_folder(folder, text, err);
-	if (fd >= 0 || fd == -ENOENT)
-		n = read_folder(folder, &list, err);
-	rc = n > 0 ? 0 : n < 0 ? n : fd;
-	if (!rc && !calibration && list[0].active)
-		rc = incise_error_set(err, EALREADY,
-				      "%s: the calibration of the capture is active "
-				      "already; give -c FILE for another",
-				      folder);
-	if (!rc)
-		rc = next_name(folder, &list[n - 1], !calibration, made, err);
-	if (!rc && text && incise_sha256_text(text, size, made->sha256))
-		rc = no_memory(folder, err);
-	if (!rc)
-		rc = write_entry(folder, made, text ? text : "", size, err);
-	if (fd >= 0)
-		close(fd);
-	free(text);
-	free(list);
-	return rc;
-}
-
-int incise_recalibrate(const char *path, const char *calibration,
-		       struct incise_recalibration *made, struct incise_error *err)
-{
-	struct incise_recalibration entry;
-	struct incise_calibration values;
-	char *folder;
-	int rc = calibration ? incise_calibration_load(calibration, &values, err) : 0;
-
-	if (!rc)
-		rc = check(path, err);
-	if (rc)
-		return rc;
-	folder = incise_recording_folder(path, err);
-	if (!folder)
-		return -errno;
-	rc = add(folder, calibration, &entry, err);
-	free(folder);
-	if (!rc && made)
-		*made = entry;
-	errno = rc ? -rc : errno;
-	return rc;
 }

@@ -6,12 +6,13 @@
  *     meta      a temporary table of this connection, with the calibration's keys
  *     depth     from the poses and the calibrated tip  ╮
  *     frames    depth in another scale                 ╰ see source.h
- *     times     less the delays: see incise_row_times_open()
+ *     times     less the delays: see rows.h
  */
 #ifndef INCISE_RECALIBRATION_PRIVATE_H
 #define INCISE_RECALIBRATION_PRIVATE_H
 
 #include <incise/calibration.h>
+#include <incise/infile.h>
 #include <incise/recalibration.h>
 #include "recording.h"
 
@@ -28,11 +29,33 @@ struct incise_recalibrated {
  */
 int incise_recalibration_apply(struct incise_recording *rec, struct incise_error *err);
 
-/* Delays of a stream and their uncertainty by the active calibration. */
-void incise_recalibration_stream(const struct incise_recording *rec,
+/* What a calibration changes of the times of a source; one without its delay: nothing. */
+void incise_recalibration_shift(const struct incise_calibration *calibration,
+				const struct incise_stream_source *source,
+				int64_t *shift_ns, double *variance_ns2);
+
+/* Delays of a stream and their uncertainty by a calibration. */
+void incise_recalibration_stream(const struct incise_calibration *calibration,
 				 struct incise_stream *stream);
 
 /* "of the recording", or which one since when, for people; to be freed; NULL: no memory. */
 char *incise_recalibration_text(const struct incise_recording *rec);
+
+/* --- the folder ------------------------------------------------------------------------ */
+
+#define INCISE_RECALIBRATION_FOLDER "calibration" /* in that of the recording */
+
+/* As the recorder keeps of one: with the history of years. */
+extern const struct incise_infile_kind incise_recalibration_kind;
+
+/* "0001-20261127T054012Z.conf"; false: no calibration. */
+bool incise_recalibration_parse(const char *name, struct incise_recalibration *entry);
+
+/* Open it: a descriptor, or -errno; -ENOENT is no error. */
+int incise_recalibration_folder(const char *folder, struct incise_error *err);
+
+/* Its entries behind that of the capture, in order, to be freed in any case; returns how many there are. */
+int incise_recalibration_list(const char *folder, struct incise_recalibration **list,
+			      struct incise_error *err);
 
 #endif

@@ -1,23 +1,17 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Reading a recording; see incise/recording.h. The file is untrusted: it may be truncated,
- * altered or forged.
+ * One recording: its tables meta, streams and knots, see recording.h. The file is untrusted: it may be
+ * truncated, altered or forged.
  */
 #include <errno.h>
-#include <fcntl.h>
-#include <limits.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/file.h>
-#include <sys/stat.h>
-#include <unistd.h>
 #include "database.h"
 #include "recalibration.h"
 #include "recording.h"
-#include "session.h"
-#include "../ledger.h"
+#include "../old/old.h"
 #include "../schema.h"
 
 #define COUNT_MAX (1LL << 53)
@@ -81,7 +75,7 @@ static bool take_known(sqlite3_stmt *stmt, int column, double scale, double *to)
 
 struct item {
 	const char *key;
-	enum { TEXT, COUNT, REAL, REAL_OR_NULL } type;
+	enum { TEXT, COUNT, REAL, REAL_OR_NULL, REAL_OR_NAN } type;
 	void *to;
 	size_t size; /* of a text */
 	bool optional;
@@ -94,6 +88,10 @@ static bool take_item(sqlite3_stmt *stmt, const struct item *item)
 		return take_text(stmt, 0, false, item->to, item->size);
 	case COUNT:
 		return take_count(stmt, 0, item->to);
+	case REAL_OR_NAN:
+		if (!take_known(stmt, 0, 1, item->to))
+			*(double *)item->to = NAN;
+		return true;
 	default:
 		return take_known(stmt, 0, 1, item->to) &&
 		       (sqlite3_column_type(stmt, 0) == SQLITE_FLOAT ||
@@ -102,24 +100,17 @@ static bool take_item(sqlite3_stmt *stmt, const struct item *item)
 	}
 }
 
-/* Prepare and run a query for the value of a key. Returns a code of sqlite3_step(). */
-static int find_key(struct incise_recording *rec, const char *key, sqlite3_stmt **stmt)
-{
-	int rc = sqlite3_prepare_v2(rec->db, "SELECT value FROM meta WHERE key = ?", -1,
-				    stmt, NULL);
-
-	if (rc != SQLITE_OK)
-		return rc;
-	sqlite3_bind_text(*stmt, 1, key, -1, SQLITE_STATIC);
-	return sqlite3_step(*stmt);
-}
-
 static int read_item(struct incise_recording *rec, const struct item *item,
 		     struct incise_error *err)
 {
 	sqlite3_stmt *stmt = NULL;
-	int rc = find_key(rec, item->key, &stmt);
+	int rc = sqlite3_prepare_v2(rec->db, "SELECT value FROM meta WHERE key = ?", -1,
+				    &stmt, NULL);
 
+	if (rc == SQLITE_OK) {
+		sqlite3_bind_text(stmt, 1, item->key, -1, SQLITE_STATIC);
+		rc = sqlite3_step(stmt);
+	}
 	if ((rc == SQLITE_ROW && take_item(stmt, item)) ||
 	    (rc == SQLITE_DONE && item->optional))
 		rc = 0;
@@ -130,24 +121,6 @@ static int read_item(struct incise_recording *rec, const struct item *item,
 				      rc == SQLITE_ROW ? "out of range" : "missing");
 	else
 		rc = incise_schema_fail(rec->db, rec->path, err);
-	sqlite3_finalize(stmt);
-	return rc;
-}
-
-int incise_recording_number(struct incise_recording *rec, const char *key, double *value,
-			    struct incise_error *err)
-{
-	sqlite3_stmt *stmt = NULL;
-	int rc;
-
-	rec = incise_recording_member(rec,
-				      !strncmp(key, "tracker", 7) ? "tracker" : "force");
-	rc = find_key(rec, key, &stmt);
-	if (rc != SQLITE_ROW || !take_known(stmt, 0, 1, value))
-		*value = NAN;
-	rc = rc == SQLITE_ROW || rc == SQLITE_DONE
-		     ? 0
-		     : incise_schema_fail(rec->db, rec->path, err);
 	sqlite3_finalize(stmt);
 	return rc;
 }
@@ -174,6 +147,7 @@ static int read_tip(struct incise_recording *rec, struct incise_error *err)
 static int read_meta(struct incise_recording *rec, struct incise_error *err)
 {
 	struct incise_recording_info *info = &rec->meta;
+	struct incise_recording_numbers *numbers = &rec->numbers;
 	uint64_t complete = 0, bits = 0, newtons = 0;
 	const struct item items[] = {
 		{"complete", COUNT, &complete, 0, false},
@@ -199,10 +173,21 @@ static int read_meta(struct incise_recording *rec, struct incise_error *err)
 		/* Older recordings have none: they start at 0 V, and are in volts. */
 		{"force_offset_V", REAL, &info->offset_V, 0, true},
 		{"force_newtons", COUNT, &newtons, 0, true},
+		{"force_hz", REAL_OR_NAN, &numbers->force_hz, 0, true},
+		{"force_zero_sd_mV", REAL_OR_NAN, &numbers->zero_sd_mV, 0, true},
+		{"force_zero_samples", REAL_OR_NAN, &numbers->zero_samples, 0, true},
+		{"tracker_hz", REAL_OR_NAN, &numbers->tracker_hz, 0, true},
+		{"tracker_latency_ns", REAL_OR_NAN, &numbers->tracker_latency_ns, 0,
+		 true},
+		{"cuts", REAL_OR_NAN, &numbers->cuts, 0, true},
+		{"depth_max_mm", REAL_OR_NAN, &numbers->depth_max_mm, 0, true},
+		{"force_max_N", REAL_OR_NAN, &numbers->force_max_N, 0, true},
 	};
 	bool none; /* no force channel */
 	int rc = 0;
 
+	*numbers =
+		(struct incise_recording_numbers){NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN};
 	for (size_t i = 0; i < sizeof(items) / sizeof(*items) && !rc; i++)
 		rc = read_item(rec, &items[i], err);
 	if (!rc)
@@ -275,53 +260,189 @@ int incise_recording_need_zero(const struct incise_recording *rec,
 				rec->path);
 }
 
-/* --- opening ----------------------------------------------------------------------- */
+/* --- tables streams and knots ---------------------------------------------------------- */
 
-/* The choice behind a session's name, "session.rec:CHOICE"; NULL: there is none. */
-static const char *choice_of(const char *path)
+static bool take_stream(sqlite3_stmt *stmt, struct incise_stream *s)
 {
-	const char *slash = strrchr(path, '/'),
-		   *colon = strrchr(slash ? slash : path, ':');
-
-	return colon && colon > path ? colon + 1 : NULL;
+	s->timestamped = sqlite3_column_int(stmt, 2);
+	return take_text(stmt, 0, true, s->name, sizeof(s->name)) && *s->name &&
+	       take_text(stmt, 1, true, s->device, sizeof(s->device)) &&
+	       take_known(stmt, 3, 1, &s->nominal_hz) &&
+	       take_known(stmt, 4, 1e-6, &s->delay_ms) &&
+	       take_known(stmt, 5, 1e-6, &s->delay_sd_ms) &&
+	       take_count(stmt, 6, &s->rows) && take_count(stmt, 7, &s->lost) &&
+	       take_count(stmt, 8, &s->late) && take_known(stmt, 9, 1, &s->rate_hz) &&
+	       take_known(stmt, 10, 1, &s->drift_ppm) &&
+	       take_known(stmt, 11, 1, &s->drift_sd_ppm) &&
+	       take_known(stmt, 12, 1e-6, &s->jitter_ms) &&
+	       take_known(stmt, 13, 1e-6, &s->jitter_max_ms) &&
+	       take_known(stmt, 14, 1e-6, &s->offset_ms) &&
+	       take_known(stmt, 15, 1e-6, &s->offset_sd_ms) &&
+	       take_text(stmt, 16, true, s->ended, sizeof(s->ended));
 }
 
-/* Without trailing slashes. */
-char *incise_recording_folder(const char *path, struct incise_error *err)
+/* Table streams, and what the sources need of it. Returns the number of its rows, or -errno. */
+static int read_table(struct incise_recording *rec, struct incise_error *err)
 {
-	size_t length = strlen(path);
-	char *folder;
-	struct stat st;
+	sqlite3_stmt *stmt;
+	int n = 0, rc;
 
-	while (length > 1 && path[length - 1] == '/')
-		length--;
-	if (asprintf(&folder, "%.*s.part", (int)length, path) < 0) {
-		incise_error_set(err, ENOMEM, "%s: out of memory", path);
-		return NULL;
-	}
-	folder[length] = 0;
-	if (stat(folder, &st) && errno == ENOENT) {
-		folder[length] = '.';
-		if (stat(folder, &st) && errno == ENOENT) {
-			incise_error_set(err, ENOENT,
-					 "%s: no such recording; check name and folder",
-					 path);
-			free(folder);
-			return NULL;
+	if (sqlite3_prepare_v2(
+		    rec->db,
+		    "SELECT name, device, stamped, nominal_hz, delay_ns, delay_sd_ns, "
+		    "rows, lost, late, rate_hz, drift_ppm, drift_sd_ppm, jitter_ns, "
+		    "jitter_max_ns, offset_ns, offset_sd_ns, ended, grain_ns FROM "
+		    "streams ORDER BY rowid",
+		    -1, &stmt, NULL) != SQLITE_OK)
+		return incise_schema_fail(rec->db, rec->path, err);
+	while ((rc = sqlite3_step(stmt)) == SQLITE_ROW && n < INCISE_STREAMS_MAX) {
+		struct incise_stream *s = &rec->table[n++];
+
+		if (!take_stream(stmt, s)) {
+			n = damaged(rec, "streams", "a value is out of range", err);
+			sqlite3_finalize(stmt);
+			return n;
 		}
+		if (!strcmp(s->name, "tracker"))
+			rec->own[INCISE_LEDGER_TRACKER].grain_ns =
+				sqlite3_column_double(stmt, 17);
 	}
-	return folder;
+	if (rc == SQLITE_ROW)
+		n = damaged(rec, "streams", "more rows than streams", err);
+	else if (rc != SQLITE_DONE)
+		n = incise_schema_fail(rec->db, rec->path, err);
+	sqlite3_finalize(stmt);
+	return n;
 }
 
-bool incise_recording_is_written(const char *folder)
+int incise_recording_streams(struct incise_recording *rec,
+			     struct incise_stream streams[INCISE_STREAMS_MAX],
+			     struct incise_error *err)
 {
-	int fd = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-	bool is = fd >= 0 && flock(fd, LOCK_SH | LOCK_NB) && errno == EWOULDBLOCK;
+	int n = 0;
 
-	if (fd >= 0)
-		close(fd);
-	return is;
+	if (!rec->session && rec->n_table < 0)
+		rec->n_table = read_table(rec, err);
+	if (!rec->session) {
+		memcpy(streams, rec->table, sizeof(rec->table));
+		for (int i = 0; i < rec->n_table && rec->recalibrated; i++)
+			incise_recalibration_stream(&rec->recalibrated->calibration,
+						    &streams[i]);
+		return rec->n_table;
+	}
+	/* Those of a session: each of the member that it is of. */
+	for (int i = 0; i < INCISE_STREAMS_MAX; i++) {
+		struct incise_stream of_member[INCISE_STREAMS_MAX];
+		int found =
+			incise_recording_streams(rec->streams[i]->file, of_member, err);
+
+		if (found < 0)
+			return found;
+		for (int k = 0; k < found; k++)
+			if (!strcmp(of_member[k].name, incise_ledger_forms[i].stream))
+				streams[n++] = of_member[k];
+	}
+	return n;
 }
+
+static bool take_knot(sqlite3_stmt *stmt, const struct incise_timeline_knot *last,
+		      struct incise_timeline_knot *knot)
+{
+	int64_t seq = sqlite3_column_int64(stmt, 0);
+
+	knot->seq = seq;
+	knot->t_ns = sqlite3_column_int64(stmt, 1);
+	knot->sd_ns = sqlite3_column_double(stmt, 2);
+	knot->starts = sqlite3_column_int(stmt, 3);
+	return sqlite3_column_type(stmt, 0) == SQLITE_INTEGER && seq >= 0 &&
+	       sqlite3_column_type(stmt, 1) == SQLITE_INTEGER &&
+	       knot->t_ns >= -TIME_MAX && knot->t_ns <= TIME_MAX &&
+	       sqlite3_column_type(stmt, 2) == SQLITE_FLOAT && knot->sd_ns >= 0 &&
+	       knot->sd_ns < 1e18 &&
+	       (!last || (knot->seq > last->seq && knot->t_ns > last->t_ns));
+}
+
+static int read_knots(struct incise_stream_source *to, const char *stream,
+		      struct incise_error *err)
+{
+	struct incise_recording *rec = to->file;
+	sqlite3_stmt *stmt;
+	int rc, n = 0;
+
+	if (!to->knots)
+		to->knots = calloc(INCISE_TIMELINE_KNOTS_MAX, sizeof(*to->knots));
+	if (!to->knots)
+		return incise_schema_no_memory(rec->path, err);
+	if (sqlite3_prepare_v2(rec->db,
+			       "SELECT seq, t_ns, sd_ns, begins FROM knots WHERE stream "
+			       "= ? ORDER BY knot",
+			       -1, &stmt, NULL) != SQLITE_OK)
+		return incise_schema_fail(rec->db, rec->path, err);
+	sqlite3_bind_text(stmt, 1, stream, -1, SQLITE_STATIC);
+	while ((rc = sqlite3_step(stmt)) == SQLITE_ROW) {
+		if (n == INCISE_TIMELINE_KNOTS_MAX ||
+		    !take_knot(stmt, n ? &to->knots[n - 1] : NULL, &to->knots[n])) {
+			sqlite3_finalize(stmt);
+			return damaged(rec, "knots", "a row is invalid", err);
+		}
+		n++;
+	}
+	rc = rc == SQLITE_DONE ? 0 : incise_schema_fail(rec->db, rec->path, err);
+	sqlite3_finalize(stmt);
+	to->n_knots = n < 2 ? 0 : n;
+	return rc;
+}
+
+/* Whether rows of the tracker can be off its line: then its rate is known, and they have no times of their own. */
+static bool may_be_off(const struct incise_stream_source *source,
+		       const struct incise_stream *row)
+{
+	const double hz = source->file->numbers.tracker_hz;
+
+	return source->stream == INCISE_LEDGER_TRACKER && hz >= RATE_MIN &&
+	       hz <= RATE_MAX && !row->timestamped &&
+	       fabs(row->delay_ms) < DELAY_MAX_MS &&
+	       (source->n_knots || !(row->nominal_hz > 0));
+}
+
+int incise_stream_resolve(struct incise_stream_source *source, struct incise_error *err)
+{
+	struct incise_recording *rec = source->file;
+	const char *name = incise_ledger_forms[source->stream].stream;
+	int rc;
+
+	if (source->known)
+		return 0;
+	if (rec->n_table < 0)
+		rec->n_table = read_table(rec, err);
+	if (rec->n_table < 0)
+		return rec->n_table;
+	rc = read_knots(source, name, err);
+	/* For a stream that is not in the table. */
+	source->delay_ns = source->stream == INCISE_LEDGER_TRACKER
+				   ? rec->numbers.tracker_latency_ns
+				   : NAN;
+	for (int i = 0; i < rec->n_table; i++) {
+		const struct incise_stream *row = &rec->table[i];
+
+		if (strcmp(row->name, name))
+			continue;
+		source->delay_ns = row->delay_ms * 1e6;
+		source->delay_sd_ns = row->delay_sd_ms * 1e6;
+		source->offset_sd_ns = row->offset_sd_ms * 1e6;
+		if (may_be_off(source, row))
+			source->period_ns = 1e9 / rec->numbers.tracker_hz;
+	}
+	if (!(source->grain_ns > 0 && source->grain_ns < DELAY_MAX_MS * 1e6))
+		source->grain_ns = 0;
+	if (rec->recalibrated)
+		incise_recalibration_shift(&rec->recalibrated->calibration, source,
+					   &source->shift_ns, &source->variance_ns2);
+	source->known = !rc;
+	return rc;
+}
+
+/* --- the recording ---------------------------------------------------------------------- */
 
 static char *find_name(const char *folder)
 {
@@ -343,352 +464,66 @@ static char *find_name(const char *folder)
 	return name;
 }
 
-static int open_database(struct incise_recording *rec, struct incise_error *err)
+struct incise_recording *incise_recording_new(char *folder)
+{
+	struct incise_recording *rec = calloc(1, sizeof(*rec));
+
+	if (rec)
+		rec->name = find_name(folder);
+	if (!rec || !rec->name) {
+		free(rec);
+		free(folder);
+		return NULL;
+	}
+	rec->path = folder;
+	rec->n_table = -1;
+	for (int i = 0; i < INCISE_LEDGER_FORMS; i++) {
+		rec->own[i].stream = i;
+		rec->own[i].file = rec;
+		rec->streams[i] = &rec->own[i];
+	}
+	return rec;
+}
+
+int incise_recording_read(struct incise_recording *rec, enum incise_recording_how how,
+			  struct incise_error *err)
 {
 	int rc = incise_database_open(rec->path, &rec->db, err);
 
-	if (rc)
-		return rc;
 	/* SQLite checks pages as it reads them. */
-	if (sqlite3_exec(rec->db, "PRAGMA cell_size_check=ON; BEGIN", NULL, NULL, NULL))
-		return incise_schema_fail(rec->db, rec->path, err);
-	return 0;
-}
-
-/* The folder of a recording, or of a session with a choice behind its name. */
-static int find_any_folder(struct incise_recording *rec, const char *path,
-			   const char **choice, struct incise_error *err)
-{
-	char *start;
-
-	*choice = choice_of(path);
-	rec->path = incise_recording_folder(path, *choice ? NULL : err);
-	if (rec->path)
-		*choice = NULL;
-	if (rec->path || !*choice)
-		return rec->path ? 0 : -errno;
-	start = strndup(path, (size_t)(*choice - 1 - path));
-	if (!start)
-		return incise_error_set(err, ENOMEM, "%s: out of memory", path);
-	rec->path = incise_recording_folder(start, NULL);
-	free(start);
-	if (rec->path)
-		return 0;
-	/* Neither is there: the name is what was given. */
-	free(incise_recording_folder(path, err));
-	return -ENOENT;
-}
-
-/* Open the members; the path is then that under which the same is opened again. */
-static int open_session(struct incise_recording *rec, const char *choice,
-			struct incise_error *err)
-{
-	int rc = incise_session_open(rec, rec->path, choice ? choice : "", err);
-	char *path;
-
-	if (rc || !choice)
-		return rc;
-	if (asprintf(&path, "%s:%s", rec->path, choice) < 0)
-		return incise_error_set(err, ENOMEM, "%s: out of memory", rec->path);
-	free(rec->path);
-	rec->path = path;
-	return 0;
-}
-
-static int open_one(struct incise_recording *rec, const char *choice, bool original,
-		    struct incise_error *err)
-{
-	int rc = incise_schema_check(rec->db, rec->path, &rec->form, err);
-
-	if (!rc && choice)
-		rc = incise_error_set(err, EINVAL,
-				      "%s: is one recording, not a joined one; give it "
-				      "without ':%s'",
-				      rec->path, choice);
+	if (!rc &&
+	    sqlite3_exec(rec->db, "PRAGMA cell_size_check=ON; BEGIN", NULL, NULL, NULL))
+		rc = incise_schema_fail(rec->db, rec->path, err);
+	if (!rc && incise_schema_is_joined(rec->db))
+		return 1;
+	if (!rc)
+		rc = incise_schema_form(rec->db, rec->path, &rec->form, err);
+	if (!rc)
+		rc = rec->form == INCISE_SCHEMA_VERSION
+			     ? incise_schema_check(rec->db, rec->path,
+						   incise_schema_tables, err)
+			     : incise_old_adopt(rec, how == INCISE_RECORDING_OLDER, err);
 	if (!rc)
 		rc = read_meta(rec, err);
-	if (!rc && !original)
+	if (!rc && how == INCISE_RECORDING_ACTIVE)
 		rc = incise_recalibration_apply(rec, err);
-	return rc || !rec->recalibrated ? rc : read_meta(rec, err);
+	if (!rc && rec->recalibrated)
+		rc = read_meta(rec, err);
+	/* Readers of a stream report what is damaged. */
+	for (int i = 0; i < INCISE_LEDGER_FORMS && !rc; i++)
+		incise_stream_resolve(&rec->own[i], NULL);
+	return rc;
 }
 
-static struct incise_recording *open_path(const char *path, bool any, bool original,
-					  struct incise_error *err)
-{
-	struct incise_recording *rec = calloc(1, sizeof(*rec));
-	const char *choice;
-	int rc;
-
-	if (!rec) {
-		incise_error_set(err, ENOMEM, "%s: out of memory", path);
-		return NULL;
-	}
-	rc = find_any_folder(rec, path, &choice, err);
-	if (!rc) {
-		rec->name = find_name(rec->path);
-		if (!rec->name)
-			rc = incise_error_set(err, ENOMEM, "%s: out of memory", path);
-	}
-	if (!rc)
-		rc = open_database(rec, err);
-	if (!rc && incise_session_is(rec->db))
-		rc = open_session(rec, choice || !any ? choice : "*", err);
-	else if (!rc)
-		rc = open_one(rec, choice, original, err);
-	if (!rc)
-		return rec;
-	incise_recording_close(rec);
-	errno = -rc;
-	return NULL;
-}
-
-struct incise_recording *incise_recording_open(const char *path, struct incise_error *err)
-{
-	return open_path(path, false, false, err);
-}
-
-struct incise_recording *incise_recording_open_any(const char *path,
-						   struct incise_error *err)
-{
-	return open_path(path, true, false, err);
-}
-
-struct incise_recording *incise_recording_open_original(const char *path,
-							struct incise_error *err)
-{
-	return open_path(path, true, true, err);
-}
-
-const char *incise_recording_name(const struct incise_recording *rec)
-{
-	return rec->name;
-}
-
-void incise_recording_close(struct incise_recording *rec)
+void incise_recording_free(struct incise_recording *rec)
 {
 	if (!rec)
 		return;
-	incise_session_close(rec->session);
 	sqlite3_close(rec->db);
+	for (int i = 0; i < INCISE_LEDGER_FORMS; i++)
+		free(rec->own[i].knots);
 	free(rec->recalibrated);
 	free(rec->path);
 	free(rec->name);
 	free(rec);
-}
-
-/* --- tables streams and knots ---------------------------------------------------------- */
-
-static bool take_stream(sqlite3_stmt *stmt, struct incise_stream *stream)
-{
-	struct incise_stream *s = stream;
-
-	s->timestamped = sqlite3_column_int(stmt, 2);
-	return take_text(stmt, 0, true, s->name, sizeof(s->name)) && *s->name &&
-	       take_text(stmt, 1, true, s->device, sizeof(s->device)) &&
-	       take_known(stmt, 3, 1, &s->nominal_hz) &&
-	       take_known(stmt, 4, 1e-6, &s->delay_ms) &&
-	       take_known(stmt, 5, 1e-6, &s->delay_sd_ms) &&
-	       take_count(stmt, 6, &s->rows) && take_count(stmt, 7, &s->lost) &&
-	       take_count(stmt, 8, &s->late) && take_known(stmt, 9, 1, &s->rate_hz) &&
-	       take_known(stmt, 10, 1, &s->drift_ppm) &&
-	       take_known(stmt, 11, 1, &s->drift_sd_ppm) &&
-	       take_known(stmt, 12, 1e-6, &s->jitter_ms) &&
-	       take_known(stmt, 13, 1e-6, &s->jitter_max_ms) &&
-	       take_known(stmt, 14, 1e-6, &s->offset_ms) &&
-	       take_known(stmt, 15, 1e-6, &s->offset_sd_ms) &&
-	       take_text(stmt, 16, true, s->ended, sizeof(s->ended));
-}
-
-/* The streams of a session: each of the member that it is of. */
-static int member_streams(struct incise_recording *rec,
-			  struct incise_stream streams[INCISE_STREAMS_MAX],
-			  struct incise_error *err)
-{
-	int n = 0;
-
-	for (int i = 0; i < INCISE_STREAMS_MAX; i++) {
-		struct incise_stream of_member[INCISE_STREAMS_MAX];
-		int found = incise_recording_streams(
-			incise_recording_member(rec, incise_ledger_forms[i].table),
-			of_member, err);
-
-		if (found < 0)
-			return found;
-		for (int k = 0; k < found; k++)
-			if (!strcmp(of_member[k].name, incise_ledger_forms[i].stream))
-				streams[n++] = of_member[k];
-	}
-	return n;
-}
-
-int incise_recording_streams(struct incise_recording *rec,
-			     struct incise_stream streams[INCISE_STREAMS_MAX],
-			     struct incise_error *err)
-{
-	sqlite3_stmt *stmt;
-	int n = 0, rc;
-
-	if (rec->session)
-		return member_streams(rec, streams, err);
-	if (rec->form < 2)
-		return 0;
-	if (sqlite3_prepare_v2(
-		    rec->db,
-		    "SELECT name, device, stamped, nominal_hz, delay_ns, delay_sd_ns, "
-		    "rows, lost, late, rate_hz, drift_ppm, drift_sd_ppm, jitter_ns, "
-		    "jitter_max_ns, offset_ns, offset_sd_ns, ended FROM streams ORDER BY "
-		    "rowid",
-		    -1, &stmt, NULL) != SQLITE_OK)
-		return incise_schema_fail(rec->db, rec->path, err);
-	while ((rc = sqlite3_step(stmt)) == SQLITE_ROW && n < INCISE_STREAMS_MAX)
-		if (!take_stream(stmt, &streams[n++])) {
-			n = damaged(rec, "streams", "a value is out of range", err);
-			sqlite3_finalize(stmt);
-			return n;
-		}
-	if (rc == SQLITE_ROW)
-		n = damaged(rec, "streams", "more rows than streams", err);
-	else if (rc != SQLITE_DONE)
-		n = incise_schema_fail(rec->db, rec->path, err);
-	sqlite3_finalize(stmt);
-	return n;
-}
-
-static bool take_knot(sqlite3_stmt *stmt, const struct incise_timeline_knot *last,
-		      struct incise_timeline_knot *knot)
-{
-	int64_t seq = sqlite3_column_int64(stmt, 0);
-
-	knot->seq = seq;
-	knot->t_ns = sqlite3_column_int64(stmt, 1);
-	knot->sd_ns = sqlite3_column_double(stmt, 2);
-	knot->starts = sqlite3_column_int(stmt, 3);
-	return sqlite3_column_type(stmt, 0) == SQLITE_INTEGER && seq >= 0 &&
-	       sqlite3_column_type(stmt, 1) == SQLITE_INTEGER &&
-	       knot->t_ns >= -TIME_MAX && knot->t_ns <= TIME_MAX &&
-	       sqlite3_column_type(stmt, 2) == SQLITE_FLOAT && knot->sd_ns >= 0 &&
-	       knot->sd_ns < 1e18 &&
-	       (!last || (knot->seq > last->seq && knot->t_ns > last->t_ns));
-}
-
-/* Of the tracker's arrivals; 0: none, or not known. */
-static double read_grain(struct incise_recording *rec)
-{
-	sqlite3_stmt *stmt = NULL;
-	double grain_ns = 0;
-
-	if (sqlite3_prepare_v2(rec->db,
-			       "SELECT grain_ns FROM streams WHERE name = 'tracker'", -1,
-			       &stmt, NULL) == SQLITE_OK &&
-	    sqlite3_step(stmt) == SQLITE_ROW)
-		grain_ns = sqlite3_column_double(stmt, 0);
-	sqlite3_finalize(stmt);
-	return grain_ns > 0 && grain_ns < DELAY_MAX_MS * 1e6 ? grain_ns : 0;
-}
-
-static int fit(struct incise_recording *rec, struct incise_recording_line *line,
-	       const struct incise_stream *stream, double period_ns,
-	       struct incise_error *err)
-{
-	const struct incise_fit_setup setup = {
-		.knots = line->knots,
-		.n_knots = line->n,
-		.period_ns = period_ns,
-		.delay_ns = llrint(stream->delay_ms * 1e6),
-		.delay_sd_ns = isnan(stream->delay_sd_ms) ? 0 : stream->delay_sd_ms * 1e6,
-		.grain_ns = read_grain(rec),
-	};
-
-	line->others = incise_others_new(rec, &setup);
-	return line->others
-		       ? 0
-		       : incise_error_set(err, ENOMEM, "%s: out of memory", rec->path);
-}
-
-/* The rows of the tracker that are not on the line. */
-static int find_others(struct incise_recording *rec, struct incise_recording_line *line,
-		       struct incise_error *err)
-{
-	struct incise_stream streams[INCISE_STREAMS_MAX];
-	int n = incise_recording_streams(rec, streams, err), rc = 0;
-	double hz = NAN;
-
-	if (n > 0)
-		rc = incise_recording_number(rec, "tracker_hz", &hz, err);
-	for (int i = 0; i < n && !rc && hz >= RATE_MIN && hz <= RATE_MAX; i++)
-		if (!strcmp(streams[i].name, "tracker") && !streams[i].timestamped &&
-		    fabs(streams[i].delay_ms) < DELAY_MAX_MS &&
-		    (line->n || !(streams[i].nominal_hz > 0)))
-			rc = fit(rec, line, &streams[i], 1e9 / hz, err);
-	return n < 0 ? n : rc;
-}
-
-void incise_recording_line_free(struct incise_recording_line *line)
-{
-	incise_others_free(line->others);
-	line->others = NULL;
-}
-
-int incise_recording_line(struct incise_recording *rec, const char *stream,
-			  struct incise_recording_line *line, struct incise_error *err)
-{
-	sqlite3_stmt *stmt;
-	int rc;
-
-	rec = incise_recording_member(rec, !strcmp(stream, "camera") ? "frames" : stream);
-	line->n = 0;
-	line->others = NULL;
-	if (rec->form < 2)
-		return 0;
-	if (sqlite3_prepare_v2(rec->db,
-			       "SELECT seq, t_ns, sd_ns, begins FROM knots WHERE stream "
-			       "= ? ORDER BY knot",
-			       -1, &stmt, NULL) != SQLITE_OK)
-		return incise_schema_fail(rec->db, rec->path, err);
-	sqlite3_bind_text(stmt, 1, stream, -1, SQLITE_STATIC);
-	while ((rc = sqlite3_step(stmt)) == SQLITE_ROW) {
-		int n = line->n;
-
-		if (n == INCISE_TIMELINE_KNOTS_MAX ||
-		    !take_knot(stmt, n ? &line->knots[n - 1] : NULL, &line->knots[n])) {
-			sqlite3_finalize(stmt);
-			return damaged(rec, "knots", "a row is invalid", err);
-		}
-		line->n++;
-	}
-	if (rc != SQLITE_DONE) {
-		rc = incise_schema_fail(rec->db, rec->path, err);
-		sqlite3_finalize(stmt);
-		return rc;
-	}
-	sqlite3_finalize(stmt);
-	if (line->n < 2)
-		line->n = 0;
-	return strcmp(stream, "tracker") ? 0 : find_others(rec, line, err);
-}
-
-/* The row among the others, or NULL. */
-static const struct incise_fit_time *find_other(const struct incise_recording_line *line,
-						uint64_t seq)
-{
-	return line->others ? incise_others_find(line->others, seq) : NULL;
-}
-
-int64_t incise_recording_time(const struct incise_recording_line *line, uint64_t seq,
-			      int64_t t_ns)
-{
-	const struct incise_fit_time *other = find_other(line, seq);
-
-	if (other)
-		return line->n ? other->t_ns : t_ns - llrint(other->held_ns);
-	return line->n ? incise_timeline_at(line->knots, line->n, seq) : t_ns;
-}
-
-double incise_recording_time_sd(const struct incise_recording_line *line, uint64_t seq)
-{
-	const struct incise_fit_time *other = find_other(line, seq);
-
-	if (other)
-		return other->sd_ns;
-	return line->n ? incise_timeline_sd(line->knots, line->n, seq) : NAN;
 }

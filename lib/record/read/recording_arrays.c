@@ -116,8 +116,6 @@ int incise_recording_values(struct incise_recording *recording, const char *name
 	if (!source)
 		return incise_error_set(err, EINVAL, "no values '%s' in a recording",
 					name);
-	if (source == &sources[2] && recording->form < 2)
-		return 0;
 	rc = array_open(&array, recording, source->table, source->columns, sizeof(*to),
 			err);
 	while (!rc && (to = array_next(&array, &rc, err))) {
@@ -243,10 +241,6 @@ int incise_recording_lengths(struct incise_recording *recording,
 	int rc;
 
 	*lengths = NULL;
-	if (recording->form < 2)
-		return incise_error_set(err, EINVAL,
-					"%s: has an older format, without frames",
-					recording->path);
 	rc = array_open(&l.frames, recording, "frames", "seq, t_ns, length_px, quality",
 			sizeof(**lengths), err);
 	if (!rc)
@@ -368,7 +362,7 @@ int incise_depth_pairs(struct incise_recording *recording,
 	int rc = incise_recording_measure(recording, &info, err);
 
 	*pairs = NULL;
-	if (rc || recording->form < 2)
+	if (rc)
 		return rc;
 	incise_depth_init(&p.depth, info.surface_point_mm, info.surface_normal);
 	find_axes(&p);

@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <incise/wall.h>
+#include "../schema.h"
 #include "recording.h"
 #include "session.h"
 #include "source.h"
@@ -65,8 +66,7 @@ static int read_points(struct incise_recording *rec, struct incise_wall_point **
 				       ? realloc(*points, capacity * sizeof(*more))
 				       : NULL;
 			if (!more) {
-				rc = incise_error_set(err, ENOMEM, "%s: out of memory",
-						      rec->path);
+				rc = incise_schema_no_memory(rec->path, err);
 				break;
 			}
 			*points = more;
@@ -84,19 +84,17 @@ struct incise_wall *incise_recording_wall(struct incise_recording *rec,
 {
 	struct incise_wall_point *points = NULL;
 	struct incise_wall *wall = NULL;
+	/* A session's clock is that of its first member. */
+	struct incise_recording *file = rec->streams[INCISE_LEDGER_WALL]->file;
 	size_t n = 0;
-	int rc = 0;
+	int rc = read_points(file, &points, &n, err);
 
-	if (rec->session)
-		return incise_session_wall(rec->session, err);
-	if (rec->form >= 3)
-		rc = read_points(rec, &points, &n, err);
 	if (!rc && !n)
 		rc = incise_error_set(
-			err, ENODATA, "%s: has no wall time: %s", rec->path,
-			rec->form < 3 ? "it was made by an older incise"
-				      : "its clock was simulated, or it was recorded "
-					"without a clock source");
+			err, ENODATA,
+			"%s: has no wall time: its clock was simulated, or it was "
+			"recorded without a clock source",
+			file->path);
 	if (!rc) {
 		wall = incise_wall_new(points, n);
 		if (!wall)
@@ -105,7 +103,13 @@ struct incise_wall *incise_recording_wall(struct incise_recording *rec,
 						      ? "%s: damaged: table wall: a "
 							"value is out of range or order"
 						      : "%s: out of memory",
-					      rec->path);
+					      file->path);
+	}
+	if (wall && rec->session) {
+		wall = incise_session_extend(rec->session, wall);
+		if (!wall)
+			rc = incise_error_set(err, errno, "%s: its wall time: %s",
+					      file->path, strerror(errno));
 	}
 	free(points);
 	if (rc)

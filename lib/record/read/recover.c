@@ -24,27 +24,6 @@ static bool is_hidden(const char *name)
 	return !strcmp(name, ".") || !strcmp(name, "..");
 }
 
-/* Remove a copy that failed, with all that is in it. */
-static void remove_folder(const char *path)
-{
-	DIR *folder = opendir(path);
-	struct dirent *entry;
-
-	while (folder && (entry = readdir(folder))) {
-		char *name;
-
-		if (is_hidden(entry->d_name) ||
-		    asprintf(&name, "%s/%s", path, entry->d_name) < 0)
-			continue;
-		if (unlink(name) && (errno == EISDIR || errno == EPERM))
-			remove_folder(name);
-		free(name);
-	}
-	if (folder)
-		closedir(folder);
-	rmdir(path);
-}
-
 static int bring_folder(const char *from, const char *to, bool top,
 			struct incise_error *err);
 
@@ -90,7 +69,7 @@ static int bring_folder(const char *from, const char *to, bool top,
 			continue;
 		if (asprintf(&old, "%s/%s", from, name) < 0 ||
 		    asprintf(&new, "%s/%s", to, name) < 0)
-			rc = incise_error_set(err, ENOMEM, "%s: out of memory", from);
+			rc = incise_schema_no_memory(from, err);
 		else
 			rc = bring(old, new, top, err);
 		free(old);
@@ -100,17 +79,6 @@ static int bring_folder(const char *from, const char *to, bool top,
 	return rc;
 }
 
-/* Nothing that cannot be read gets the final name. */
-static int try_it(const char *path, struct incise_error *err)
-{
-	struct incise_recording *recording = incise_recording_open_any(path, err);
-
-	if (!recording)
-		return -errno;
-	incise_recording_close(recording);
-	return 0;
-}
-
 static int recover_to(const char *from, const char *to, bool damaged,
 		      struct incise_recovered *made, struct incise_error *err)
 {
@@ -118,14 +86,14 @@ static int recover_to(const char *from, const char *to, bool damaged,
 	int rc;
 
 	if (asprintf(&file, "%s/%s", to, INCISE_SCHEMA_DB) < 0)
-		return incise_error_set(err, ENOMEM, "%s: out of memory", to);
+		return incise_schema_no_memory(to, err);
 	rc = incise_database_recover(from, file, err);
 	free(file);
 	if (!rc)
 		rc = bring_folder(from, to, true, err);
 	if (!rc)
 		rc = incise_recording_convert(to, from, damaged, made, err);
-	return rc ? rc : try_it(to, err);
+	return rc ? rc : incise_recording_try(to, err);
 }
 
 int incise_recording_recover(const char *path, const char *output, bool damaged,
@@ -143,7 +111,7 @@ int incise_recording_recover(const char *path, const char *output, bool damaged,
 		return -errno;
 	if (asprintf(&part, "%s.part", output) < 0) {
 		free(folder);
-		return incise_error_set(err, ENOMEM, "%s: out of memory", output);
+		return incise_schema_no_memory(output, err);
 	}
 	if (mkdir(part, 0777))
 		rc = incise_error_set(err, errno,
@@ -155,7 +123,7 @@ int incise_recording_recover(const char *path, const char *output, bool damaged,
 			rc = incise_error_set(err, errno, "%s: %s", output,
 					      strerror(errno));
 		if (rc)
-			remove_folder(part);
+			incise_database_remove(part);
 	}
 	free(part);
 	free(folder);

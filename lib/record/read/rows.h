@@ -16,20 +16,47 @@
 #include <stdint.h>
 #include <incise/calibration.h>
 #include <incise/error.h>
+#include "../time/fit.h"
 #include "source.h"
+
+/* --- the clock of a session -------------------------------------------------------------- */
+
+/*
+ *     session's clock              ╱─ knots, straight lines between them; beyond the ends the
+ *     (the first member's)   ╱───╱    line goes on
+ *                        ───╱
+ *                     member's CLOCK_MONOTONIC
+ */
+struct incise_session_knot {
+	int64_t t_ns, to_ns; /* both increase */
+	double bound_ns;     /* of the error, with the first member's */
+};
+
+struct incise_session_map {
+	struct incise_session_knot *knots;
+	size_t n; /* 2 or more */
+};
+
+/* A time of a member's clock on the session's, ns; without a map the same. */
+int64_t incise_session_time(const struct incise_session_map *map, int64_t t_ns);
+
+/* And back. */
+int64_t incise_session_member_time(const struct incise_session_map *map, int64_t t_ns);
+
+/* Bound of its error, ns. */
+double incise_session_bound(const struct incise_session_map *map, int64_t t_ns);
 
 /* --- times ------------------------------------------------------------------------- */
 
 #define INCISE_TIME_NONE INT64_MIN /* before any row */
 
 struct incise_row_times {
-	struct incise_recording_line line;
-	const char *stream;
-	bool may_repeat;	      /* equal times are allowed */
-	double delay_ns, delay_sd_ns; /* subtracted while recording; NAN: not known */
-	double offset_sd_ns;	      /* of times without a line */
-	double variance_ns2;	      /* added by another calibration */
+	const struct incise_stream_source *source; /* NULL: of events */
+	struct incise_others *others; /* rows that are timed otherwise, or NULL */
+	/* Of the source, or by another calibration. */
 	int64_t shift_ns;
+	double variance_ns2;
+	bool may_repeat;		      /* equal times are allowed */
 	int64_t own_ns, last_ns;	      /* of the row before */
 	const struct incise_session_map *map; /* to the clock of a session, or NULL */
 	int64_t least_ns;		      /* of own times */
@@ -40,6 +67,8 @@ int incise_row_times_open(struct incise_row_times *times,
 			  struct incise_recording *recording, const char *table,
 			  struct incise_error *err);
 
+void incise_row_times_close(struct incise_row_times *times);
+
 /* Use the delay of another calibration, if it has one for this stream; before the first row. */
 void incise_row_times_calibrate(struct incise_row_times *times,
 				const struct incise_calibration *calibration);
@@ -47,6 +76,18 @@ void incise_row_times_calibrate(struct incise_row_times *times,
 /* Time of the next row, to @best_ns; false: its own is impossible or does not increase. */
 bool incise_row_times_next(struct incise_row_times *times, int64_t seq, int64_t t_ns,
 			   int64_t *best_ns);
+
+/*
+ * The time of a row as it was recorded, on the line or without a line its own, and its standard uncertainty; NAN: not
+ * known.
+ */
+int64_t incise_row_times_line(const struct incise_row_times *times, uint64_t seq,
+			      int64_t t_ns);
+double incise_row_times_line_sd(const struct incise_row_times *times, uint64_t seq);
+
+/* The first row from a number on that is not on the line of the tracker, or NULL. */
+const struct incise_fit_time *incise_row_times_other(const struct incise_row_times *times,
+						     uint64_t seq);
 
 /* Its standard uncertainty, s; 0 if it is not known. */
 double incise_row_times_sd(const struct incise_row_times *times, int64_t seq);

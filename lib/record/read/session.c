@@ -7,11 +7,13 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <incise/seal.h>
 #include "../../base/crc32c.h"
 #include "../ledger.h"
+#include "../old/old.h"
 #include "../schema.h"
+#include "database.h"
 #include "rows.h"
-#include <incise/seal.h>
 #include "session.h"
 
 #define TIME_MAX (INT64_MAX / 4) /* of rows.c */
@@ -29,105 +31,19 @@ const char *const incise_session_tables[] = {
 	NULL,
 };
 
-/* --- clocks -------------------------------------------------------------------------- */
-
-/* The piece of the line at or before a time, by a member of struct knot. */
-static size_t find_piece(const struct incise_session_map *map, int64_t t_ns, bool inverse)
-{
-	size_t low = 0, high = map->n - 1;
-
-	while (high - low > 1) {
-		size_t middle = low + (high - low) / 2;
-		const struct incise_session_knot *knot = &map->knots[middle];
-
-		if ((inverse ? knot->to_ns : knot->t_ns) <= t_ns)
-			low = middle;
-		else
-			high = middle;
-	}
-	return low;
-}
-
-static int64_t on_line(int64_t a, int64_t b, int64_t to_a, int64_t to_b, int64_t t)
-{
-	double slope = (double)(to_b - to_a) / (double)(b - a);
-	/* The offset is exact, and only the small rest is rounded. */
-	double rest = (double)(t - a) * (slope - 1);
-
-	return to_a + (t - a) + llrint(fmax(fmin(rest, 1e18), -1e18));
-}
-
-int64_t incise_session_time(const struct incise_session_map *map, int64_t t_ns)
-{
-	const struct incise_session_knot *a;
-
-	if (!map)
-		return t_ns;
-	a = &map->knots[find_piece(map, t_ns, false)];
-	return on_line(a[0].t_ns, a[1].t_ns, a[0].to_ns, a[1].to_ns, t_ns);
-}
-
-int64_t incise_session_member_time(const struct incise_session_map *map, int64_t t_ns)
-{
-	const struct incise_session_knot *a;
-
-	if (!map)
-		return t_ns;
-	a = &map->knots[find_piece(map, t_ns, true)];
-	return on_line(a[0].to_ns, a[1].to_ns, a[0].t_ns, a[1].t_ns, t_ns);
-}
-
-double incise_session_bound(const struct incise_session_map *map, int64_t t_ns)
-{
-	const struct incise_session_knot *a;
-
-	if (!map)
-		return 0;
-	a = &map->knots[find_piece(map, t_ns, false)];
-	return fmax(a[0].bound_ns, a[1].bound_ns);
-}
-
 /* --- identity ------------------------------------------------------------------------ */
 
-/* From form 5 on it is the last head of the seal, which follows from all. */
-static char *identity_by_seal(struct incise_recording *recording)
+char *incise_session_identity(struct incise_recording *recording)
 {
 	struct incise_seal_head head;
 	char identity[33], *text;
 
+	if (recording->old)
+		return recording->old->identity(recording);
 	if (incise_seal_head(recording, identity, &head, NULL) ||
 	    asprintf(&text, "%s:%lld:%s", identity, (long long)head.commit, head.head) <
 		    0)
 		return NULL;
-	return text;
-}
-
-char *incise_session_identity(struct incise_recording *recording)
-{
-	sqlite3_stmt *stmt = NULL;
-	char *text = NULL, *more;
-
-	if (recording->form >= 5)
-		return identity_by_seal(recording);
-
-	if (sqlite3_prepare_v2(recording->db,
-			       "SELECT stream, block, count, crc FROM ledger AS a WHERE "
-			       "block = (SELECT max(block) FROM ledger AS b WHERE "
-			       "b.stream = a.stream) ORDER BY stream",
-			       -1, &stmt, NULL) != SQLITE_OK)
-		return NULL;
-	while (sqlite3_step(stmt) == SQLITE_ROW) {
-		if (asprintf(&more, "%s%s%.40s:%lld:%lld:%08llx", text ? text : "",
-			     text ? " " : "", (const char *)sqlite3_column_text(stmt, 0),
-			     sqlite3_column_int64(stmt, 1), sqlite3_column_int64(stmt, 2),
-			     (unsigned long long)sqlite3_column_int64(stmt, 3)) < 0)
-			more = NULL;
-		free(text);
-		text = more;
-		if (!text || strlen(text) > 4000)
-			break;
-	}
-	sqlite3_finalize(stmt);
 	return text;
 }
 
@@ -174,18 +90,6 @@ static int damaged(const char *folder, const char *what, struct incise_error *er
 		folder, what);
 }
 
-bool incise_session_is(sqlite3 *db)
-{
-	sqlite3_stmt *stmt = NULL;
-	bool is = sqlite3_prepare_v2(db, "PRAGMA application_id", -1, &stmt, NULL) ==
-			  SQLITE_OK &&
-		  sqlite3_step(stmt) == SQLITE_ROW &&
-		  sqlite3_column_int64(stmt, 0) == INCISE_SESSION_APPLICATION;
-
-	sqlite3_finalize(stmt);
-	return is;
-}
-
 /* A text of a row; false: it has none, or it is too long. */
 static bool take(sqlite3_stmt *stmt, int column, char *to, size_t size)
 {
@@ -217,45 +121,25 @@ static double real_or_nan(sqlite3_stmt *stmt, int column)
 /* Version, tables and checksum. */
 static int check(sqlite3 *db, const char *folder, struct incise_error *err)
 {
-	sqlite3_stmt *stmt = NULL;
-	sqlite3_int64 version = 0, seal = -1;
+	const int64_t version = incise_schema_ask(db, 0, "PRAGMA user_version");
 	uint32_t crc = 0;
-	int found = 0;
 
-	if (sqlite3_prepare_v2(db, "PRAGMA user_version", -1, &stmt, NULL) == SQLITE_OK &&
-	    sqlite3_step(stmt) == SQLITE_ROW)
-		version = sqlite3_column_int64(stmt, 0);
-	sqlite3_finalize(stmt);
 	if (version > INCISE_SESSION_VERSION)
 		return incise_error_set(
 			err, EINVAL,
 			"%s: made by a newer incise (joined recording of version "
 			"%lld, this one reads up to %d); use that version",
 			folder, (long long)version, INCISE_SESSION_VERSION);
-	for (; incise_session_tables[found]; found++) {
-		sqlite3_stmt *known = NULL;
-		bool same;
-
-		if (sqlite3_prepare_v2(db,
+	for (int i = 0; incise_session_tables[i]; i++)
+		if (!incise_schema_ask(db, 0,
 				       "SELECT 1 FROM sqlite_master WHERE type = 'table' "
-				       "AND sql = ?",
-				       -1, &known, NULL) != SQLITE_OK)
-			return incise_schema_fail(db, folder, err);
-		sqlite3_bind_text(known, 1, incise_session_tables[found], -1,
-				  SQLITE_STATIC);
-		same = sqlite3_step(known) == SQLITE_ROW;
-		sqlite3_finalize(known);
-		if (!same)
+				       "AND sql = %Q",
+				       incise_session_tables[i]))
 			return damaged(folder, "a table is missing or altered", err);
-	}
 	if (incise_session_seal(db, &crc) != SQLITE_OK)
 		return incise_schema_fail(db, folder, err);
-	if (sqlite3_prepare_v2(db, "SELECT value FROM session WHERE key = 'seal'", -1,
-			       &stmt, NULL) == SQLITE_OK &&
-	    sqlite3_step(stmt) == SQLITE_ROW)
-		seal = sqlite3_column_int64(stmt, 0);
-	sqlite3_finalize(stmt);
-	return seal == (sqlite3_int64)crc
+	return incise_schema_ask(db, -1,
+				 "SELECT value FROM session WHERE key = 'seal'") == crc
 		       ? 0
 		       : damaged(folder, "its tables are not as they were written", err);
 }
@@ -266,23 +150,26 @@ static int open_member(struct incise_session *session, const char *folder,
 {
 	int at = session->n;
 	const char *name = session->info[at].name;
-	char *path = NULL, *identity = NULL;
+	char *path = NULL, *own, *identity = NULL;
 	int rc = 0;
 
 	if (asprintf(&path, "%s/%s", folder, name) < 0)
-		return incise_error_set(err, ENOMEM, "%s: out of memory", folder);
-	session->members[at] = incise_recording_open(path, err);
-	if (!session->members[at] && errno == ENOENT)
-		rc = incise_error_set(
-			err, ENOENT, "%s: member %s is missing in its folder; join again",
-			folder, name);
-	else if (!session->members[at])
-		rc = -errno;
-	if (!rc && session->members[at]->session)
-		rc = damaged(folder, "a member is a joined recording itself", err);
+		return incise_schema_no_memory(folder, err);
+	own = incise_recording_folder(path, NULL);
+	session->members[at] = own ? incise_recording_new(own) : NULL;
 	session->n += session->members[at] != NULL;
-	if (!rc && session->members[at]->form < 2)
-		rc = damaged(folder, "a member has no ledger", err);
+	if (!session->members[at])
+		rc = errno == ENOENT
+			     ? incise_error_set(err, ENOENT,
+						"%s: member %s is missing in its folder; "
+						"join again",
+						folder, name)
+			     : incise_schema_no_memory(folder, err);
+	if (!rc)
+		rc = incise_recording_read(session->members[at], INCISE_RECORDING_ACTIVE,
+					   err);
+	if (rc == 1)
+		rc = damaged(folder, "a member is a joined recording itself", err);
 	if (!rc) {
 		identity = incise_session_identity(session->members[at]);
 		if (!identity || strcmp(identity, ledger))
@@ -370,8 +257,7 @@ static int read_map(struct incise_session *session, int member, sqlite3 *db,
 			capacity = capacity ? 2 * capacity : 16;
 			knots = realloc(map->knots, capacity * sizeof(*knots));
 			if (!knots) {
-				rc = incise_error_set(err, ENOMEM, "%s: out of memory",
-						      folder);
+				rc = incise_schema_no_memory(folder, err);
 				break;
 			}
 			map->knots = knots;
@@ -389,37 +275,27 @@ static int read_map(struct incise_session *session, int member, sqlite3 *db,
 	sqlite3_finalize(stmt);
 	if (!rc && map->n < 2)
 		rc = damaged(folder, "the map of a clock is missing", err);
-	session->members[member]->map = map;
+	for (int i = 0; i < INCISE_LEDGER_FORMS; i++)
+		session->members[member]->own[i].map = map;
 	return rc;
 }
 
 /* --- what they have ------------------------------------------------------------------ */
-
-bool incise_session_span(struct incise_recording *member, const char *table,
-			 int64_t *first_ns, int64_t *last_ns)
-{
-	int64_t seq;
-
-	*first_ns = *last_ns = 0;
-	return incise_source_end(member, table, false, &seq, first_ns, NULL, NULL) > 0 &&
-	       incise_source_end(member, table, true, &seq, last_ns, NULL, NULL) > 0 &&
-	       *first_ns >= 0 && *last_ns >= *first_ns && *last_ns <= TIME_MAX;
-}
 
 /* Describe a member; the ones before it are described. */
 static void describe(struct incise_session *session, int at)
 {
 	struct incise_session_info *info = &session->info[at];
 	struct incise_recording *member = session->members[at];
-	const struct incise_session_map *map = member->map;
+	const struct incise_session_map *map = &session->maps[at];
 	int64_t first_ns = INT64_MAX, last_ns = -1, others_first = INT64_MAX,
 		others_last = INT64_MIN;
 
 	for (int i = 0; i < INCISE_STREAMS_MAX; i++) {
 		int64_t first, last;
 
-		if (!incise_session_span(member, incise_ledger_forms[i].table, &first,
-					 &last))
+		if (!incise_source_span(member, incise_ledger_forms[i].table, &first,
+					&last))
 			continue;
 		first_ns = first < first_ns ? first : first_ns;
 		last_ns = last > last_ns ? last : last_ns;
@@ -583,21 +459,6 @@ static int choose(struct incise_session *session, const char *folder, const char
 
 /* --- a recording of them ------------------------------------------------------------- */
 
-struct incise_recording *incise_recording_member(const struct incise_recording *recording,
-						 const char *table)
-{
-	const struct incise_session *session = recording->session;
-
-	if (!session || !strcmp(table, "events"))
-		return (struct incise_recording *)recording;
-	for (int i = 0; i < INCISE_STREAMS_MAX; i++)
-		if (!strcmp(table, incise_ledger_forms[i].table))
-			return session->members[session->of[i]];
-	/* Depth is the tracker's; the session's clock is that of its first member. */
-	return session
-		->members[strcmp(table, "wall") ? session->of[INCISE_LEDGER_TRACKER] : 0];
-}
-
 /* Whether a stream is read from a member. */
 static bool is_chosen(const struct incise_session *session, int member)
 {
@@ -638,13 +499,16 @@ static void merge_rigs(const struct incise_session *session,
 static void merge_meta(struct incise_recording *rec)
 {
 	const struct incise_session *session = rec->session;
-	const struct incise_recording_info *force =
-		&incise_recording_member(rec, "force")->meta;
-	const struct incise_recording_info *tracker =
-		&incise_recording_member(rec, "tracker")->meta;
+	const struct incise_recording *of_force = rec->streams[INCISE_LEDGER_FORCE]->file;
+	const struct incise_recording *of_tracker =
+		rec->streams[INCISE_LEDGER_TRACKER]->file;
+	const struct incise_recording_info *tracker = &of_tracker->meta;
 	struct incise_recording_info *to = &rec->meta;
 
-	*to = *force;
+	rec->numbers = of_force->numbers;
+	rec->numbers.tracker_hz = of_tracker->numbers.tracker_hz;
+	rec->numbers.tracker_latency_ns = of_tracker->numbers.tracker_latency_ns;
+	*to = of_force->meta;
 	merge_rigs(session, to);
 	to->tracker = tracker->tracker;
 	to->tracker_lost = tracker->tracker_lost;
@@ -653,7 +517,7 @@ static void merge_meta(struct incise_recording *rec)
 	memcpy(to->surface_point_mm, tracker->surface_point_mm,
 	       sizeof(to->surface_point_mm));
 	memcpy(to->tip_mm, tracker->tip_mm, sizeof(to->tip_mm));
-	to->depth_mm_px = incise_recording_member(rec, "frames")->meta.depth_mm_px;
+	to->depth_mm_px = rec->streams[INCISE_LEDGER_CAMERA]->file->meta.depth_mm_px;
 	for (int i = 0; i < session->n; i++)
 		to->complete = to->complete && session->members[i]->meta.complete;
 }
@@ -675,8 +539,7 @@ static int copy_events(struct incise_session *session, int at, sqlite3_stmt *ins
 		rc = 0;
 		if (asprintf(&text, "%s: %s", session->info[at].name,
 			     incise_rows_text(&rows, 3, NULL)) < 0) {
-			rc = incise_error_set(err, ENOMEM, "%s: out of memory",
-					      member->path);
+			rc = incise_schema_no_memory(member->path, err);
 			break;
 		}
 		sqlite3_reset(insert);
@@ -684,8 +547,7 @@ static int copy_events(struct incise_session *session, int at, sqlite3_stmt *ins
 		sqlite3_bind_text(insert, 2, kind, (int)n, SQLITE_TRANSIENT);
 		sqlite3_bind_text(insert, 3, text, -1, SQLITE_TRANSIENT);
 		if (sqlite3_step(insert) != SQLITE_DONE)
-			rc = incise_error_set(err, ENOMEM, "%s: out of memory",
-					      member->path);
+			rc = incise_schema_no_memory(member->path, err);
 		free(text);
 	}
 	incise_rows_close(&rows);
@@ -712,7 +574,7 @@ static int merge_events(struct incise_recording *rec, bool all, struct incise_er
 			 NULL, NULL, NULL) != SQLITE_OK ||
 	    sqlite3_prepare_v2(rec->db, "INSERT INTO events VALUES(?, ?, ?)", -1, &insert,
 			       NULL) != SQLITE_OK)
-		rc = incise_error_set(err, ENOMEM, "%s: out of memory", rec->path);
+		rc = incise_schema_no_memory(rec->path, err);
 	for (int i = 0; i < rec->session->n && !rc; i++)
 		if (all || is_chosen(rec->session, i))
 			rc = copy_events(rec->session, i, insert, err);
@@ -736,7 +598,7 @@ int incise_session_open(struct incise_recording *rec, const char *folder,
 			calloc(INCISE_SESSION_MEMBERS_MAX, sizeof(*session->maps));
 	}
 	if (!session || !session->info || !session->members || !session->maps)
-		return incise_error_set(err, ENOMEM, "%s: out of memory", folder);
+		return incise_schema_no_memory(folder, err);
 	if (!rc)
 		rc = read_members(session, rec->db, folder, err);
 	for (int i = 0; i < session->n && !rc; i++) {
@@ -750,7 +612,9 @@ int incise_session_open(struct incise_recording *rec, const char *folder,
 		rc = merge_events(rec, strchr(choice, '*') != NULL, err);
 	if (rc)
 		return rc;
-	rec->form = session->members[0]->form;
+	for (int i = 0; i < INCISE_STREAMS_MAX; i++)
+		rec->streams[i] = &session->members[session->of[i]]->own[i];
+	rec->streams[INCISE_LEDGER_WALL] = &session->members[0]->own[INCISE_LEDGER_WALL];
 	merge_meta(rec);
 	return 0;
 }
@@ -820,10 +684,9 @@ static struct incise_wall *extend(const struct incise_wall *wall, int64_t first_
 	return extended;
 }
 
-struct incise_wall *incise_session_wall(const struct incise_session *session,
-					struct incise_error *err)
+struct incise_wall *incise_session_extend(const struct incise_session *session,
+					  struct incise_wall *wall)
 {
-	struct incise_wall *wall = incise_recording_wall(session->members[0], err);
 	struct incise_wall *extended;
 	int64_t first_ns = INT64_MAX, last_ns = INT64_MIN;
 	double wider_ns = 0;
@@ -839,13 +702,10 @@ struct incise_wall *incise_session_wall(const struct incise_session *session,
 		first_ns = info->first_ns < first_ns ? info->first_ns : first_ns;
 		last_ns = info->last_ns > last_ns ? info->last_ns : last_ns;
 	}
-	if (!wall || first_ns > last_ns)
+	if (first_ns > last_ns)
 		return wall;
 	extended = extend(wall, first_ns, last_ns, wider_ns);
 	incise_wall_free(wall);
-	if (!extended)
-		incise_error_set(err, errno, "%s: its wall time: %s",
-				 session->members[0]->path, strerror(errno));
 	return extended;
 }
 
@@ -854,7 +714,7 @@ void incise_session_close(struct incise_session *session)
 	if (!session)
 		return;
 	for (int i = 0; i < session->n; i++) {
-		incise_recording_close(session->members[i]);
+		incise_recording_free(session->members[i]);
 		free(session->maps[i].knots);
 	}
 	free(session->info);

@@ -6,11 +6,6 @@
  *     session.rec/recording.db     members, and the map of each one's clock
  *     session.rec/NAME/            a member: a recording as it was
  *
- *     session's clock              ╱─ knots, straight lines between them; beyond the ends the
- *     (the first member's)   ╱───╱    line goes on
- *                        ───╱
- *                     member's CLOCK_MONOTONIC
- *
  * A session opened is a recording whose streams are each of one member.
  */
 #ifndef INCISE_SESSION_PRIVATE_H
@@ -20,21 +15,10 @@
 #include <stdint.h>
 #include <incise/session.h>
 #include <incise/wall.h>
-#include "recording.h"
+#include "rows.h"
 
-#define INCISE_SESSION_APPLICATION 0x494e4353 /* "INCS", SQLite's application_id */
-#define INCISE_SESSION_VERSION 1	      /* SQLite's user_version */
+#define INCISE_SESSION_VERSION 1 /* SQLite's user_version */
 #define INCISE_SESSION_KNOTS_MAX 1000000
-
-struct incise_session_knot {
-	int64_t t_ns, to_ns; /* both increase */
-	double bound_ns;     /* of the error, with the first member's */
-};
-
-struct incise_session_map {
-	struct incise_session_knot *knots;
-	size_t n; /* 2 or more */
-};
 
 struct incise_session {
 	int n;
@@ -56,13 +40,6 @@ char *incise_session_identity(struct incise_recording *recording);
 /* The checksum of a session's tables. Returns an SQLite code. */
 int incise_session_seal(sqlite3 *db, uint32_t *crc);
 
-/* First and last t_ns of a table, on the recording's clock. Returns whether it has rows. */
-bool incise_session_span(struct incise_recording *recording, const char *table,
-			 int64_t *first_ns, int64_t *last_ns);
-
-/* Whether an opened database is one of a session. */
-bool incise_session_is(sqlite3 *db);
-
 /*
  * Open the members of rec, whose database is open, by the choice behind its name ("b",
  * "force=a,tracker=b", or ""). Returns 0 or -errno; closing rec closes them.
@@ -77,17 +54,8 @@ void incise_session_close(struct incise_session *session);
  */
 #define INCISE_SESSION_FAR_NS 59000000000LL
 
-/* The wall time of a session. As incise_recording_wall(). */
-struct incise_wall *incise_session_wall(const struct incise_session *session,
-					struct incise_error *err);
-
-/* A time of a member's clock on the session's, ns; without a map the same. */
-int64_t incise_session_time(const struct incise_session_map *map, int64_t t_ns);
-
-/* And back. */
-int64_t incise_session_member_time(const struct incise_session_map *map, int64_t t_ns);
-
-/* Bound of its error, ns. */
-double incise_session_bound(const struct incise_session_map *map, int64_t t_ns);
+/* Extend the wall time of the first member to the session's ends; it is freed. NULL with errno. */
+struct incise_wall *incise_session_extend(const struct incise_session *session,
+					  struct incise_wall *wall);
 
 #endif

@@ -10,9 +10,11 @@
 #include "../../base/vector.h"
 #include "../schema.h"
 #include "recalibration.h"
+#include "../old/old.h"
 #include "source.h"
 
-#define ROWS_MAX 1024 /* of a batch, where the file has no blocks */
+#define TIME_MAX (INT64_MAX / 4) /* of rows.c */
+#define ROWS_MAX 1024		 /* of a batch, where the file has no blocks */
 
 static const struct incise_ledger_form depth_form = {
 	"depth", "depth",
@@ -32,6 +34,13 @@ const struct incise_ledger_form *incise_source_form(int stream)
 	return stream == INCISE_SOURCE_DEPTH ? &depth_form : &incise_ledger_forms[stream];
 }
 
+struct incise_stream_source *incise_source_stream(
+	const struct incise_recording *recording, int stream)
+{
+	return recording
+		->streams[stream == INCISE_SOURCE_DEPTH ? INCISE_LEDGER_TRACKER : stream];
+}
+
 static int fail(struct incise_source *source, struct incise_error *err)
 {
 	return incise_schema_fail(source->recording->db, source->recording->path, err);
@@ -39,11 +48,10 @@ static int fail(struct incise_source *source, struct incise_error *err)
 
 static int no_memory(struct incise_source *source, struct incise_error *err)
 {
-	return incise_error_set(err, ENOMEM, "%s: out of memory",
-				source->recording->path);
+	return incise_schema_no_memory(source->recording->path, err);
 }
 
-static int step(struct incise_source *source)
+int incise_source_step(struct incise_source *source)
 {
 	int rc = source->ended ? SQLITE_DONE : sqlite3_step(source->stmt);
 
@@ -51,98 +59,7 @@ static int step(struct incise_source *source)
 	return rc;
 }
 
-/* --- a row a sample: forms 1 to 4 ------------------------------------------------------ */
-
-/* Columns that a form has not: station 0, which is unknown, no button, no digest. */
-static const char *columns_of(int stream, int form)
-{
-	if (stream == INCISE_LEDGER_TRACKER && form < 2)
-		return "seq, t_ns, arrival_ns, x_mm, y_mm, z_mm, qw, qx, qy, qz, status, "
-		       "0, 0";
-	if (stream == INCISE_LEDGER_CAMERA && form < 4)
-		return "seq, t_ns, arrival_ns, pts, bytes, crc, length_px, sd_px, "
-		       "depth_mm, quality, zeroblob(32)";
-	return incise_ledger_forms[stream].columns;
-}
-
-/* A value of the row at hand, into a column. False: its type is not that of the column. */
-static bool take_value(sqlite3_stmt *stmt, int at, char type, union incise_column *column,
-		       size_t row)
-{
-	const int found = sqlite3_column_type(stmt, at);
-	const int bytes = found == SQLITE_TEXT || found == SQLITE_BLOB
-				  ? sqlite3_column_bytes(stmt, at)
-				  : 0;
-
-	switch (type) {
-	case 'i':
-		column->i[row] = sqlite3_column_int64(stmt, at);
-		return found == SQLITE_INTEGER;
-	case 'c':
-		column->c[row] = bytes ? *(const char *)sqlite3_column_text(stmt, at) : 0;
-		return found == SQLITE_TEXT;
-	case 's':
-		memset(column->s[row], 0, sizeof(*column->s));
-		if (found != SQLITE_TEXT || bytes > INCISE_LEDGER_TEXT)
-			return false;
-		memcpy(column->s[row], sqlite3_column_text(stmt, at), bytes);
-		return true;
-	case 'h':
-		if (found != SQLITE_BLOB || bytes != sizeof(*column->h))
-			return false;
-		memcpy(column->h[row], sqlite3_column_blob(stmt, at), bytes);
-		return true;
-	default:
-		column->r[row] =
-			found == SQLITE_NULL ? NAN : sqlite3_column_double(stmt, at);
-		return (found == SQLITE_FLOAT && isfinite(column->r[row])) ||
-		       (found == SQLITE_NULL && type == 'n');
-	}
-}
-
-static bool take_row(struct incise_source *source)
-{
-	struct incise_batch *batch = &source->batch;
-	bool good = true;
-
-	for (int i = 0; batch->form->types[i]; i++)
-		good &= take_value(source->stmt, i, batch->form->types[i],
-				   &batch->column[i], batch->n);
-	return good;
-}
-
-/* An impossible row ends a batch, and is reported by the next call. */
-static int next_rows(struct incise_source *source, struct incise_error *err)
-{
-	struct incise_batch *batch = &source->batch;
-	int rc = SQLITE_ROW;
-
-	batch->n = 0;
-	if (!incise_batch_reserve(batch, source->rows_max))
-		return no_memory(source, err);
-	while (batch->n < source->rows_max &&
-	       (source->held || (rc = step(source)) == SQLITE_ROW)) {
-		source->held = false;
-		if (take_row(source)) {
-			batch->n++;
-			continue;
-		}
-		source->held = batch->n > 0;
-		if (source->held)
-			return 1;
-		return incise_error_set(err, EINVAL,
-					"%s: damaged: table %s, row %lld is invalid; "
-					"`sqlite3 %s/%s` shows it",
-					source->recording->path, batch->form->table,
-					(long long)sqlite3_column_int64(source->stmt, 0),
-					source->recording->path, INCISE_SCHEMA_DB);
-	}
-	if (rc != SQLITE_ROW && rc != SQLITE_DONE)
-		return fail(source, err);
-	return batch->n > 0;
-}
-
-/* --- blocks: form 5 -------------------------------------------------------------------- */
+/* --- blocks ----------------------------------------------------------------------------- */
 
 /* Whether a block goes on from the one before: NULL, or what is wrong. */
 static const char *does_not_follow(struct incise_source *source,
@@ -185,7 +102,7 @@ static int next_block(struct incise_source *source, struct incise_error *err)
 
 	/* The end of a stream is a block without rows. */
 	do {
-		rc = source->held ? SQLITE_ROW : step(source);
+		rc = source->held ? SQLITE_ROW : incise_source_step(source);
 		source->held = false;
 		if (rc == SQLITE_DONE)
 			return 0;
@@ -318,34 +235,18 @@ static int open_depth(struct incise_source *source, int64_t from_seq,
 static int open_table(struct incise_source *source, int64_t from_seq, bool from_end,
 		      struct incise_error *err)
 {
-	const struct incise_ledger_form *form = source->batch.form;
 	struct incise_recording *recording = source->recording;
-	char sql[300];
-	int rc;
+	const char *stream = source->batch.form->stream;
+	int rc = recording->old
+			 ? recording->old->open(source, from_seq, from_end)
+			 : incise_ledger_select(
+				   recording->db, stream,
+				   from_seq == INT64_MIN
+					   ? from_seq
+					   : incise_ledger_find(recording->db, stream,
+								false, from_seq),
+				   from_end, &source->stmt);
 
-	if (recording->form >= 5) {
-		rc = incise_ledger_select(recording->db, recording->form, form->stream,
-					  from_seq == INT64_MIN
-						  ? from_seq
-						  : incise_ledger_find(recording->db,
-								       form->stream,
-								       false, from_seq),
-					  from_end, &source->stmt);
-	} else {
-		if (recording->form < (source->stream == INCISE_LEDGER_WALL	? 3
-				       : source->stream == INCISE_LEDGER_CAMERA ? 2
-										: 1))
-			return incise_error_set(err, ENODATA,
-						"%s: has an older format, without %s",
-						recording->path, form->table);
-		snprintf(sql, sizeof(sql),
-			 "SELECT %s FROM %s WHERE seq >= ? ORDER BY seq%s",
-			 columns_of(source->stream, recording->form), form->table,
-			 from_end ? " DESC" : "");
-		rc = sqlite3_prepare_v2(recording->db, sql, -1, &source->stmt, NULL);
-		if (rc == SQLITE_OK)
-			rc = sqlite3_bind_int64(source->stmt, 1, from_seq);
-	}
 	return rc == SQLITE_OK ? 0 : fail(source, err);
 }
 
@@ -361,7 +262,7 @@ int incise_source_open_at(struct incise_source *source,
 {
 	const struct incise_ledger_form *form = incise_source_form(stream);
 
-	recording = incise_recording_member(recording, form->table);
+	recording = incise_source_stream(recording, stream)->file;
 	*source = (struct incise_source){
 		.recording = recording,
 		.stream = stream,
@@ -382,8 +283,8 @@ int incise_source_next(struct incise_source *source, struct incise_error *err)
 
 	if (source->depth)
 		return next_depth(source, err);
-	rc = source->recording->form >= 5 ? next_block(source, err)
-					  : next_rows(source, err);
+	rc = source->recording->old ? source->recording->old->next(source, err)
+				    : next_block(source, err);
 	if (rc > 0 && source->stream == INCISE_LEDGER_CAMERA && source->scale != 1)
 		for (size_t k = 0; k < source->batch.n; k++)
 			source->batch.column[8].r[k] *= source->scale;
@@ -412,7 +313,7 @@ int incise_source_end(struct incise_recording *recording, const char *table, boo
 	if (stream == INCISE_SOURCE_DEPTH)
 		stream = INCISE_LEDGER_TRACKER;
 	source = (struct incise_source){
-		.recording = incise_recording_member(recording, table),
+		.recording = incise_source_stream(recording, stream)->file,
 		.stream = stream,
 		.batch.form = incise_source_form(stream),
 		.rows_max = 1,
@@ -441,31 +342,29 @@ int incise_source_end(struct incise_recording *recording, const char *table, boo
 int64_t incise_source_seek(struct incise_recording *recording, const char *table,
 			   int64_t t_ns)
 {
-	const struct incise_ledger_form *form = incise_source_form(
-		incise_source_find(strcmp(table, "depth") ? table : "tracker"));
-	sqlite3_stmt *stmt = NULL;
-	int64_t seq = INT64_MIN;
-	char sql[120];
+	const int stream = incise_source_find(strcmp(table, "depth") ? table : "tracker");
+	const char *name = incise_ledger_forms[stream].stream;
 
 	if (t_ns == INT64_MIN)
-		return seq;
-	if (recording->form >= 5)
-		snprintf(sql, sizeof(sql),
-			 "SELECT first_seq FROM blocks WHERE stream = '%s' AND block = ?",
-			 form->stream);
-	else
-		snprintf(sql, sizeof(sql), "SELECT min(seq) FROM %s WHERE t_ns >= ?",
-			 form->table);
-	if (sqlite3_prepare_v2(recording->db, sql, -1, &stmt, NULL) != SQLITE_OK)
-		return seq;
-	sqlite3_bind_int64(stmt, 1,
-			   recording->form >= 5
-				   ? incise_ledger_find(recording->db, form->stream, true,
-							t_ns)
-				   : t_ns);
-	if (sqlite3_step(stmt) == SQLITE_ROW &&
-	    sqlite3_column_type(stmt, 0) == SQLITE_INTEGER)
-		seq = sqlite3_column_int64(stmt, 0);
-	sqlite3_finalize(stmt);
-	return seq;
+		return t_ns;
+	return recording->old ? recording->old->seek(recording, stream, t_ns)
+			      : incise_schema_ask(
+					recording->db, INT64_MIN,
+					"SELECT first_seq FROM blocks WHERE stream = %Q "
+					"AND block = %lld",
+					name,
+					(long long)incise_ledger_find(recording->db, name,
+								      true, t_ns));
+}
+
+bool incise_source_span(struct incise_recording *recording, const char *table,
+			int64_t *first_ns, int64_t *last_ns)
+{
+	int64_t seq;
+
+	*first_ns = *last_ns = 0;
+	return incise_source_end(recording, table, false, &seq, first_ns, NULL, NULL) >
+		       0 &&
+	       incise_source_end(recording, table, true, &seq, last_ns, NULL, NULL) > 0 &&
+	       *first_ns >= 0 && *last_ns >= *first_ns && *last_ns <= TIME_MAX;
 }

@@ -2,9 +2,9 @@
 /*
  * A stream of one recording as batches, in order: the only place that knows how its file keeps it.
  *
- *     form 5       table blocks ─► decode ─┐
- *     forms 1 to 4 a row a sample ─────────┼─► batch ─► rows.h, Arrow
- *     depth        tracker ─► tip, speed ──┘
+ *     table blocks ─► decode ───────────────┐
+ *     format 4     ─► ../old/old.h ─────────┼─► batch ─► rows.h, Arrow
+ *     depth        ─► tracker ─► tip, speed ┘
  *
  * The file is untrusted: what is impossible in a batch is an error that names where; reading may go on
  * behind it.
@@ -24,8 +24,12 @@
 /* INCISE_LEDGER_* or INCISE_SOURCE_DEPTH by the name of its table; -1: none. */
 int incise_source_find(const char *table);
 
-/* The columns of a stream's batches, of all forms of recordings. */
+/* The columns of a stream's batches. */
 const struct incise_ledger_form *incise_source_form(int stream);
+
+/* That of a recording with the rows; those of depth are the tracker's. */
+struct incise_stream_source *incise_source_stream(
+	const struct incise_recording *recording, int stream);
 
 struct incise_source_depth;
 
@@ -43,7 +47,7 @@ struct incise_source {
 	double scale; /* of depths by vision, of another calibration */
 };
 
-/* Returns 0 or -errno; ENODATA: an older form has no such stream. Close it in any case. */
+/* Returns 0 or -errno. Close it in any case. */
 int incise_source_open(struct incise_source *source, struct incise_recording *recording,
 		       int stream, struct incise_error *err);
 
@@ -57,6 +61,9 @@ int incise_source_open_at(struct incise_source *source,
  * block or row, -EINVAL, the next call goes on.
  */
 int incise_source_next(struct incise_source *source, struct incise_error *err);
+
+/* Step the statement, once to its end. Returns an SQLite code. */
+int incise_source_step(struct incise_source *source);
 
 void incise_source_close(struct incise_source *source);
 
@@ -74,5 +81,9 @@ int64_t incise_source_seek(struct incise_recording *recording, const char *table
 int incise_source_end(struct incise_recording *recording, const char *table, bool last,
 		      int64_t *seq, int64_t *t_ns, int64_t *arrival_ns,
 		      struct incise_error *err);
+
+/* First and last t_ns of a table, on its own clock. Returns whether it has rows. */
+bool incise_source_span(struct incise_recording *recording, const char *table,
+			int64_t *first_ns, int64_t *last_ns);
 
 #endif

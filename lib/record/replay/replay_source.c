@@ -107,13 +107,11 @@ static int step_depth(struct incise_replay_source *source, struct incise_error *
 /* --- opening ------------------------------------------------------------------------- */
 
 /* A number of table meta within bounds. */
-static int number(struct incise_recording *recording, const char *key, double least,
-		  double most, double *to, struct incise_error *err)
+static int check_number(const struct incise_recording *recording, const char *key,
+			double value, double least, double most, struct incise_error *err)
 {
-	int rc = incise_recording_number(recording, key, to, err);
-
-	if (rc || (*to >= least && *to <= most))
-		return rc;
+	if (value >= least && value <= most)
+		return 0;
 	return incise_error_set(err, EINVAL,
 				"%s: damaged: '%s' in table meta is missing, or out of "
 				"range",
@@ -123,12 +121,14 @@ static int number(struct incise_recording *recording, const char *key, double le
 /* The predictor's limits of rate and latency; lib/control/predict.h. */
 static int read_info(struct incise_replay_source *source, struct incise_error *err)
 {
-	double rate_hz, latency_ns;
-	int rc = number(source->recording, "tracker_hz", 1, 1e4, &rate_hz, err);
+	const struct incise_recording *recording = source->recording;
+	const double rate_hz = recording->numbers.tracker_hz;
+	const double latency_ns = recording->numbers.tracker_latency_ns;
+	int rc = check_number(recording, "tracker_hz", rate_hz, 1, 1e4, err);
 
 	if (!rc)
-		rc = number(source->recording, "tracker_latency_ns", 0, 1e9, &latency_ns,
-			    err);
+		rc = check_number(recording, "tracker_latency_ns", latency_ns, 0, 1e9,
+				  err);
 	if (rc)
 		return rc;
 	source->info = (struct incise_tracker_info){
@@ -170,9 +170,8 @@ static int find_last(struct incise_replay_source *source,
 
 	if (rc <= 0)
 		return rc;
-	t_ns = on_clock(s,
-			arrival ? arrival_ns
-				: incise_recording_time(&s->rows.times.line, seq, t_ns));
+	t_ns = on_clock(s, arrival ? arrival_ns
+				   : incise_row_times_line(&s->rows.times, seq, t_ns));
 	if (t_ns > source->last_ns)
 		source->last_ns = t_ns;
 	return 0;

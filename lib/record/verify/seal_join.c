@@ -10,6 +10,7 @@
 #include <stdlib.h>
 #include "../../base/c_locale.h"
 #include "../read/session.h"
+#include "../schema.h"
 #include "seal_walk.h"
 
 /* Unknown without a sign, which nan may have. */
@@ -87,7 +88,7 @@ char *incise_session_statement(const struct incise_recording *recording,
 		return text;
 	free(text);
 	if (rc == -ENOMEM)
-		incise_error_set(err, ENOMEM, "%s: out of memory", recording->path);
+		incise_schema_no_memory(recording->path, err);
 	errno = -rc;
 	return NULL;
 }

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
  * The seal of a recording recomputed from its rows, commit by commit; or from the digests of its
- * blocks, where another has read all rows. Memory does not grow with the recording, but for 32
- * bytes of such a digest, and a commit that does not agree does not affect those after it.
+ * blocks, where another has read all rows. Memory does not grow with the recording, and a commit that does
+ * not agree does not affect those after it.
  *
  *     rows of 4 streams ─┐
  *     their ledgers ─────┼─► a commit ─► head, compared with that of table seal
@@ -12,22 +12,14 @@
 #define INCISE_SEAL_WALK_H
 
 #include <incise/seal.h>
-#include "../read/recording.h"
+#include "../old/old.h"
 #include "../seal_chain.h"
 #include "../statement.h"
 
-/* Of the blocks of one stream, in order. */
-struct incise_seal_digests {
-	size_t n, capacity;
-	uint8_t (*digests)[INCISE_SEAL_BYTES];
-};
-
 struct incise_seal_walk_stream {
-	sqlite3_stmt *rows, *blocks;
-	const struct incise_ledger_form *form;
-	struct incise_ledger_row row; /* next, where has_row */
-	bool has_row, good_row;
-	bool ended; /* no block is left */
+	sqlite3_stmt *blocks;
+	struct incise_old_rows rows; /* of format 4: at the next one */
+	bool ended;		     /* no block is left */
 };
 
 struct incise_seal_walk {
@@ -35,42 +27,38 @@ struct incise_seal_walk {
 	struct incise_seal seal; /* after the commit */
 	sqlite3_stmt *commits;
 	struct incise_seal_walk_stream streams[INCISE_LEDGER_FORMS];
-	const struct incise_seal_digests *known; /* of each stream; NULL: read the rows */
+	bool known;   /* blocks have the digests that they name */
 	int64_t last; /* number of the last commit; -1: there is none */
 	/* The commit. */
 	int64_t number, t_ns;
 	bool good; /* it is what its rows give */
 };
 
-/*
- * @known: the digests of all blocks of each stream, which agree with the ledger, or NULL. Returns
- * 0, -EINVAL, -EIO, -ENOMEM; for a recording of form 4 or later. Close it in any case.
- */
-int incise_seal_walk_open(struct incise_seal_walk *walk,
-			  struct incise_recording *recording,
-			  const struct incise_seal_digests *known,
-			  struct incise_error *err);
-
-/* Go to the next commit: 1; 0 at the end; as incise_seal_walk_open(). */
-int incise_seal_walk_next(struct incise_seal_walk *walk, struct incise_error *err);
-
 /* Behind the last commit: the number of rows, and whether the ledger has blocks. */
 uint64_t incise_seal_walk_behind(struct incise_seal_walk *walk, bool *blocks);
 
-void incise_seal_walk_close(struct incise_seal_walk *walk);
-
 /*
- * Fill a statement from a recording up to commit @upto, -1: the last one. @step is called after
+ * Fill a statement from a recording up to commit @upto, -1: the last one. @known: a verification has seen that
+ * blocks have the digests that they name. @step is called after
  * each commit of the whole recording, and may stop it with its result. A recording that ends
  * before @upto has fewer heads: those behind have an empty text.
  */
 int incise_statement_make(struct incise_seal_statement *statement,
-			  struct incise_recording *recording,
-			  const struct incise_seal_digests *known, int64_t upto,
+			  struct incise_recording *recording, bool known, int64_t upto,
 			  int (*step)(void *user, struct incise_seal_walk *walk),
 			  void *user, struct incise_error *err);
 
-/* Whether a recording can have a seal: 0; -ENODATA, -ENOTSUP. */
+/* A text for one line. */
+void incise_seal_line(char *to, size_t size, const char *text);
+
+/* Text of a key of table meta, "" if it has none. Returns 0 or -errno. */
+int incise_seal_key(struct incise_recording *recording, const char *key, char *to,
+		    size_t size, struct incise_error *err);
+
+int incise_seal_identity(struct incise_recording *recording, char identity[33],
+			 struct incise_error *err);
+
+/* Whether a recording can have a seal: 0; -ENOTSUP. */
 int incise_seal_possible(const struct incise_recording *recording,
 			 struct incise_error *err);
 

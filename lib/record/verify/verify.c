@@ -4,7 +4,6 @@
  */
 #include <errno.h>
 #include <fcntl.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,39 +11,10 @@
 #include <unistd.h>
 #include "../frames.h"
 #include "../schema.h"
+#include "../old/old.h"
 #include "../read/session.h"
+#include "seal_walk.h"
 #include "verify.h"
-
-/* The table of the streams' entries. */
-static const char *entries(const struct incise_verification *verify)
-{
-	return verify->recording->form >= 5 ? "blocks" : "ledger";
-}
-
-/* One integer by SQL; @otherwise if it is NULL or cannot be read. */
-INCISE_PRINTF(3, 4)
-static int64_t ask(struct incise_verification *verify, int64_t otherwise,
-		   const char *format, ...)
-{
-	sqlite3_stmt *stmt;
-	va_list args;
-	char *sql;
-	int rc;
-
-	va_start(args, format);
-	sql = sqlite3_vmprintf(format, args);
-	va_end(args);
-	rc = sql ? sqlite3_prepare_v2(verify->recording->db, sql, -1, &stmt, NULL)
-		 : SQLITE_NOMEM;
-	sqlite3_free(sql);
-	if (rc != SQLITE_OK)
-		return otherwise;
-	if (sqlite3_step(stmt) == SQLITE_ROW &&
-	    sqlite3_column_type(stmt, 0) == SQLITE_INTEGER)
-		otherwise = sqlite3_column_int64(stmt, 0);
-	sqlite3_finalize(stmt);
-	return otherwise;
-}
 
 /* --- pages, counts and names ---------------------------------------------------------- */
 
@@ -66,24 +36,18 @@ static int check_pages(struct incise_verification *verify)
 	while (rc == SQLITE_OK && (rc = sqlite3_step(stmt)) == SQLITE_ROW) {
 		const char *text = (const char *)sqlite3_column_text(stmt, 0);
 
-		if (!text || strcmp(text, "ok")) {
-			struct incise_verify_finding found =
-				incise_verify_finding(INCISE_VERIFY_DAMAGED);
-
-			incise_verify_found(verify, &found, "%s is damaged: %s",
-					    INCISE_SCHEMA_DB,
+		if (!text || strcmp(text, "ok"))
+			incise_verify_found(verify,
+					    incise_verify_finding(INCISE_VERIFY_DAMAGED),
+					    "%s is damaged: %s", INCISE_SCHEMA_DB,
 					    text ? text : "out of memory");
-		}
 		rc = SQLITE_OK;
 	}
 	sqlite3_progress_handler(db, 0, NULL, NULL);
-	if (rc != SQLITE_DONE && rc != SQLITE_INTERRUPT) {
-		struct incise_verify_finding found =
-			incise_verify_finding(INCISE_VERIFY_DAMAGED);
-
-		incise_verify_found(verify, &found, "%s is damaged: %s", INCISE_SCHEMA_DB,
+	if (rc != SQLITE_DONE && rc != SQLITE_INTERRUPT)
+		incise_verify_found(verify, incise_verify_finding(INCISE_VERIFY_DAMAGED),
+				    "%s is damaged: %s", INCISE_SCHEMA_DB,
 				    sqlite3_errmsg(db));
-	}
 	sqlite3_finalize(stmt);
 	return rc == SQLITE_INTERRUPT ? -ECANCELED : 0;
 }
@@ -91,9 +55,8 @@ static int check_pages(struct incise_verification *verify)
 /* SQLite leaves alone what lies behind the pages that its header counts. */
 static void check_length(struct incise_verification *verify)
 {
-	struct incise_verify_finding found = incise_verify_finding(INCISE_VERIFY_DAMAGED);
-	int64_t bytes =
-		ask(verify, 0, "PRAGMA page_size") * ask(verify, 0, "PRAGMA page_count");
+	int64_t bytes = incise_schema_ask(verify->recording->db, 0, "PRAGMA page_size") *
+			incise_schema_ask(verify->recording->db, 0, "PRAGMA page_count");
 	struct stat st;
 
 	/* With a log, pages may be in it alone; a copy of a locked one has no name. */
@@ -101,21 +64,9 @@ static void check_length(struct incise_verification *verify)
 	    stat(sqlite3_db_filename(verify->recording->db, "main"), &st))
 		return;
 	if (st.st_size > bytes)
-		incise_verify_found(verify, &found, "%s has %lld bytes of %lld",
-				    INCISE_SCHEMA_DB, (long long)st.st_size,
-				    (long long)bytes);
-}
-
-/* Table depth of an interrupted recording; a closed one has a seal of it. */
-static void check_depth(struct incise_verification *verify)
-{
-	struct incise_verify_finding found = incise_verify_finding(INCISE_VERIFY_COUNT);
-	uint64_t rows = ask(verify, -1, "SELECT count(*) FROM depth");
-
-	found.count = verify->recording->meta.depth;
-	if (rows != found.count)
-		incise_verify_found(verify, &found, "table depth has %lld rows of %llu",
-				    (long long)rows, (unsigned long long)found.count);
+		incise_verify_found(verify, incise_verify_finding(INCISE_VERIFY_DAMAGED),
+				    "%s has %lld bytes of %lld", INCISE_SCHEMA_DB,
+				    (long long)st.st_size, (long long)bytes);
 }
 
 /* An entry with an unknown name would pass as verified. */
@@ -127,68 +78,56 @@ static void check_depth(struct incise_verification *verify)
 	"'file:camera.mkv'"
 static void check_names(struct incise_verification *verify)
 {
-	struct incise_verify_finding found = incise_verify_finding(INCISE_VERIFY_LEDGER);
-
 	const char *seals = verify->report->interrupted ? "" : SEALS;
 	const char *unknown =
-		verify->recording->form < 5
-			? "SELECT count(*) FROM ledger WHERE stream NOT IN (" STREAMS
-			  "%s)"
-		: verify->level == INCISE_VERIFY_TABLES
+		verify->level == INCISE_VERIFY_TABLES
 			? "SELECT count(*) FROM ledger WHERE stream NOT IN (''%s)"
 			: "SELECT (SELECT count(*) FROM blocks WHERE stream NOT IN "
 			  "(" STREAMS ")) + (SELECT count(*) FROM ledger WHERE stream "
 			  "NOT IN (''%s))";
 
-	if (ask(verify, -1, unknown, seals))
-		incise_verify_found(verify, &found,
+	if (incise_schema_ask(verify->recording->db, -1, unknown, seals))
+		incise_verify_found(verify, incise_verify_finding(INCISE_VERIFY_LEDGER),
 				    "the ledger has entries of unknown streams");
 }
 
 /* Of a stream's first or last entry with rows: entries follow one another, and all would be long to read. */
-#define END(field, table, order)                                              \
-	"(SELECT " field " FROM " table " WHERE stream = name AND count > 0 " \
+#define END(field, order)                                                  \
+	"(SELECT " field " FROM blocks WHERE stream = name AND count > 0 " \
 	"ORDER BY block " order " LIMIT 1)"
-#define ENDED(table)                                 \
-	"SELECT name, ended, " END("last_ns", table, \
-				   "DESC") " FROM streams WHERE ended IS NOT NULL"
 
 /* The number of samples that a dead device would still have sent is not known. */
 static void report_ends(struct incise_verification *verify)
 {
-	sqlite3_stmt *stmt;
+	struct incise_recording *recording = verify->recording;
 
-	if (sqlite3_prepare_v2(verify->recording->db,
-			       verify->recording->form >= 5 ? ENDED("blocks")
-							    : ENDED("ledger"),
-			       -1, &stmt, NULL) != SQLITE_OK)
-		return; /* reported with the pages and seals */
-	while (sqlite3_step(stmt) == SQLITE_ROW) {
+	for (int i = 0; i < recording->n_table; i++) {
+		const struct incise_stream *stream = &recording->table[i];
 		struct incise_verify_finding found =
 			incise_verify_finding(INCISE_VERIFY_ENDED);
-		const char *name = (const char *)sqlite3_column_text(stmt, 0);
-		const char *why = (const char *)sqlite3_column_text(stmt, 1);
 
-		found.stream = name ? name : "";
-		if (sqlite3_column_type(stmt, 2) == SQLITE_INTEGER)
-			found.last_ns = sqlite3_column_int64(stmt, 2);
+		if (!*stream->ended)
+			continue;
+		found.stream = stream->name;
+		found.last_ns = incise_schema_ask(
+			recording->db, -1,
+			"SELECT " END("last_ns", "DESC") " FROM (SELECT %Q AS name)",
+			stream->name);
 		if (found.last_ns < 0)
-			incise_verify_found(verify, &found, "%s: gave nothing: %s",
-					    found.stream, why ? why : "");
+			incise_verify_found(verify, found, "%s: gave nothing: %s",
+					    stream->name, stream->ended);
 		else
 			incise_verify_found(
-				verify, &found,
+				verify, found,
 				"%s: ended at %.4f s, before the recording did: %s",
-				found.stream, incise_verify_s(verify, found.last_ns),
-				why ? why : "");
+				stream->name, incise_verify_s(verify, found.last_ns),
+				stream->ended);
 	}
-	sqlite3_finalize(stmt);
 }
 
 /* One that was converted as it was does not become good by that. */
 static void report_conversion(struct incise_verification *verify)
 {
-	struct incise_verify_finding found = incise_verify_finding(INCISE_VERIFY_ALTERED);
 	sqlite3_stmt *stmt = NULL;
 
 	if (sqlite3_prepare_v2(verify->recording->db,
@@ -197,7 +136,8 @@ static void report_conversion(struct incise_verification *verify)
 			       "'converted_from') WHERE at",
 			       -1, &stmt, NULL) == SQLITE_OK &&
 	    sqlite3_step(stmt) == SQLITE_ROW)
-		incise_verify_found(verify, &found, "it was converted with a finding: %s",
+		incise_verify_found(verify, incise_verify_finding(INCISE_VERIFY_ALTERED),
+				    "it was converted with a finding: %s",
 				    (const char *)sqlite3_column_text(stmt, 0));
 	sqlite3_finalize(stmt);
 }
@@ -209,16 +149,15 @@ static void report_interruption(struct incise_verification *verify)
 
 	if (!verify->report->interrupted)
 		return;
-	found.last_ns =
-		ask(verify, -1,
-		    "SELECT max(" END("last_ns", "%s", "DESC") ") FROM (" RIG_NAMES ")",
-		    entries(verify));
+	found.last_ns = incise_schema_ask(
+		verify->recording->db, -1,
+		"SELECT max(" END("last_ns", "DESC") ") FROM (" RIG_NAMES ")");
 	if (found.last_ns < 0)
-		incise_verify_found(verify, &found,
+		incise_verify_found(verify, found,
 				    "interrupted, or being written: no row yet");
 	else
 		incise_verify_found(
-			verify, &found,
+			verify, found,
 			"interrupted, or being written: it ends with its last commit, "
 			"at %.4f s; tables events, knots, meta and streams have "
 			"no seal before the end and are not verified",
@@ -235,8 +174,8 @@ static int read_entry(struct incise_verification *verify, const char *stream,
 	int n = 0, rc;
 
 	*entry = (struct incise_ledger_block){0};
-	if (incise_ledger_select(verify->recording->db, verify->recording->form, stream,
-				 INT64_MIN, false, &stmt) != SQLITE_OK)
+	if (incise_ledger_select(verify->recording->db, stream, INT64_MIN, false,
+				 &stmt) != SQLITE_OK)
 		return -1;
 	while ((rc = sqlite3_step(stmt)) == SQLITE_ROW && n++ == 0)
 		if (!incise_ledger_block_read(entry, stmt))
@@ -260,18 +199,18 @@ static void compare(struct incise_verification *verify, const char *stream,
 	}
 	if (!n) {
 		found.kind = INCISE_VERIFY_LEDGER;
-		incise_verify_found(verify, &found, "%s has no seal in the ledger", what);
+		incise_verify_found(verify, found, "%s has no seal in the ledger", what);
 		return;
 	}
 	found.count = entry.count;
 	if (n == 1 && incise_ledger_same(made, &entry))
 		return;
 	if (n == 1 && made->count != entry.count)
-		incise_verify_found(verify, &found, "%s has %lld %s of %lld", what,
+		incise_verify_found(verify, found, "%s has %lld %s of %lld", what,
 				    (long long)made->count, units,
 				    (long long)entry.count);
 	else
-		incise_verify_found(verify, &found,
+		incise_verify_found(verify, found,
 				    "%s is altered: its %s or its seal differ from "
 				    "those written",
 				    what, units);
@@ -292,7 +231,7 @@ static void check_file(struct incise_verification *verify)
 	if (fd < 0) {
 		/* With frames, verify_camera.c reports that it is missing. */
 		if (read_entry(verify, INCISE_LEDGER_FILE, &entry) && !verify->frames)
-			incise_verify_found(verify, &found,
+			incise_verify_found(verify, found,
 					    "camera: " INCISE_FRAMES_FILE " is missing");
 		return;
 	}
@@ -302,7 +241,7 @@ static void check_file(struct incise_verification *verify)
 		rc = incise_ledger_seal_file(fd, n == 1 ? entry.last_seq : 0, &made);
 	close(fd);
 	if (rc) {
-		incise_verify_found(verify, &found,
+		incise_verify_found(verify, found,
 				    INCISE_FRAMES_FILE " cannot be read: %s",
 				    strerror(-rc));
 		return;
@@ -311,7 +250,7 @@ static void check_file(struct incise_verification *verify)
 		&made);
 	/* 0: made before the length was noted, or on a disk that hung. */
 	if (n == 1 && entry.last_seq && entry.last_seq != st.st_size)
-		incise_verify_found(verify, &found,
+		incise_verify_found(verify, found,
 				    INCISE_FRAMES_FILE " has %lld bytes of %lld",
 				    (long long)st.st_size, (long long)entry.last_seq);
 }
@@ -321,8 +260,8 @@ static int check_seals(struct incise_verification *verify)
 {
 	int rc = 0;
 
-	/* From form 5 on there is no table depth, the first of them. */
-	for (int i = verify->recording->form >= 5; incise_ledger_sealed[i] && !rc; i++) {
+	/* Today's format has no table depth, the first of them. */
+	for (int i = !verify->recording->old; incise_ledger_sealed[i] && !rc; i++) {
 		const char *table = incise_ledger_sealed[i];
 		struct incise_ledger_block made;
 		char stream[40], what[40];
@@ -345,22 +284,24 @@ static int check_seals(struct incise_verification *verify)
 /* Whether there is any trace of a stream, which may have no row: others may have been removed. */
 static bool recorded(struct incise_verification *verify, int stream, const char *key)
 {
-	const struct incise_ledger_form *form =
-		incise_ledger_form(stream, verify->recording->form);
+	const struct incise_ledger_form *form = &incise_ledger_forms[stream];
 
-	return ask(verify, 1,
-		   "SELECT EXISTS(SELECT 1 FROM %s WHERE stream = '%s') OR "
-		   "EXISTS(SELECT 1 FROM streams WHERE name = '%s') OR EXISTS(SELECT 1 "
-		   "FROM meta WHERE key = '%s' AND value > 0)",
-		   entries(verify), form->stream, form->stream, key) ||
-	       (verify->recording->form < 5 &&
-		ask(verify, 1, "SELECT EXISTS(SELECT 1 FROM %s)", form->table));
+	return incise_schema_ask(
+		       verify->recording->db, 1,
+		       "SELECT EXISTS(SELECT 1 FROM blocks WHERE stream = '%s') OR "
+		       "EXISTS(SELECT 1 FROM streams WHERE name = '%s') OR EXISTS(SELECT 1 "
+		       "FROM meta WHERE key = '%s' AND value > 0)",
+		       form->stream, form->stream, key) ||
+	       (verify->recording->old &&
+		incise_schema_ask(verify->recording->db, 1,
+				  "SELECT EXISTS(SELECT 1 FROM %s)", form->table));
 }
 
 /* A number of table meta. */
 static int64_t count_of(struct incise_verification *verify, const char *key)
 {
-	return ask(verify, 0, "SELECT value FROM meta WHERE key = '%s'", key);
+	return incise_schema_ask(verify->recording->db, 0,
+				 "SELECT value FROM meta WHERE key = '%s'", key);
 }
 
 /* Wall time is no stream of the report: its findings are all there is to tell. */
@@ -368,8 +309,7 @@ static int check_wall(struct incise_verification *verify)
 {
 	struct incise_verify_stream rows = {0};
 
-	if (verify->recording->form < 3 ||
-	    !recorded(verify, INCISE_LEDGER_WALL, "wall_rows"))
+	if (!recorded(verify, INCISE_LEDGER_WALL, "wall_rows"))
 		return 0;
 	return incise_verify_stream(verify, INCISE_LEDGER_WALL,
 				    count_of(verify, "wall_rows"), 0, &rows);
@@ -392,11 +332,10 @@ static int check_streams(struct incise_verification *verify)
 	verify->camera = recorded(verify, INCISE_LEDGER_CAMERA, "frames_rows");
 	verify->rows = meta->force + meta->tracker;
 	if (verify->camera) {
-		verify->frames = ask(verify, 0,
-				     verify->recording->form >= 5
-					     ? "SELECT sum(count) FROM blocks WHERE "
-					       "stream = 'camera'"
-					     : "SELECT count(*) FROM frames");
+		verify->frames =
+			incise_schema_ask(verify->recording->db, 0,
+					  "SELECT sum(count) FROM blocks WHERE stream = "
+					  "'camera'");
 		verify->rows += verify->frames * INCISE_VERIFY_FRAME_ROWS;
 	}
 	for (int i = 0; i < INCISE_LEDGER_STREAMS && !rc; i++) {
@@ -415,44 +354,36 @@ static int check_streams(struct incise_verification *verify)
 	return rc;
 }
 
-static int verify_one(const char *path, const struct incise_verify_watch *watch,
-		      enum incise_verify_level level,
-		      const struct incise_seal_statement *statement,
-		      struct incise_verify_report *report, struct incise_error *err)
+int incise_verify_recording(struct incise_recording *recording,
+			    const struct incise_verify_watch *watch,
+			    enum incise_verify_level level,
+			    const struct incise_seal_statement *statement,
+			    struct incise_verify_report *report, struct incise_error *err)
 {
-	struct incise_verification verify = {
-		.watch = watch, .report = report, .level = level, .statement = statement};
+	struct incise_verification verify = {.recording = recording,
+					     .watch = watch,
+					     .report = report,
+					     .level = level,
+					     .statement = statement};
+	const bool old = recording->old, sealed = !old || incise_old_is_sealed(recording);
 	bool altered;
-	int rc;
+	int rc = 0;
 
-	*report = (struct incise_verify_report){0};
-	verify.recording = incise_recording_open_original(path, err);
-	if (!verify.recording)
-		return -errno;
-	if (verify.recording->form < 2) {
-		rc = incise_error_set(
-			err, ENODATA,
-			"%s: made by an older incise (format %d) without a ledger, so "
-			"it cannot be verified; `incise info` reads it",
-			path, verify.recording->form);
-		goto out;
-	}
-	report->interrupted = !verify.recording->meta.complete;
-	verify.hashed = verify.recording->form >= 4 &&
-			!incise_seal_init(&verify.rows_seal, verify.recording->form);
+	*report = (struct incise_verify_report){.interrupted = !recording->meta.complete};
+	verify.hashed = !old && !incise_seal_init(&verify.rows_seal);
 	/* Where no sample is read the recorder's summary has to be enough. */
-	if (verify.recording->form < 5 || report->interrupted)
-		level = verify.level =
-			level == INCISE_VERIFY_TABLES ? INCISE_VERIFY_ROWS : level;
-	if (level != INCISE_VERIFY_TABLES)
-		verify.origin_ns = ask(&verify, 0,
-				       "SELECT min(" END("first_ns", "%s",
-							 "ASC") ") FROM (" RIG_NAMES ")",
-				       entries(&verify));
-	rc = level == INCISE_VERIFY_TABLES ? 0 : check_streams(&verify);
+	if ((old || report->interrupted) && level == INCISE_VERIFY_TABLES)
+		level = verify.level = INCISE_VERIFY_ROWS;
+	if (level != INCISE_VERIFY_TABLES) {
+		verify.origin_ns = incise_schema_ask(
+			recording->db, 0,
+			"SELECT min(" END("first_ns", "ASC") ") FROM "
+							     "(" RIG_NAMES ")");
+		rc = check_streams(&verify);
+	}
 	if (!rc) {
-		if (report->interrupted && verify.recording->form < 5)
-			check_depth(&verify);
+		if (old && report->interrupted)
+			incise_old_verify_depth(&verify);
 		check_names(&verify);
 		altered = verify.altered;
 		verify.altered = false;
@@ -461,16 +392,16 @@ static int verify_one(const char *path, const struct incise_verify_watch *watch,
 		verify.tables_altered = verify.altered;
 		verify.altered |= altered;
 	}
-	if (!rc && verify.recording->form >= 4 && level != INCISE_VERIFY_TABLES)
+	if (!rc && sealed && level != INCISE_VERIFY_TABLES)
 		rc = incise_verify_seal(&verify);
 	if (!rc && level == INCISE_VERIFY_ALL) {
 		rc = check_pages(&verify);
 		check_length(&verify);
 	}
-	if (rc) {
-		rc = incise_error_set(err, ECANCELED, "%s: stopped; not verified", path);
-		goto out;
-	}
+	incise_seal_free(&verify.rows_seal);
+	if (rc)
+		return incise_error_set(err, ECANCELED, "%s: stopped; not verified",
+					recording->path);
 	/* Of altered rows nothing follows. */
 	if (!verify.altered && level != INCISE_VERIFY_TABLES)
 		incise_verify_times(&verify);
@@ -479,12 +410,7 @@ static int verify_one(const char *path, const struct incise_verify_watch *watch,
 	report_interruption(&verify);
 	report->complete = !report->findings;
 	report->intact = !verify.altered;
-out:
-	for (int i = 0; i < INCISE_LEDGER_FORMS; i++)
-		free(verify.digests[i].digests);
-	incise_seal_free(&verify.rows_seal);
-	incise_recording_close(verify.recording);
-	return rc;
+	return 0;
 }
 
 /* --- joined recordings --------------------------------------------------------------- */
@@ -571,10 +497,15 @@ static int verify_members(const struct incise_session *session,
 					      session->n};
 		const struct incise_verify_watch named = {member_found, member_progress,
 							  &member};
+		struct incise_recording *recording;
 		struct incise_verify_report found;
 
-		rc = verify_one(session->members[i]->path, &named, level, NULL, &found,
-				err);
+		recording = incise_recording_open_as(session->members[i]->path,
+						     INCISE_RECORDING_ORIGINAL, err);
+		rc = recording ? incise_verify_recording(recording, &named, level, NULL,
+							 &found, err)
+			       : -errno;
+		incise_recording_close(recording);
 		if (!rc)
 			add_report(report, &found);
 	}
@@ -585,7 +516,8 @@ static int verify_it(const char *path, const struct incise_verify_watch *watch,
 		     enum incise_verify_level level, struct incise_verify_report *report,
 		     struct incise_error *err)
 {
-	struct incise_recording *recording = incise_recording_open_original(path, err);
+	struct incise_recording *recording =
+		incise_recording_open_as(path, INCISE_RECORDING_ORIGINAL, err);
 	int rc;
 
 	*report = (struct incise_verify_report){0};
@@ -593,13 +525,10 @@ static int verify_it(const char *path, const struct incise_verify_watch *watch,
 		return -errno;
 	rc = recording->session
 		     ? verify_members(recording->session, watch, level, report, err)
-		     : 0;
-	if (recording->session) {
-		incise_recording_close(recording);
-		return rc;
-	}
+		     : incise_verify_recording(recording, watch, level, NULL, report,
+					       err);
 	incise_recording_close(recording);
-	return verify_one(path, watch, level, NULL, report, err);
+	return rc;
 }
 
 int incise_verify(const char *path, const struct incise_verify_watch *watch,
@@ -624,7 +553,8 @@ int incise_seal_compare(const char *path, const char *text, size_t length,
 			const struct incise_verify_watch *watch,
 			struct incise_verify_report *report, struct incise_error *err)
 {
-	struct incise_recording *recording = incise_recording_open_any(path, err);
+	struct incise_recording *recording =
+		incise_recording_open_as(path, INCISE_RECORDING_ORIGINAL, err);
 	struct incise_seal_statement statement;
 	int rc;
 
@@ -632,16 +562,11 @@ int incise_seal_compare(const char *path, const char *text, size_t length,
 	if (!recording)
 		return -errno;
 	rc = incise_seal_possible(recording, err);
-	/* Forms before 4 have no statements: another form is a forgery, or a mistake. */
-	if (rc == -ENODATA)
-		rc = incise_error_set(err, ENODATA,
-				      "%s: has format %d, which has no seal: it is not "
-				      "the recording of the statement, or its seal was "
-				      "removed",
-				      recording->path, recording->form);
-	incise_recording_close(recording);
 	if (!rc)
 		rc = incise_seal_read(&statement, text, length, err);
-	return rc ? rc
-		  : verify_one(path, watch, INCISE_VERIFY_ALL, &statement, report, err);
+	if (!rc)
+		rc = incise_verify_recording(recording, watch, INCISE_VERIFY_ALL,
+					     &statement, report, err);
+	incise_recording_close(recording);
+	return rc;
 }

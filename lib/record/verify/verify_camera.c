@@ -8,10 +8,11 @@
  *                  └ missing └ extra     ahead of the table
  *
  * A damaged frame may have any number, so a frame is identified by its number and by other
- * columns of its row: the timestamp in the file, or size and CRC. From form 4 on a row has a
- * digest of its frame, which nobody can forge.
+ * columns of its row: the timestamp in the file, or size and CRC. A row has a digest of its frame,
+ * which nobody can forge.
  */
 #include <errno.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -22,7 +23,7 @@
 
 struct row {
 	int64_t seq, t_ns, pts_ms, bytes, crc;
-	const uint8_t *sha256; /* zeros where it has none */
+	const uint8_t *sha256;
 };
 
 /* Consecutive frames that are wrong in the same way. */
@@ -81,13 +82,13 @@ static void flush_run(struct walk *walk)
 			 incise_verify_s(walk->verify, run->first_ns),
 			 incise_verify_s(walk->verify, run->last_ns));
 	if (run->what == ALTERED)
-		incise_verify_found(walk->verify, &found,
+		incise_verify_found(walk->verify, found,
 				    "camera: %llu altered in " INCISE_FRAMES_FILE
 				    ", %s: %s not as written",
 				    (unsigned long long)run->count, where, run->why);
 	else
 		incise_verify_found(
-			walk->verify, &found,
+			walk->verify, found,
 			run->what == MISSING
 				? "camera: %llu missing in " INCISE_FRAMES_FILE ", %s"
 				: "camera: %llu in " INCISE_FRAMES_FILE
@@ -275,12 +276,11 @@ static int walk_through(struct walk *walk, struct incise_frames_reader *reader)
 			rc = incise_verify_progress(verify, false);
 	}
 	if (!rc && got < 0) {
-		struct incise_verify_finding found =
-			finding(got == -ENOMEM ? INCISE_VERIFY_UNVERIFIED
-					       : INCISE_VERIFY_DAMAGED);
-
 		flush_run(walk);
-		incise_verify_found(verify, &found, "%s", err.text);
+		incise_verify_found(verify,
+				    finding(got == -ENOMEM ? INCISE_VERIFY_UNVERIFIED
+							   : INCISE_VERIFY_DAMAGED),
+				    "%s", err.text);
 		return 0;
 	}
 	while (!rc && walk->has_row)
@@ -298,7 +298,7 @@ static void report_unopened(struct incise_verification *verify, const char *path
 
 	if (access(path, F_OK) && errno == ENOENT) {
 		found.count = verify->report->frames.missing = verify->frames;
-		incise_verify_found(verify, &found,
+		incise_verify_found(verify, found,
 				    "camera: " INCISE_FRAMES_FILE
 				    " is missing, and %llu frames with it",
 				    (unsigned long long)verify->frames);
@@ -307,29 +307,24 @@ static void report_unopened(struct incise_verification *verify, const char *path
 	found.kind =
 		err->code == EINVAL ? INCISE_VERIFY_DAMAGED : INCISE_VERIFY_UNVERIFIED;
 	found.count = verify->frames;
-	incise_verify_found(verify, &found, "camera: the frames are not verified: %s",
+	incise_verify_found(verify, found, "camera: the frames are not verified: %s",
 			    err->text);
 }
 
 static int prepare(struct walk *walk)
 {
 	struct incise_recording *recording = walk->verify->recording;
-	sqlite3_stmt *stmt = NULL;
 
-	if (incise_source_open(&walk->rows, recording, INCISE_LEDGER_CAMERA, NULL) ||
-	    sqlite3_prepare_v2(
-		    recording->db,
-		    "SELECT stamped, delay_ns, ended IS NOT NULL FROM streams WHERE "
-		    "name = 'camera'",
-		    -1, &stmt, NULL) != SQLITE_OK)
-		return -EIO;
-	if (sqlite3_step(stmt) == SQLITE_ROW) {
-		walk->timestamped = sqlite3_column_int(stmt, 0);
-		walk->delay_ns = sqlite3_column_int64(stmt, 1);
-		walk->ended = sqlite3_column_int(stmt, 2);
+	for (int i = 0; i < recording->n_table; i++) {
+		const struct incise_stream *stream = &recording->table[i];
+
+		if (strcmp(stream->name, "camera"))
+			continue;
+		walk->timestamped = stream->timestamped;
+		walk->delay_ns = llrint(stream->delay_ms * 1e6);
+		walk->ended = *stream->ended;
 	}
-	sqlite3_finalize(stmt);
-	return 0;
+	return incise_source_open(&walk->rows, recording, INCISE_LEDGER_CAMERA, NULL);
 }
 
 int incise_verify_camera(struct incise_verification *verify)
@@ -355,7 +350,7 @@ int incise_verify_camera(struct incise_verification *verify)
 		report_unopened(verify, path ? path : "", &err);
 		goto out;
 	}
-	reader->digests = verify->recording->form >= 4;
+	reader->digests = true;
 	rc = prepare(&walk);
 	if (!rc)
 		rc = walk_through(&walk, reader);

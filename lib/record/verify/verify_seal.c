@@ -45,7 +45,7 @@ static void flush_wrong(struct walk *walk)
 		snprintf(commits, sizeof(commits), "commits %lld to %lld differ",
 			 (long long)found->first_block, (long long)found->last_block);
 	incise_verify_found(
-		walk->verify, found,
+		walk->verify, *found,
 		"seal: %s, up to %.4f s: %s, the ledger or the seal are not those written",
 		commits, incise_verify_s(walk->verify, found->last_ns),
 		found->first_block ? "rows or tables" : "table meta of the start, rows");
@@ -86,7 +86,7 @@ static void report_behind(struct walk *walk)
 		return;
 	walk->bad = true;
 	found.count = walk->behind;
-	incise_verify_found(walk->verify, &found,
+	incise_verify_found(walk->verify, found,
 			    "seal: %llu rows are behind its last commit, %lld",
 			    (unsigned long long)walk->behind, (long long)walk->last);
 }
@@ -165,7 +165,7 @@ static int compare_parts(struct incise_verification *verify,
 			 i == INCISE_SEAL_FILE ? "bytes" : "rows",
 			 (unsigned long long)a->rows);
 		found.count = b->rows;
-		incise_verify_found(verify, &found, "%s differs from the statement%s%s%s",
+		incise_verify_found(verify, found, "%s differs from the statement%s%s%s",
 				    found.stream, *place ? ", " : "", place,
 				    a->rows == b->rows ? "" : rows);
 		n++;
@@ -187,14 +187,14 @@ static void compare_statement(struct walk *walk, const struct incise_seal_statem
 
 	if (strcmp(was->identity, is->identity) != 0) {
 		found.stream = "start";
-		incise_verify_found(verify, &found,
+		incise_verify_found(verify, found,
 				    "the statement is of another recording: it has the "
 				    "identity %s, this one %s",
 				    was->identity, is->identity);
 		return;
 	}
 	if (incise_seal_before(verify->recording, was->last.head)) {
-		incise_verify_found(verify, &found,
+		incise_verify_found(verify, found,
 				    "the statement is of this recording before its "
 				    "conversion from an older format: keep it in "
 				    "seal-before/, and sign the recording as it is now");
@@ -207,7 +207,7 @@ static void compare_statement(struct walk *walk, const struct incise_seal_statem
 		found.first_ns = walk->last_ns;
 		found.last_ns = was->last.t_ns;
 		incise_verify_found(
-			verify, &found,
+			verify, found,
 			"ends with commit %lld of the %lld that were signed, at %.4f of "
 			"%.4f s: its end was removed",
 			(long long)walk->last, (long long)was->last.commit,
@@ -220,7 +220,7 @@ static void compare_statement(struct walk *walk, const struct incise_seal_statem
 		    : compare_parts(verify, was, is, same, from, differs ? to : NULL);
 	if (!n && differs) {
 		describe_place(verify, from, to, &found, place, sizeof(place));
-		incise_verify_found(verify, &found,
+		incise_verify_found(verify, found,
 				    "seal: its heads differ from the statement, %s: "
 				    "ledger, times or numbers of commits were changed",
 				    place);
@@ -232,7 +232,7 @@ static void compare_statement(struct walk *walk, const struct incise_seal_statem
 		found.first_ns = was->last.t_ns;
 		found.last_ns = walk->last_ns;
 		incise_verify_found(
-			verify, &found,
+			verify, found,
 			"commits %lld to %lld, %.4f to %.4f s, are behind the last one "
 			"that was signed: the statement does not cover them, nor depth, "
 			"events, knots, streams and meta",
@@ -251,17 +251,14 @@ int incise_verify_seal(struct incise_verification *verify)
 	struct incise_error err = {0};
 	/* With rows that the ledger does not have, blocks are not those of the digests. */
 	const bool known = verify->hashed && !verify->rows_altered;
-	int rc = incise_statement_make(&is, verify->recording,
-				       known ? verify->digests : NULL,
+	int rc = incise_statement_make(&is, verify->recording, known,
 				       was ? was->last.commit : -1, step, &walk, &err);
 
 	if (rc == -ECANCELED)
 		return rc;
 	if (rc) {
-		struct incise_verify_finding found =
-			incise_verify_finding(INCISE_VERIFY_DAMAGED);
-
-		incise_verify_found(verify, &found, "%s", err.text);
+		incise_verify_found(verify, incise_verify_finding(INCISE_VERIFY_DAMAGED),
+				    "%s", err.text);
 		return 0;
 	}
 	report_behind(&walk);

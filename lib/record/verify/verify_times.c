@@ -4,6 +4,7 @@
  * the line in table knots, is not to be trusted; see lib/record/time/fit.h.
  */
 #include <math.h>
+#include "../read/rows.h"
 #include "verify.h"
 
 /* Whether two rows are reported as one: of one kind, in a row but for some in between. */
@@ -29,7 +30,7 @@ static void report(struct incise_verification *verify,
 	found.last_ns = last->t_ns;
 	found.count = count;
 	incise_verify_found(
-		verify, &found,
+		verify, found,
 		"tracker: numbers %lld to %lld, %.4f to %.4f s: %llu rows %s; their "
 		"t_ns is wrong; readers use the arrival, with a standard uncertainty "
 		"of up to %.3g ms",
@@ -43,17 +44,17 @@ void incise_verify_times(struct incise_verification *verify)
 {
 	const struct incise_fit_time *other = NULL;
 	struct incise_fit_time first, last;
-	struct incise_recording_line line;
+	struct incise_row_times times;
 	struct incise_error err = {0};
 	uint64_t count = 0;
 	double sd_ns = 0;
 
-	if (incise_recording_line(verify->recording, "tracker", &line, &err))
+	if (incise_row_times_open(&times, verify->recording, "tracker", &err))
 		return;
 	/* Without a line all rows are timed by arrival, as their t_ns is. */
-	if (line.n && line.others)
-		other = incise_others_next(line.others, 0);
-	for (; other; other = incise_others_next(line.others, other->seq + 1)) {
+	if (times.source->n_knots)
+		other = incise_row_times_other(&times, 0);
+	for (; other; other = incise_row_times_other(&times, other->seq + 1)) {
 		/* On the line, with an uncertainty that covers the doubt. */
 		if (other->kind == INCISE_FIT_WIDER)
 			continue;
@@ -71,5 +72,5 @@ void incise_verify_times(struct incise_verification *verify)
 	}
 	if (count)
 		report(verify, &first, &last, count, sd_ns);
-	incise_recording_line_free(&line);
+	incise_row_times_close(&times);
 }

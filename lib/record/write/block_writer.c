@@ -9,6 +9,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 #include "../frames.h"
+#include "../schema.h"
 #include "block_writer.h"
 
 int incise_block_writer_start(struct incise_block_writer *writer, sqlite3 *db)
@@ -38,12 +39,6 @@ void incise_block_writer_free(struct incise_block_writer *writer)
 	incise_seal_free(&writer->seal);
 	free(writer->data);
 	*writer = (struct incise_block_writer){0};
-}
-
-static int run_statement(sqlite3_stmt *stmt)
-{
-	sqlite3_step(stmt);
-	return sqlite3_reset(stmt);
 }
 
 static void bind_block(sqlite3_stmt *stmt, const char *stream,
@@ -80,7 +75,7 @@ int incise_block_writer_put(struct incise_block_writer *writer, int stream,
 	bind_block(writer->block, incise_ledger_forms[stream].stream, block);
 	sqlite3_bind_blob(writer->block, 10, digest, sizeof(digest), SQLITE_TRANSIENT);
 	sqlite3_bind_blob64(writer->block, 11, writer->data, size, SQLITE_STATIC);
-	return run_statement(writer->block);
+	return incise_schema_run(writer->block);
 }
 
 int incise_block_writer_commit(struct incise_block_writer *writer, int64_t t_ns)
@@ -96,7 +91,7 @@ int incise_block_writer_commit(struct incise_block_writer *writer, int64_t t_ns)
 		return SQLITE_NOMEM;
 	sqlite3_bind_blob(stmt, 3 + INCISE_LEDGER_FORMS, seal->head, sizeof(seal->head),
 			  SQLITE_TRANSIENT);
-	return run_statement(stmt);
+	return incise_schema_run(stmt);
 }
 
 /* An entry of table ledger: a sealed table, or camera.mkv. */
@@ -104,7 +99,7 @@ static int put_entry(struct incise_block_writer *writer, const char *stream,
 		     const struct incise_ledger_block *block)
 {
 	bind_block(writer->entry, stream, block);
-	return run_statement(writer->entry);
+	return incise_schema_run(writer->entry);
 }
 
 int incise_block_writer_seal(struct incise_block_writer *writer, int folder, bool whole,

@@ -61,7 +61,7 @@ static int open_camera(struct incise_recorder *rec,
 			return -errno;
 	}
 	if (asprintf(&file, "%s/%s", rec->part, INCISE_FRAMES_FILE) < 0)
-		return incise_error_set(err, ENOMEM, "%s: out of memory", rec->path);
+		return incise_schema_no_memory(rec->path, err);
 	rec->camera.writer = incise_frames_writer_new(file, &shape, &options, err);
 	free(file);
 	return rec->camera.writer ? 0 : -errno;
@@ -309,6 +309,7 @@ static void recorder_free(struct incise_recorder *rec)
 	for (int i = 0; i < INCISE_LEDGER_FORMS; i++)
 		incise_batch_free(&rec->batches[i]);
 	free(rec->summary.waiting);
+	free(rec->summary.ends_ns);
 	if (rec->folder >= 0)
 		close(rec->folder);
 	if (rec->parent >= 0)
@@ -366,7 +367,7 @@ static int start(struct incise_recorder *rec, const struct incise_recorder_setup
 	int rc = incise_recorder_check_space(rec, setup->planned_s, err);
 
 	rec->worthless = true;
-	if (!rc && incise_seal_init(&rec->blocks.seal, INCISE_SCHEMA_VERSION))
+	if (!rc && incise_seal_init(&rec->blocks.seal))
 		rc = incise_error_set(err, ENOMEM,
 				      "%s: libcrypto gives no SHA-256; check its "
 				      "openssl.cnf",
@@ -383,7 +384,7 @@ static int start(struct incise_recorder *rec, const struct incise_recorder_setup
 			&rec->wall.sampler, setup->clock_source,
 			incise_clock_is_real(incise_rig_clock(rec->rig)), err);
 	if (!rc && setup->armed && incise_recorder_arm(rec))
-		rc = incise_error_set(err, ENOMEM, "%s: out of memory", rec->path);
+		rc = incise_schema_no_memory(rec->path, err);
 	if (!rc && !setup->armed)
 		rc = start_camera(rec, err);
 	if (!rc)
@@ -409,7 +410,7 @@ struct incise_recorder *incise_recorder_new(const char *path, struct incise_rig 
 		return NULL;
 	rec = calloc(1, sizeof(*rec));
 	if (!rec) {
-		incise_error_set(err, ENOMEM, "%s: out of memory", path);
+		incise_schema_no_memory(path, err);
 		return NULL;
 	}
 	rec->parent = rec->folder = -1;
@@ -423,6 +424,8 @@ struct incise_recorder *incise_recorder_new(const char *path, struct incise_rig 
 	if (incise_rig_force(rig))
 		incise_force_info(incise_rig_force(rig), &rec->force_info);
 	incise_force_calibration(&rec->force_info, &rec->calibration);
+	rec->stats.full_scale_N =
+		rec->force_info.full_scale_V * 1e3 / rec->calibration.force_mV_N;
 	rec->stats.zero_mV = rec->calibration.force_zero_mV;
 	if (incise_rig_tracker(rig))
 		incise_tracker_info(incise_rig_tracker(rig), &rec->tracker_info);
@@ -606,24 +609,6 @@ int incise_recorder_mark(struct incise_recorder *rec, const char *kind, const ch
 	return rec->failed;
 }
 
-int incise_recorder_mark_at(struct incise_recorder *rec, int64_t t_ns, const char *kind,
-			    const char *text, struct incise_error *err)
-{
-	if (!rec->failed &&
-	    incise_recorder_note_at(rec, t_ns, kind, "%s", text) != SQLITE_OK)
-		rec->failed = incise_recorder_fail(rec, err);
-	return rec->failed;
-}
-
-int incise_recorder_wall(const struct incise_recorder *rec,
-			 struct incise_wall_point *point)
-{
-	if (!rec->wall.known)
-		return -ENODATA;
-	*point = rec->wall.newest;
-	return 0;
-}
-
 /* --- end -------------------------------------------------------------------------- */
 
 int incise_recorder_end(struct incise_recorder *rec, struct incise_error *err)
@@ -740,4 +725,13 @@ int incise_recorder_close(struct incise_recorder *rec, struct incise_error *err)
 	if (rc)
 		errno = -rc;
 	return rc;
+}
+
+void incise_recorder_discard(struct incise_recorder *rec)
+{
+	if (!rec->failed) {
+		rec->failed = -ECANCELED;
+		rec->worthless = true;
+	}
+	incise_recorder_close(rec, NULL);
 }

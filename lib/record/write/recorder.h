@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Inside a recorder; for lib/record/write/recorder*.c only. Each file calls only those below it.
+ * Inside a recorder; for capture.c and recorder*.c of this folder only. Each file calls only those
+ * below it.
  *
+ *     capture.c             a whole capture
  *     recorder.c            start, poll, commits and end; the camera
  *     recorder_rows.c       streams: from samples to blocks; zero; pretrigger
  *     recorder_summary.c    cuts, largest depth and force
@@ -78,7 +80,12 @@ struct incise_recorder_summary {
 		int32_t code;
 	} * waiting;
 	size_t n, capacity;
-	double depth_max_mm;	       /* in a cut */
+	double depth_max_mm; /* in a cut */
+	/* Cuts by the depths alone, and when each ended, for readers of a part. */
+	struct incise_cut_count by_depth;
+	int64_t *ends_ns;
+	size_t n_ends, ends_capacity;
+	bool no_ends;		       /* out of memory: readers look for them */
 	int32_t code_least, code_most; /* in cuts; least above most: none */
 };
 
@@ -168,6 +175,11 @@ struct incise_recorder {
 	int failed;	     /* negative errno of the failure that ended it, or 0 */
 	bool worthless;	     /* failed before there was anything to keep */
 };
+
+/* --- recorder.c -------------------------------------------------------------------- */
+
+/* Free a recorder; unless it failed, remove what it wrote. */
+void incise_recorder_discard(struct incise_recorder *rec);
 
 /* --- recorder_rows.c --------------------------------------------------------------- */
 
@@ -264,13 +276,12 @@ int incise_recorder_open_database(struct incise_recorder *rec,
 				  const char *calibration_path, struct incise_error *err);
 void incise_recorder_close_database(struct incise_recorder *rec);
 
-/* Run a bound statement. Returns an SQLite code. */
-int incise_recorder_run(sqlite3_stmt *stmt);
-
 /* Set a value in table meta; NaN becomes NULL: not known. Returns an SQLite code. */
 int incise_recorder_set_integer(struct incise_recorder *rec, const char *key,
 				int64_t value);
 int incise_recorder_set_real(struct incise_recorder *rec, const char *key, double value);
+int incise_recorder_set_bytes(struct incise_recorder *rec, const char *key,
+			      const void *bytes, size_t n);
 
 /* Add a row to table events, at a time or now. Returns an SQLite code. */
 int incise_recorder_note_at(struct incise_recorder *rec, int64_t t_ns, const char *kind,

@@ -69,19 +69,13 @@ int incise_recorder_check(struct incise_recorder *rec, int code, struct incise_e
 
 /* --- rows of tables meta and events -------------------------------------------------- */
 
-int incise_recorder_run(sqlite3_stmt *stmt)
-{
-	sqlite3_step(stmt);
-	return sqlite3_reset(stmt);
-}
-
 static int set_text(struct incise_recorder *rec, const char *key, const char *value)
 {
 	sqlite3_stmt *stmt = rec->stmt[SET_META];
 
 	sqlite3_bind_text(stmt, 1, key, -1, SQLITE_STATIC);
 	sqlite3_bind_text(stmt, 2, value, -1, SQLITE_TRANSIENT);
-	return incise_recorder_run(stmt);
+	return incise_schema_run(stmt);
 }
 
 int incise_recorder_set_integer(struct incise_recorder *rec, const char *key,
@@ -91,7 +85,17 @@ int incise_recorder_set_integer(struct incise_recorder *rec, const char *key,
 
 	sqlite3_bind_text(stmt, 1, key, -1, SQLITE_STATIC);
 	sqlite3_bind_int64(stmt, 2, value);
-	return incise_recorder_run(stmt);
+	return incise_schema_run(stmt);
+}
+
+int incise_recorder_set_bytes(struct incise_recorder *rec, const char *key,
+			      const void *bytes, size_t n)
+{
+	sqlite3_stmt *stmt = rec->stmt[SET_META];
+
+	sqlite3_bind_text(stmt, 1, key, -1, SQLITE_STATIC);
+	sqlite3_bind_blob64(stmt, 2, n ? bytes : "", n, SQLITE_TRANSIENT);
+	return incise_schema_run(stmt);
 }
 
 /* SQLite keeps NaN as NULL: not known. */
@@ -101,7 +105,7 @@ int incise_recorder_set_real(struct incise_recorder *rec, const char *key, doubl
 
 	sqlite3_bind_text(stmt, 1, key, -1, SQLITE_STATIC);
 	sqlite3_bind_double(stmt, 2, value);
-	return incise_recorder_run(stmt);
+	return incise_schema_run(stmt);
 }
 
 /* End a truncated text before its last, incomplete character. */
@@ -128,7 +132,7 @@ static int note(struct incise_recorder *rec, int64_t t_ns, const char *kind,
 	sqlite3_bind_int64(stmt, 1, t_ns);
 	sqlite3_bind_text(stmt, 2, kind, -1, SQLITE_TRANSIENT);
 	sqlite3_bind_text(stmt, 3, text, -1, SQLITE_TRANSIENT);
-	return incise_recorder_run(stmt);
+	return incise_schema_run(stmt);
 }
 
 int incise_recorder_note_at(struct incise_recorder *rec, int64_t t_ns, const char *kind,
@@ -291,7 +295,7 @@ int incise_recorder_open_database(struct incise_recorder *rec,
 	int rc;
 
 	if (asprintf(&file, "%s/%s", rec->part, INCISE_SCHEMA_DB) < 0)
-		return incise_error_set(err, ENOMEM, "%s: out of memory", rec->path);
+		return incise_schema_no_memory(rec->path, err);
 	rc = sqlite3_open_v2(
 		file, &rec->db,
 		SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX, NULL);

@@ -51,7 +51,7 @@ int incise_recorder_split_path(struct incise_recorder *rec, const char *path,
 	rec->path = strndup(path, length);
 	if (!rec->path || asprintf(&rec->part, "%s.part", rec->path) < 0) {
 		rec->part = NULL;
-		return incise_error_set(err, ENOMEM, "%s: out of memory", path);
+		return incise_schema_no_memory(path, err);
 	}
 	slash = strrchr(rec->path, '/');
 	rec->name = slash ? slash + 1 : rec->path;

@@ -18,6 +18,7 @@
 #include "../frames.h"
 #include "../ledger.h"
 #include "../read/cut.h"
+#include "../schema.h"
 #include "recorder.h"
 
 /* Time for the zero of the force channel, with the tool held free. */
@@ -382,7 +383,7 @@ static ssize_t enter(struct incise_recorder *rec, int i, int64_t seq, int64_t t_
 	    incise_block_writer_put(&rec->blocks, i, batch, &block) != SQLITE_OK)
 		return incise_recorder_fail(rec, err);
 	if (!incise_batch_reserve(batch, batch->n + 1))
-		return incise_error_set(err, ENOMEM, "%s: out of memory", rec->path);
+		return incise_schema_no_memory(rec->path, err);
 	at = (ssize_t)batch->n;
 	batch->column[0].i[at] = seq;
 	batch->column[1].i[at] = t_ns;
@@ -904,7 +905,7 @@ static int write_stream(struct incise_recorder *rec, int i)
 		sqlite3_bind_text(stmt, 18, now.ended, -1, SQLITE_TRANSIENT);
 	else
 		sqlite3_bind_null(stmt, 18);
-	return incise_recorder_run(stmt);
+	return incise_schema_run(stmt);
 }
 
 static int write_knots(struct incise_recorder *rec, int i)
@@ -915,7 +916,7 @@ static int write_knots(struct incise_recorder *rec, int i)
 	int n = incise_timeline_knots(&stream->timeline, knots), rc;
 
 	sqlite3_bind_text(stmt, 1, stream->name, -1, SQLITE_STATIC);
-	rc = incise_recorder_run(stmt);
+	rc = incise_schema_run(stmt);
 	stmt = rec->stmt[INSERT_KNOT];
 	for (int k = 0; k < n && rc == SQLITE_OK; k++) {
 		sqlite3_bind_text(stmt, 1, stream->name, -1, SQLITE_STATIC);
@@ -924,7 +925,7 @@ static int write_knots(struct incise_recorder *rec, int i)
 		sqlite3_bind_int64(stmt, 4, knots[k].t_ns);
 		sqlite3_bind_double(stmt, 5, knots[k].sd_ns);
 		sqlite3_bind_int(stmt, 6, knots[k].starts);
-		rc = incise_recorder_run(stmt);
+		rc = incise_schema_run(stmt);
 	}
 	return rc;
 }

@@ -58,6 +58,31 @@ static void take_force(struct incise_recorder_summary *summary,
 		summary->code_most = force->code;
 }
 
+static void note_end(struct incise_recorder_summary *summary, int64_t t_ns)
+{
+	if (summary->n_ends == summary->ends_capacity) {
+		size_t capacity = summary->n_ends ? 2 * summary->n_ends : 64;
+		void *more = reallocarray(summary->ends_ns, capacity,
+					  sizeof(*summary->ends_ns));
+
+		summary->no_ends |= !more;
+		if (!more)
+			return;
+		summary->ends_ns = more;
+		summary->ends_capacity = capacity;
+	}
+	summary->ends_ns[summary->n_ends++] = t_ns;
+}
+
+static void follow_by_depth(struct incise_recorder_summary *summary,
+			    const struct incise_depth_row *row)
+{
+	const bool inside = summary->by_depth.inside;
+
+	if (!incise_cut_step(&summary->by_depth, row->depth_mm) && inside)
+		note_end(summary, row->t_ns);
+}
+
 void incise_recorder_follow_depth(struct incise_recorder *rec,
 				  const struct incise_depth_row *row)
 {
@@ -65,6 +90,7 @@ void incise_recorder_follow_depth(struct incise_recorder *rec,
 	struct incise_cut_follow *follow = &summary->follow;
 	size_t k = 0;
 
+	follow_by_depth(summary, row);
 	follow->before = follow->after;
 	follow->after =
 		(struct incise_cut_depth){row->t_ns, row->depth_mm, row->velocity_mm_s};
@@ -92,6 +118,10 @@ int incise_recorder_write_summary(struct incise_recorder *rec)
 	int bad = incise_recorder_set_integer(rec, "cuts", summary->follow.cut.count);
 
 	bad |= incise_recorder_set_real(rec, "depth_max_mm", summary->depth_max_mm);
+	if (!summary->no_ends)
+		bad |= incise_recorder_set_bytes(rec, "cut_ends_ns", summary->ends_ns,
+						 summary->n_ends *
+							 sizeof(*summary->ends_ns));
 	/* Without a zero there is no force. */
 	return bad |
 	       incise_recorder_set_real(rec, "force_max_N", any ? fmax(0, mV / mV_N) : 0);

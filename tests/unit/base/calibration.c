@@ -205,6 +205,31 @@ TEST(what_failed_is_not_in_force)
 	temp_file_free(&file);
 }
 
+TEST(the_last_value_that_passed_is_found)
+{
+	const struct incise_calibration_record records[] = {
+		{.date = "a",
+		 .n = 1,
+		 .values = {{"force_mV_N", "mV/N", NAN, 1230, 1}},
+		 .pass = true},
+		{.date = "b",
+		 .n = 2,
+		 .values = {{"force_zero_mV", "mV", NAN, 180, 1},
+			    {"force_mV_N", "mV/N", 1230, 1250, 2}},
+		 .pass = true},
+		{.date = "c", .n = 1, .values = {{"force_mV_N", "mV/N", 1250, 900, 3}}},
+	};
+	const struct incise_calibration_record *record = NULL;
+
+	assert_ptr_equal(incise_calibration_last(records, 3, "force_mV_N", &record),
+			 &records[1].values[1]);
+	assert_ptr_equal(record, &records[1]);
+	assert_ptr_equal(incise_calibration_last(records, 1, "force_mV_N", NULL),
+			 &records[0].values[0]);
+	assert_null(incise_calibration_last(records, 3, "depth_mm_px", NULL));
+	assert_null(incise_calibration_last(records, 0, "force_mV_N", NULL));
+}
+
 TEST(every_key_comes_back)
 {
 	struct temp_file file = temp_file_new("calibration.conf", "");

@@ -50,7 +50,7 @@ TEST(test_paper)
 	assert_true(fit.mm_px == 47.5 / 400);
 	assert_true(fit.full_px == 400);
 	assert_true(inlier[0]);
-	assert_int_equal(fit.n_parts, 3);
+	assert_int_equal(fit.budget.n, 3);
 	/* u/mm_px: 0.012/47.5 and 0.02/400 */
 	assert_true(fabs(fit.u_mm_px / fit.mm_px - hypot(0.012 / 47.5, 0.02 / 400)) <
 		    1e-12);

@@ -202,9 +202,9 @@ TEST(a_code_counts_where_no_noise_dithers)
 	assert_int_equal(run(&rig, &setup, &coarse, NULL, NULL), 0);
 	setup.dithered = true;
 	assert_int_equal(run(&rig, &setup, &fine, NULL, NULL), 0);
-	assert_int_equal(coarse.parts, fine.parts + 1);
-	assert_string_equal(coarse.part[2].source, "resolution of the converter");
-	assert_float_equal(coarse.part[2].u, 5000.0 / 4096 / sqrt(12), 1e-12);
+	assert_int_equal(coarse.budget.n, fine.budget.n + 1);
+	assert_string_equal(coarse.budget.part[2].source, "resolution of the converter");
+	assert_float_equal(coarse.budget.part[2].u, 5000.0 / 4096 / sqrt(12), 1e-12);
 	assert_true(coarse.zero_u_mV > fine.zero_u_mV);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/motor.c over lib/device/gpio/pulser.c, on lines and a clock that a test
+ * lib/device/motor.c over lib/device/pulser.c, on lines and a clock that a test
  * makes: all cases of the conformance table, exactly in time and with a thread that is
  * late; the same table for the virtual rig.
  */

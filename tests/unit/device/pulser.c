@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/gpio/pulser.c: what it does when something is wrong, on lines and a clock that
+ * lib/device/pulser.c: what it does when something is wrong, on lines and a clock that
  * a test makes. What it does when all is well is in tests/unit/device/motor.c.
  */
 #include "../unit.h"

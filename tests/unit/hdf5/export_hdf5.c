@@ -7,16 +7,24 @@
 #include <sys/resource.h>
 #include <signal.h>
 #include <hdf5.h>
-#include <incise/backend.h>
 #include <incise/outfile.h>
 #include "../../../lib/record/export/table_writer.h"
 
+struct row {
+	int64_t cut;
+	double t_s, force_N;
+	int64_t count;
+	bool clipped;
+};
+
+#define AT(member) offsetof(struct row, member), NULL, NULL, NULL
+
 static const struct incise_table_column columns[] = {
-	{"cut", "1", "a name", INCISE_COLUMN_NAME, 0, NULL, NULL},
-	{"t_s", "s", "a time", INCISE_COLUMN_REAL, 6, NULL, NULL},
-	{"force_N", "N", "a force", INCISE_COLUMN_SINGLE, 5, NULL, NULL},
-	{"count", "1", "a count", INCISE_COLUMN_INTEGER, 0, NULL, NULL},
-	{"clipped", "1", "a flag", INCISE_COLUMN_FLAG, 0, NULL, NULL},
+	{"cut", "1", "a name", INCISE_COLUMN_NAME, 0, AT(cut)},
+	{"t_s", "s", "a time", INCISE_COLUMN_REAL, 6, AT(t_s)},
+	{"force_N", "N", "a force", INCISE_COLUMN_SINGLE, 5, AT(force_N)},
+	{"count", "1", "a count", INCISE_COLUMN_INTEGER, 0, AT(count)},
+	{"clipped", "1", "a flag", INCISE_COLUMN_FLAG, 0, AT(clipped)},
 };
 
 #define FILE_NAME "table.h5"
@@ -59,24 +67,26 @@ static int write_rows(int64_t n, const struct incise_provenance *provenance,
 		      struct incise_error *err)
 {
 	struct incise_outfile *file = incise_outfile_open(FILE_NAME, err);
-	struct incise_table table;
+	struct incise_table table = {
+		.format = &incise_table_hdf5,
+		.columns = columns,
+		.n_columns = 5,
+		.provenance = provenance,
+	};
 	char name[32];
 	int rc;
 
 	assert_non_null(file);
-	rc = incise_table_open(&table, incise_backend.open(NULL, err),
-			       incise_outfile_stream(file), columns, 5, provenance, err);
+	table.out = incise_outfile_stream(file);
+	rc = incise_table_open(&table, err);
 	for (int64_t i = 0; i < n && !rc; i++) {
 		int64_t mixed = mix(i);
 
 		snprintf(name, sizeof(name), "liver-%02d", (int)(i / 20000) + 1);
 		rc = incise_table_add(&table,
-				      (union incise_cell[]){{.integer = incise_table_name(
-								     &table, name)},
-							    {.real = time_of(i)},
-							    {.real = mixed * 0x1p-60},
-							    {.integer = mixed},
-							    {.integer = i % 3 == 0}},
+				      &(struct row){incise_table_name(&table, name),
+						    time_of(i), mixed * 0x1p-60, mixed,
+						    i % 3 == 0},
 				      err);
 	}
 	if (!rc)
@@ -128,7 +138,7 @@ TEST(rows_come_back)
 					50001};
 	struct incise_provenance provenance = {0};
 
-	assert_int_equal(incise_provenance_add(&provenance, "source", "liver.rec"), 0);
+	incise_provenance_add(&provenance, "source", "liver.rec");
 	for (size_t k = 0; k < sizeof(sizes) / sizeof(*sizes); k++) {
 		int64_t n = sizes[k];
 		double *cut, *t_s, *force, *count, *clipped;

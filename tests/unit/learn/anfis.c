@@ -93,12 +93,15 @@ TEST(test_gradient)
 	}
 }
 
-static void count_epoch(void *user, int epoch, double train_rmse, double check_rmse)
+static int count_epoch(void *user, const struct incise_train_step *step)
 {
 	int *epochs = user;
 
-	assert_int_equal(epoch, ++*epochs);
-	assert_true(isfinite(train_rmse) && isnan(check_rmse));
+	if (!step->epoch)
+		return 0;
+	assert_int_equal(step->epoch, ++*epochs);
+	assert_true(isfinite(step->train_rmse) && isnan(step->check_rmse));
+	return 0;
 }
 
 /* The epoch of the least training error is returned, not the last. */
@@ -107,12 +110,9 @@ TEST(test_best_epoch_is_kept)
 	struct incise_pairs pairs = {rows, PAIRS, 2};
 	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 1, 1);
 	int epochs = 0;
-	struct incise_anfis anfis = {.train = &pairs,
-				     .ridge = 1e-6,
-				     .step = 3,
-				     .epochs = 20,
-				     .progress = count_epoch,
-				     .user = &epochs};
+	struct incise_watch watch = {.progress = count_epoch, .user = &epochs};
+	struct incise_anfis anfis = {
+		.train = &pairs, .ridge = 1e-6, .step = 3, .epochs = 20, .watch = &watch};
 
 	fill();
 	assert_int_equal(incise_anfis_run(model, &anfis), 0);

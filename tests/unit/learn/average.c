@@ -94,8 +94,8 @@ TEST(test_never_worse_than_plane_or_mean)
 
 			make_cuts(kind, set);
 			model = learn(mfs, NULL, &report);
-			assert_int_equal(incise_baselines(&train, groups, &unseen, &other,
-							  NULL),
+			assert_int_equal(incise_baselines(&train, groups, &unseen, NULL,
+							  NULL, &other, NULL),
 					 0);
 			ratio = rmse(model) / fmin(other.linear, other.mean);
 			incise_model_free(model);
@@ -151,7 +151,8 @@ TEST(test_one_rule_is_a_plane)
 	for (int i = 0; i < ROWS; i++)
 		groups[i] = i; /* no cuts */
 	model = learn(mfs, NULL, &report);
-	assert_int_equal(incise_baselines(&train, groups, &unseen, &other, NULL), 0);
+	assert_int_equal(
+		incise_baselines(&train, groups, &unseen, NULL, NULL, &other, NULL), 0);
 	assert_true(fabs(rmse(model) / other.linear - 1) < 1e-2);
 	assert_true(report.averaged > 0 && report.mean_weight < 0.01);
 	incise_model_free(model);

@@ -32,7 +32,7 @@ TEST(test_plane)
 	double sum = 0, mean = 0;
 
 	fill(plane);
-	assert_int_equal(incise_baselines(&pairs, NULL, &pairs, &b, NULL), 0);
+	assert_int_equal(incise_baselines(&pairs, NULL, &pairs, NULL, NULL, &b, NULL), 0);
 	for (int i = 0; i < 400; i++)
 		mean += rows[3 * i + 2] / 400;
 	for (int i = 0; i < 400; i++)
@@ -49,7 +49,7 @@ TEST(test_stairs)
 	struct incise_baselines b;
 
 	fill(stairs);
-	assert_int_equal(incise_baselines(&pairs, NULL, &pairs, &b, NULL), 0);
+	assert_int_equal(incise_baselines(&pairs, NULL, &pairs, NULL, NULL, &b, NULL), 0);
 	assert_true(b.knn < 0.5 * b.linear);
 	assert_true(b.linear < b.mean);
 }
@@ -71,14 +71,15 @@ TEST(test_no_peeking)
 		incise_random_step(&seed);
 		rows[3 * i + 2] = (seed >> 11) * 0x1p-53;
 	}
-	assert_int_equal(incise_baselines(&pairs, NULL, &pairs, &b, NULL), 0);
+	assert_int_equal(incise_baselines(&pairs, NULL, &pairs, NULL, NULL, &b, NULL), 0);
 	assert_true(b.knn > 0.95 * b.mean);
 	/* Each cut with a level of its own, all in the same place of the inputs. */
 	for (int i = 0; i < 400; i++) {
 		groups[i] = i % 4;
 		rows[3 * i + 2] = i % 4;
 	}
-	assert_int_equal(incise_baselines(&pairs, groups, &pairs, &b, NULL), 0);
+	assert_int_equal(incise_baselines(&pairs, groups, &pairs, NULL, NULL, &b, NULL),
+			 0);
 	assert_true(b.knn > 0.95 * b.mean);
 }
 
@@ -88,7 +89,10 @@ TEST(test_refusals)
 			    other = {rows, 10, 3};
 	struct incise_baselines b;
 
-	assert_int_equal(incise_baselines(&none, NULL, &pairs, &b, NULL), -EINVAL);
-	assert_int_equal(incise_baselines(&pairs, NULL, &none, &b, NULL), -EINVAL);
-	assert_int_equal(incise_baselines(&pairs, NULL, &other, &b, NULL), -EINVAL);
+	assert_int_equal(incise_baselines(&none, NULL, &pairs, NULL, NULL, &b, NULL),
+			 -EINVAL);
+	assert_int_equal(incise_baselines(&pairs, NULL, &none, NULL, NULL, &b, NULL),
+			 -EINVAL);
+	assert_int_equal(incise_baselines(&pairs, NULL, &other, NULL, NULL, &b, NULL),
+			 -EINVAL);
 }

@@ -3,7 +3,6 @@
 #include "../unit.h"
 /* before cmocka.h, which has a macro fail() */
 #include "../../../lib/learn/dataset.c"
-#include <incise/dataset.h>
 #include "../message.h"
 #include "../base/temp_file.h"
 
@@ -232,4 +231,36 @@ TEST(test_split)
 	incise_train_side_free(&fit);
 	assert_int_equal(incise_train_split(data, 1, 1, &fit, &check, NULL), -EINVAL);
 	incise_dataset_free(data);
+}
+
+/* A column that a file has, and whether its first row states a number there. */
+TEST(test_has)
+{
+	static const struct {
+		const char *text;
+		bool has, stated;
+	} cases[] = {
+		{"# x\ncut,u\na,0.5\nb,nan\n", true, true},
+		{"cut,u\na,nan\nb,1\n", true, false},
+		{"cut,u\na,x\n", true, false},
+		{"cut,u\na\n", true, false},
+		{"cut,u\n", true, true},
+		{"cut,v\na,nan\n", false, true},
+		{"", false, true},
+	};
+	bool stated = false;
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct temp_file file = temp_file_new("d.csv", cases[i].text);
+
+		stated = true;
+		assert_int_equal(incise_dataset_has(file.path, "u", &stated),
+				 cases[i].has);
+		assert_int_equal(stated, cases[i].stated);
+		assert_int_equal(incise_dataset_has(file.path, "u", NULL), cases[i].has);
+		temp_file_free(&file);
+	}
+	stated = false;
+	assert_false(incise_dataset_has("/none", "u", &stated));
+	assert_false(stated); /* others have set it */
 }

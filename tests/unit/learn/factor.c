@@ -6,7 +6,7 @@
  */
 #include "../unit.h"
 #include <unistd.h>
-#include <incise/factor.h>
+#include "../../../lib/learn/factor.h"
 #include "../../../lib/base/random.h"
 #include "../../../lib/learn/design.h"
 #include "../cases.h"
@@ -47,8 +47,8 @@ static void add(struct incise_factor *factor, const char *hash, int from, int to
 		double row[3];
 
 		pair(i, row);
-		assert_int_equal(incise_factor_add(factor, row, (uint64_t)i / 100, NULL),
-				 0);
+		assert_int_equal(
+			incise_factor_add(factor, row, (uint64_t)i / 100, 1, NULL), 0);
 	}
 	for (int g = from / 100; g < to / 100; g++)
 		incise_factor_count(factor, (uint64_t)g, 1, 100);
@@ -115,7 +115,7 @@ static void add_groups(struct incise_factor *factor, uint64_t fold, int groups, 
 			double row[3];
 
 			pair(1000 * g + i, row);
-			assert_int_equal(incise_factor_add(factor, row, key, NULL), 0);
+			assert_int_equal(incise_factor_add(factor, row, key, 1, NULL), 0);
 		}
 		incise_factor_count(factor, key, 1, (uint64_t)different);
 	}
@@ -302,7 +302,7 @@ TEST(test_solution)
 	struct incise_factor_ridge ridge = {1e-3, 1, NAN};
 	struct incise_ridge same_ridge = {1e-3, 1, 60, 20};
 	struct incise_train_report report;
-	struct incise_lsq *qr = incise_lsq_new(60);
+	struct incise_lsq *qr = incise_lsq_new(60, NULL);
 	struct incise_design design;
 	double sum = 0, squares = 0, mean, sd, x[60], error = 0, w[20];
 
@@ -327,7 +327,7 @@ TEST(test_solution)
 		incise_lsq_add(qr, (row[2] - mean) / sd);
 	}
 	assert_int_equal(incise_lsq_solve(qr, &same_ridge, x), 0);
-	solved = incise_factor_solve(factor, &ridge, &report, NULL, NULL);
+	solved = incise_factor_solve(factor, &ridge, &report, NULL, NULL, NULL);
 	assert_non_null(solved);
 	for (int i = 0; i < ROWS; i++) {
 		double row[3], scaled[3], f[20], y;

@@ -147,7 +147,7 @@ TEST(test_factor)
 {
 	enum { N = 13, ROWS = 500 };
 	struct incise_gram *gram = incise_gram_new(N + 2);
-	struct incise_lsq *qr = incise_lsq_new(N), *lsq = incise_lsq_new(N);
+	struct incise_lsq *qr = incise_lsq_new(N, NULL), *lsq = incise_lsq_new(N, NULL);
 	double mean = 0.25, scale = 0.125, x[N], y[N], row[N + 2], error = 0;
 	const double *a, *b;
 	int stride;
@@ -193,7 +193,7 @@ TEST(test_dependent)
 	enum { N = 6 };
 	struct incise_ridge ridge = {1e-6, 1, N, 1};
 	struct incise_gram *gram = incise_gram_new(N + 2);
-	struct incise_lsq *lsq = incise_lsq_new(N);
+	struct incise_lsq *lsq = incise_lsq_new(N, NULL);
 	double x[N], mean, sd;
 	const double *factor;
 	int stride;

@@ -24,7 +24,7 @@ TEST(test_planted_solution)
 	const double planted[] = {1, -2, 3, 0.5, 0, 1e3, -1e-3};
 
 	for (size_t k = 0; k < sizeof(rows) / sizeof(*rows); k++) {
-		struct incise_lsq *lsq = incise_lsq_new(7);
+		struct incise_lsq *lsq = incise_lsq_new(7, NULL);
 		double x[7];
 
 		seed = k + 1;
@@ -49,7 +49,7 @@ TEST(test_planted_solution)
 TEST(test_ridge)
 {
 	static const double ridges[] = {10, 0, 1e-6, 1e6, 10};
-	struct incise_lsq *lsq = incise_lsq_new(1);
+	struct incise_lsq *lsq = incise_lsq_new(1, NULL);
 	double aa = 0, at = 0, x;
 
 	seed = 5;
@@ -73,7 +73,7 @@ TEST(test_ridge)
 /* Two equal columns: singular without ridge; with a little, the weight is shared. */
 TEST(test_rank_deficient)
 {
-	struct incise_lsq *lsq = incise_lsq_new(2);
+	struct incise_lsq *lsq = incise_lsq_new(2, NULL);
 	struct incise_ridge little = {1e-6, 1, 2, 1}, one = {1, 1, 2, 1};
 	double x[2], condition;
 
@@ -102,7 +102,7 @@ TEST(test_rank_deficient)
 
 TEST(test_condition)
 {
-	struct incise_lsq *lsq = incise_lsq_new(3);
+	struct incise_lsq *lsq = incise_lsq_new(3, NULL);
 	double condition;
 
 	for (int n = 0; n < 3; n++) {
@@ -124,7 +124,7 @@ TEST(test_condition_of_lapack)
 	seed = 7;
 	for (int n = 1; n <= 80; n += 1 + n / 8)
 		for (int grade = 0; grade < 12; grade += 3) {
-			struct incise_lsq *lsq = incise_lsq_new(n);
+			struct incise_lsq *lsq = incise_lsq_new(n, NULL);
 
 			for (int k = 0; k < n; k++) {
 				double *row = incise_lsq_row(lsq);
@@ -150,7 +150,7 @@ TEST(test_condition_of_lapack)
 /* A row far below the first still counts: 1e-9 of it is not rounding. */
 TEST(test_small_entries_count)
 {
-	struct incise_lsq *lsq = incise_lsq_new(2);
+	struct incise_lsq *lsq = incise_lsq_new(2, NULL);
 	double x[2];
 
 	for (int n = 0; n < 2; n++) {
@@ -167,7 +167,7 @@ TEST(test_small_entries_count)
 TEST(test_extreme_sizes)
 {
 	static const double sizes[] = {1e-300, 1e-160, 1, 1e160, 1e300};
-	struct incise_lsq *lsq = incise_lsq_new(2);
+	struct incise_lsq *lsq = incise_lsq_new(2, NULL);
 	double x[2];
 
 	for (size_t s = 0; s < sizeof(sizes) / sizeof(*sizes); s++) {
@@ -198,7 +198,8 @@ TEST(test_ridge_of_blocks)
 	for (size_t m = 0; m < sizeof(means) / sizeof(*means); m++)
 		for (int blocks = 1; blocks <= 5; blocks++) {
 			int n = 2 * blocks;
-			struct incise_lsq *a = incise_lsq_new(n), *b = incise_lsq_new(n);
+			struct incise_lsq *a = incise_lsq_new(n, NULL),
+					  *b = incise_lsq_new(n, NULL);
 			struct incise_ridge ridge = {0.7, means[m], n, blocks};
 			double x[10], y[10];
 
@@ -240,7 +241,7 @@ TEST(test_ridge_of_blocks)
 /* |R⁻ᵀa|² = aᵀ(AᵀA)⁻¹a, which for a row of orthogonal columns is Σ a²/|column|². */
 TEST(test_leverage)
 {
-	struct incise_lsq *lsq = incise_lsq_new(3);
+	struct incise_lsq *lsq = incise_lsq_new(3, NULL);
 	double a[] = {1, 2, 3};
 	const double *factor;
 	int stride;

@@ -4,10 +4,9 @@
  * that of a fit to pairs that have this error.
  */
 #include "../unit.h"
-#include <incise/factor.h>
-#include <incise/propagation.h>
+#include "../../../lib/learn/propagation.h"
 #include "../../../lib/base/random.h"
-#include "../../../lib/learn/design.h"
+#include "../../../lib/learn/factor.h"
 
 #define RIGS 8
 #define ROWS 400 /* of a rig */
@@ -72,12 +71,12 @@ static struct incise_model *fit(struct incise_propagation *p,
 				w = incise_propagation_add(p, row);
 			if (!rig)
 				row[2] += error * (row[4] + row[6]);
-			assert_int_equal(incise_factor_add_weighted(
-						 factor, row, (uint64_t)i / 100, w, NULL),
+			assert_int_equal(incise_factor_add(factor, row, (uint64_t)i / 100,
+							   w, NULL),
 					 0);
 		}
 	}
-	model = incise_factor_solve(factor, &ridge, NULL, uncertainty, NULL);
+	model = incise_factor_solve(factor, &ridge, NULL, uncertainty, NULL, NULL);
 	assert_non_null(model);
 	if (p)
 		assert_int_equal(

@@ -77,12 +77,15 @@ struct curve {
 	double train[600], check[600];
 };
 
-static void on_epoch(void *user, int epoch, double train_rmse, double check_rmse)
+static int on_epoch(void *user, const struct incise_train_step *step)
 {
 	struct curve *curve = user;
 
-	curve->train[epoch - 1] = train_rmse;
-	curve->check[epoch - 1] = check_rmse;
+	if (step->epoch) {
+		curve->train[step->epoch - 1] = step->train_rmse;
+		curve->check[step->epoch - 1] = step->check_rmse;
+	}
+	return 0;
 }
 
 static void train_mackey_glass(int first, int epochs, struct curve *curve,
@@ -420,7 +423,9 @@ TEST(test_default_holds_on_unseen_cut)
 	incise_train_options_init(&options);
 	options.groups = groups;
 	assert_int_equal(incise_train(model, &train, &check, &options, &report, NULL), 0);
-	assert_int_equal(incise_baselines(&train, groups, &check, &baselines, NULL), 0);
+	assert_int_equal(incise_baselines(&train, groups, &check, NULL, NULL, &baselines,
+					  NULL),
+			 0);
 	assert_true(report.check_rmse < 0.5 * baselines.mean);
 	/* The law is a product with a line: no more than a fifth over the best line. */
 	assert_true(report.check_rmse < 1.2 * baselines.linear);
@@ -750,19 +755,19 @@ TEST(test_report)
 }
 
 struct stopping {
-	volatile int stop;
-	int epochs;
+	int calls, at, epochs;
 };
 
-static void stop_after_two(void *user, int epoch, double train_rmse, double check_rmse)
+static int stop_at(void *user, const struct incise_train_step *step)
 {
 	struct stopping *stopping = user;
 
-	stopping->epochs = epoch;
-	stopping->stop = epoch >= 2;
+	if (step->epoch)
+		stopping->epochs = step->epoch;
+	return ++stopping->calls == stopping->at;
 }
 
-/* Stopped before it begins, or between two epochs, training fails and changes nothing. */
+/* Stopped at any call of its progress, a training fails, changes nothing, and calls it no more. */
 TEST(test_training_can_be_stopped)
 {
 	double rows[200 * 3];
@@ -770,7 +775,6 @@ TEST(test_training_can_be_stopped)
 	const double min[] = {0, 0}, max[] = {1, 1};
 	struct incise_pairs train = {rows, 200, 2};
 	struct incise_model *model = grid(2, min, max, mfs, INCISE_MF_GAUSS);
-	int chosen[] = {0, 0};
 	static const char *const names[] = {"a", "b", "y"};
 
 	for (int i = 0; i < 200; i++) {
@@ -778,21 +782,45 @@ TEST(test_training_can_be_stopped)
 		rows[3 * i + 1] = i * 53 % 97 / 96.0;
 		rows[3 * i + 2] = sin(9 * rows[3 * i]) + rows[3 * i + 1];
 	}
-	for (int k = 0; k < 4; k++) {
-		struct stopping stopping = {.stop = k < 2};
+	incise_train_options_init(&options);
+	options.epochs = 6;
+	options.progress = stop_at;
+	for (int k = 0; k < 3; k++) {
+		struct stopping whole = {0};
+		int step;
 
-		incise_train_options_init(&options);
-		options.classic = k % 2;
-		options.stop = &stopping.stop;
-		options.progress = stop_after_two;
-		options.user = &stopping;
-		assert_error(incise_train(model, &train, NULL, &options, NULL, &err),
-			     ECANCELED, &err, NULL);
-		assert_int_equal(stopping.epochs, k < 2 ? 0 : 2);
-		assert_true(incise_model_rule(model, 0)->p[0] == 0);
-		if (k < 2)
-			assert_null(incise_train_start(&train, names, INCISE_MF_GAUSS,
-						       chosen, &options, &err));
+		options.classic = k == 1;
+		for (int at = 0; at <= whole.calls; at += step) {
+			struct stopping stopping = {.at = at};
+			struct incise_uncertainty *uncertainty = NULL;
+			int chosen[] = {0, 0}, rc;
+			struct incise_model *copy = incise_model_copy(model);
+
+			options.user = at ? &stopping : &whole;
+			options.uncertainty = &uncertainty;
+			if (k < 2) {
+				rc = incise_train(copy, &train, NULL, &options, NULL,
+						  &err);
+				assert_true((incise_model_rule(copy, 0)->p[0] == 0) ==
+					    (at > 0));
+			} else {
+				struct incise_model *start =
+					incise_train_start(&train, names, INCISE_MF_GAUSS,
+							   chosen, &options, &err);
+
+				rc = start ? 0 : -err.code;
+				incise_model_free(start);
+			}
+			assert_int_equal(rc, at ? -ECANCELED : 0);
+			assert_int_equal(stopping.calls, at);
+			assert_true(at || k == 2 || whole.epochs > 1);
+			assert_true(k == 2 || (at > 0) == !uncertainty);
+			incise_uncertainty_free(uncertainty);
+			incise_model_free(copy);
+			/* All of the first, then some 20. */
+			step = at < 10 ? 1 : 1 + whole.calls / 20;
+		}
+		assert_true(whole.calls > 1);
 	}
 	incise_model_free(model);
 }

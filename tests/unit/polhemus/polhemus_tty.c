@@ -9,6 +9,8 @@
 #include "../../../lib/device/polhemus/polhemus_tty.h"
 #include "pty.h"
 
+extern const struct incise_backend incise_tracker_tty;
+
 /* --- polhemus_tty --- */
 
 static int master;

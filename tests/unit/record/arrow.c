@@ -84,7 +84,7 @@ TEST(force_is_that_of_the_table, IN_FOLDER)
 		}
 	assert_int_equal(row, n);
 	assert_int_equal(clipped, 2);
-	assert_int_equal(batches, 2);	    /* of 65536 rows at most */
+	assert_int_equal(batches, 5);	    /* of 16384 rows at most */
 	assert_null(next(&stream).release); /* the end stays the end */
 	stream.release(&stream);
 	assert_null(stream.release);
@@ -316,7 +316,6 @@ TEST(refuses_what_cannot_be, IN_FOLDER)
 		{"table", "UPDATE force SET t_ns = -1 WHERE seq = 3", 0,
 		 "table force, row 3: its time"},
 		{"table", "UPDATE tracker SET z_mm = 1.0", 0, "no cut"},
-		{"frames", TO_FORM_1, -ENOTSUP, "has an older format"},
 	};
 	struct incise_export_options options;
 
@@ -363,21 +362,6 @@ TEST(refuses_what_cannot_be, IN_FOLDER)
 				 -EINVAL);
 		incise_recording_close(recording);
 	}
-}
-
-TEST(an_older_form_has_its_streams, IN_FOLDER)
-{
-	struct ArrowArrayStream stream;
-	struct ArrowArray batch;
-
-	record("a.rec", SHORT_SCRIPT, 1000 * MS);
-	change(DB, TO_FORM_1);
-	stream = open_stream("tracker", NULL);
-	batch = next(&stream);
-	assert_int_equal(((const int32_t *)data(&batch, 11))[3], 0); /* no station */
-	assert_false(flag(&batch, 12, 3));
-	batch.release(&batch);
-	stream.release(&stream);
 }
 
 TEST(texts_are_utf8, IN_FOLDER)

@@ -9,7 +9,7 @@
 #include "recorded.h"
 #include <incise/backend.h>
 #include <incise/verify.h>
-#include "../../../lib/record/read/recording.h"
+#include "../../../lib/record/read/rows.h"
 
 #define DB "a.rec/recording.db"
 #define SIM "sim:clock=simulated"
@@ -49,7 +49,7 @@ static int64_t *truth(const char *spec, int64_t duration_ns, int *n)
 static void measure(double hz, double drift_ppm, double jitter_ms, double latency_ms,
 		    int seed, double seconds, struct errors *out)
 {
-	struct incise_recording_line line;
+	struct incise_row_times times;
 	struct incise_recording *recording;
 	struct incise_stream streams[INCISE_STREAMS_MAX];
 	int64_t duration_ns = (int64_t)(seconds * 1e9), *t_ns;
@@ -67,7 +67,8 @@ static void measure(double hz, double drift_ppm, double jitter_ms, double latenc
 	record("a.rec", spec, duration_ns);
 	t_ns = truth(still, duration_ns, &n);
 	recording = incise_recording_open("a.rec", &err);
-	succeeds(recording && !incise_recording_line(recording, "tracker", &line, &err) &&
+	succeeds(recording &&
+		 !incise_row_times_open(&times, recording, "tracker", &err) &&
 		 incise_recording_streams(recording, streams, &err) == 2);
 	*out = (struct errors){.force = streams[0], .tracker = streams[1]};
 	succeeds(!incise_source_open(&source, recording, INCISE_LEDGER_TRACKER, &err));
@@ -75,17 +76,17 @@ static void measure(double hz, double drift_ppm, double jitter_ms, double latenc
 		for (size_t k = 0; k < source.batch.n && rows < n; k++, rows++) {
 			uint64_t seq = source.batch.column[0].i[k];
 			double error_ns =
-				incise_recording_time(&line, seq,
+				incise_row_times_line(&times, seq,
 						      source.batch.column[1].i[k]) -
 				t_ns[seq];
 
 			sum2 += error_ns * error_ns;
 			out->worst_ms = fmax(out->worst_ms, fabs(error_ns) * 1e-6);
 			covered += fabs(error_ns) <=
-				   1.96 * incise_recording_time_sd(&line, seq);
+				   1.96 * incise_row_times_line_sd(&times, seq);
 		}
 	incise_source_close(&source);
-	incise_recording_line_free(&line);
+	incise_row_times_close(&times);
 	incise_recording_close(recording);
 	free(t_ns);
 	assert_int_equal(system("rm -r a.rec"), 0);

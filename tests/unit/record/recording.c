@@ -9,7 +9,7 @@
 #include <fcntl.h>
 #include <limits.h>
 #include <stdlib.h>
-#include "../../../lib/record/read/recording.h"
+#include "../../../lib/record/read/cut.h"
 
 #define DB "a.rec/recording.db"
 
@@ -53,19 +53,6 @@ TEST(info_tells_what_the_tables_hold, IN_FOLDER)
 	assert_true(info.depth_max_mm <= ask(DB, "SELECT max(depth_mm) FROM depth"));
 	assert_true(info.depth_max_mm > 19 && info.depth_max_mm < 22); /* 20 nominal */
 	assert_true(info.force_max_N > 1); /* 2.6 N by the model at 20 mm and 25 mm/s */
-}
-
-TEST(form_1_is_read, IN_FOLDER)
-{
-	struct incise_recording_info now, before;
-
-	record("a.rec", SHORT_SCRIPT, 8000 * MS); /* two cuts */
-	assert_int_equal(read_all("a.rec", &now, &err), 0);
-	change(DB, TO_FORM_1);
-	succeeds(!read_all("a.rec", &before, &err));
-	assert_true(before.cuts > 0 && before.cuts == now.cuts);
-	assert_true(before.tracker == now.tracker &&
-		    before.force_max_N == now.force_max_N);
 }
 
 TEST(paths_that_lead_to_a_recording, IN_FOLDER)
@@ -263,6 +250,39 @@ TEST(half_a_page_beside_a_log, IN_FOLDER)
 	}
 }
 
+/* Those that the recorder noted; as many as it found, or one is not over. */
+static void cut_ends_are_those_of_the_depths(struct incise_recording *recording)
+{
+	struct incise_cut_count cut = {0};
+	struct incise_source source;
+	sqlite3_stmt *stmt;
+	const char *noted; /* int64_t, unaligned */
+	int n = 0;
+
+	assert_int_equal(sqlite3_prepare_v2(recording->db,
+					    "SELECT value FROM meta WHERE key = "
+					    "'cut_ends_ns'",
+					    -1, &stmt, NULL),
+			 SQLITE_OK);
+	assert_int_equal(sqlite3_step(stmt), SQLITE_ROW);
+	noted = sqlite3_column_blob(stmt, 0);
+	succeeds(!incise_source_open(&source, recording, INCISE_SOURCE_DEPTH, &err));
+	while (incise_source_next(&source, &err) > 0)
+		for (size_t k = 0; k < source.batch.n; k++) {
+			const bool inside = cut.inside;
+
+			if (incise_cut_step(&cut, source.batch.column[2].r[k]) || !inside)
+				continue;
+			assert_memory_equal(noted + 8 * n, &source.batch.column[1].i[k],
+					    8);
+			n++;
+		}
+	incise_source_close(&source);
+	assert_int_equal(sqlite3_column_bytes(stmt, 0), 8 * n);
+	assert_int_equal(n, cut.count - cut.inside);
+	sqlite3_finalize(stmt);
+}
+
 /* The recorder's summary is what readers find of all samples, but for the times of the capture. */
 TEST(a_summary_is_that_of_the_samples, IN_FOLDER)
 {
@@ -287,6 +307,7 @@ TEST(a_summary_is_that_of_the_samples, IN_FOLDER)
 		recording = open_recording("a.rec");
 		succeeds(!incise_recording_info(recording, &summary, &err) &&
 			 !incise_recording_measure(recording, &all, &err));
+		cut_ends_are_those_of_the_depths(recording);
 		incise_recording_close(recording);
 		assert_true(summary.summary);
 		assert_false(all.summary);
@@ -489,7 +510,7 @@ TEST(closing_nothing)
 
 TEST(line_is_read_and_used, IN_FOLDER)
 {
-	struct incise_recording_line line;
+	struct incise_row_times times;
 	struct incise_recording *recording;
 
 	record("a.rec", "sim:clock=simulated", 700 * MS);
@@ -499,20 +520,20 @@ TEST(line_is_read_and_used, IN_FOLDER)
 		   "('tracker', 1, 20, 3000, 7.0, 0), ('tracker', 2, 30, 6000, 6.0, 0)");
 	recording = incise_recording_open("a.rec", &err);
 	assert_non_null(recording);
-	assert_int_equal(incise_recording_line(recording, "tracker", &line, &err), 0);
-	assert_int_equal(line.n, 3);
-	assert_int_equal(incise_recording_time(&line, 15, 77), 2000);
-	assert_int_equal(incise_recording_time(&line, 25, 77), 4500);
-	assert_int_equal(incise_recording_time(&line, 40, 77),
+	assert_int_equal(incise_row_times_open(&times, recording, "tracker", &err), 0);
+	assert_int_equal(times.source->n_knots, 3);
+	assert_int_equal(incise_row_times_line(&times, 15, 77), 2000);
+	assert_int_equal(incise_row_times_line(&times, 25, 77), 4500);
+	assert_int_equal(incise_row_times_line(&times, 40, 77),
 			 9000); /* beyond the last */
-	assert_true(incise_recording_time_sd(&line, 15) == 7);
-	assert_true(incise_recording_time_sd(&line, 29) == 7);
-	incise_recording_line_free(&line);
+	assert_true(incise_row_times_line_sd(&times, 15) == 7);
+	assert_true(incise_row_times_line_sd(&times, 29) == 7);
+	incise_row_times_close(&times);
 	/* what has no line has its own times */
-	assert_int_equal(incise_recording_line(recording, "force", &line, &err), 0);
-	assert_int_equal(line.n, 0);
-	assert_int_equal(incise_recording_time(&line, 15, 77), 77);
-	assert_true(isnan(incise_recording_time_sd(&line, 15)));
+	assert_int_equal(incise_row_times_open(&times, recording, "force", &err), 0);
+	assert_int_equal(times.source->n_knots, 0);
+	assert_int_equal(incise_row_times_line(&times, 15, 77), 77);
+	assert_true(isnan(incise_row_times_line_sd(&times, 15)));
 	incise_recording_close(recording);
 }
 
@@ -549,7 +570,7 @@ TEST(impossible_streams_are_refused, IN_FOLDER)
 
 	record("good.rec", "sim:clock=simulated", 2000 * MS);
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct incise_recording_line line;
+		struct incise_row_times times;
 		struct incise_stream streams[INCISE_STREAMS_MAX];
 		struct incise_recording *recording;
 
@@ -568,27 +589,12 @@ TEST(impossible_streams_are_refused, IN_FOLDER)
 		recording = incise_recording_open("a.rec", &err);
 		if (!recording)
 			fail_msg("%s: %s", cases[i].sql, err.text);
-		assert_error(
-			cases[i].knots
-				? incise_recording_line(recording, "tracker", &line, &err)
-				: incise_recording_streams(recording, streams, &err),
-			EINVAL, &err, "a.rec:", cases[i].knots ? "knots" : "streams");
+		assert_error(cases[i].knots
+				     ? incise_row_times_open(&times, recording, "tracker",
+							     &err)
+				     : incise_recording_streams(recording, streams, &err),
+			     EINVAL, &err,
+			     "a.rec:", cases[i].knots ? "knots" : "streams");
 		incise_recording_close(recording);
 	}
-}
-
-TEST(old_recordings_have_none, IN_FOLDER)
-{
-	struct incise_recording_line line;
-	struct incise_stream streams[INCISE_STREAMS_MAX];
-	struct incise_recording *recording;
-
-	record("a.rec", "sim:clock=simulated", 700 * MS);
-	change(DB, TO_FORM_1);
-	recording = incise_recording_open("a.rec", &err);
-	succeeds(recording);
-	assert_int_equal(incise_recording_streams(recording, streams, &err), 0);
-	assert_int_equal(incise_recording_line(recording, "tracker", &line, &err), 0);
-	assert_int_equal(line.n, 0);
-	incise_recording_close(recording);
 }

@@ -252,15 +252,6 @@ TEST(impossible_lengths_are_refused, IN_FOLDER)
 	}
 }
 
-TEST(old_recordings_have_no_frames, IN_FOLDER)
-{
-	struct incise_recording_length *rows;
-
-	record("a.rec", "sim:clock=simulated", 700 * MS);
-	change(DB, TO_FORM_1);
-	assert_error(lengths_of(&rows, &err), EINVAL, &err, "form");
-}
-
 /* --- pairs of depths --------------------------------------------------------------------- */
 
 #define CUTS "sim:clock=simulated,cut_s=2,pause_s=0.5,depth_mm=8"
@@ -326,7 +317,6 @@ TEST(what_is_no_depth_is_left_out, IN_FOLDER)
 		{"UPDATE frames SET depth_mm = 9e999", -EINVAL},
 		{"UPDATE tracker SET z_mm = 9e999 WHERE seq = 200", -EINVAL},
 		{"DELETE FROM tracker WHERE seq = 200", -EINVAL},
-		{TO_FORM_1, 0},
 	};
 
 	for (size_t i = 0; i < sizeof(row) / sizeof(row[0]); i++) {

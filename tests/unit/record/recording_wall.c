@@ -124,17 +124,11 @@ TEST(damaged_rows_are_refused, IN_FOLDER)
 	}
 }
 
-TEST(older_and_simulated_ones_have_none, IN_FOLDER)
+TEST(simulated_ones_have_none, IN_FOLDER)
 {
 	record_by(SHORT_SCRIPT, NULL, 2 * S);
 	read_wall(ENODATA);
 	assert_true(is_intact());
-	change(DB, TO_FORM_2);
-	read_wall(ENODATA);
-	assert_int_equal(system("rm -r a.rec"), 0);
-	record_by(SHORT_SCRIPT, NULL, 2 * S);
-	change(DB, TO_FORM_1);
-	read_wall(ENODATA);
 }
 
 static int64_t clock_ns(clockid_t clock)

@@ -185,7 +185,6 @@ TEST(what_forces_depend_on)
 		 "b.rec",
 		 {0},
 		 true},
-		{TO_FORM_1, "b.rec", {0}, true},
 		{"UPDATE meta SET value = 0 WHERE key = 'complete'", "c.rec", {0}, true},
 		{"UPDATE tracker SET arrival_ns = arrival_ns + 1000000",
 		 "b.rec",

@@ -49,7 +49,7 @@ static struct incise_row_times open_times(const char *table)
 
 static void close_times(struct incise_row_times *times)
 {
-	incise_recording_line_free(&times->line);
+	incise_row_times_close(times);
 	incise_recording_close(opened);
 }
 

@@ -7,13 +7,22 @@
 #include "../../../lib/base/random.h"
 #include "../../../lib/record/export/table_writer.h"
 
+struct row {
+	int64_t name;
+	double value;
+	int64_t n;
+	bool flag;
+};
+
+#define AT(member) offsetof(struct row, member), NULL, NULL, NULL
+
 static const struct incise_table_column columns[] = {
-	{"name", "1", "a name", INCISE_COLUMN_NAME, 0, NULL, NULL},
-	{"fixed", "mm", "a real", INCISE_COLUMN_REAL, 4, NULL, NULL},
-	{"micro", "s", "a real", INCISE_COLUMN_SINGLE, 6, NULL, NULL},
-	{"free", "N", "a real", INCISE_COLUMN_REAL, -1, NULL, NULL},
-	{"count", "1", "a count", INCISE_COLUMN_INTEGER, 0, NULL, NULL},
-	{"flag", "1", "a flag", INCISE_COLUMN_FLAG, 0, NULL, NULL},
+	{"name", "1", "a name", INCISE_COLUMN_NAME, 0, AT(name)},
+	{"fixed", "mm", "a real", INCISE_COLUMN_REAL, 4, AT(value)},
+	{"micro", "s", "a real", INCISE_COLUMN_SINGLE, 6, AT(value)},
+	{"free", "N", "a real", INCISE_COLUMN_REAL, -1, AT(value)},
+	{"count", "1", "a count", INCISE_COLUMN_INTEGER, 0, AT(n)},
+	{"flag", "1", "a flag", INCISE_COLUMN_FLAG, 0, AT(flag)},
 };
 
 #define N_COLUMNS ((int)(sizeof(columns) / sizeof(*columns)))
@@ -21,13 +30,24 @@ static const struct incise_table_column columns[] = {
 static char *text;
 static size_t size;
 
+static void start(struct incise_table *table, const struct incise_provenance *provenance,
+		  FILE *out)
+{
+	*table = (struct incise_table){
+		.format = &incise_table_csv,
+		.out = out,
+		.columns = columns,
+		.n_columns = N_COLUMNS,
+		.provenance = provenance,
+	};
+	assert_int_equal(incise_table_open(table, &err), 0);
+}
+
 static FILE *begin(struct incise_table *table, const struct incise_provenance *provenance)
 {
 	FILE *out = open_memstream(&text, &size);
 
-	assert_int_equal(incise_table_open(table, &incise_table_csv, out, columns,
-					   N_COLUMNS, provenance, &err),
-			 0);
+	start(table, provenance, out);
 	return out;
 }
 
@@ -36,15 +56,8 @@ static void add(struct incise_table *table, const char *name, double value, int6
 	int number = incise_table_name(table, name);
 
 	assert_true(number > 0);
-	assert_int_equal(incise_table_add(table,
-					  (union incise_cell[]){{.integer = number},
-								{.real = value},
-								{.real = value},
-								{.real = value},
-								{.integer = n},
-								{.integer = n & 1}},
-					  &err),
-			 0);
+	assert_int_equal(
+		incise_table_add(table, &(struct row){number, value, n, n & 1}, &err), 0);
 }
 
 static void end(struct incise_table *table, FILE *out)
@@ -98,9 +111,9 @@ TEST(names_are_quoted_and_provenance_is_comments)
 	struct incise_table table;
 	FILE *out;
 
-	assert_int_equal(incise_provenance_add(&provenance, "source", "a\nb%s", ".rec"),
-			 0);
-	assert_int_equal(incise_provenance_add(&provenance, "nothing", "%s", ""), 0);
+	incise_provenance_add(&provenance, "source", "a\nb%s", ".rec");
+	incise_provenance_add(&provenance, "nothing", "%s", "");
+	assert_int_equal(provenance.rc, 0);
 	out = begin(&table, &provenance);
 	add(&table, "plain", 1, 0);
 	add(&table, "say \"a,b\"", 1, 0);
@@ -135,9 +148,7 @@ TEST(a_full_disk_is_told)
 	struct incise_table table;
 	FILE *out = fopen("/dev/full", "w");
 
-	assert_int_equal(incise_table_open(&table, &incise_table_csv, out, columns,
-					   N_COLUMNS, NULL, &err),
-			 0);
+	start(&table, NULL, out);
 	add(&table, "a", 1, 1);
 	assert_int_equal(incise_table_finish(&table, &err), -ENOSPC);
 	assert_int_equal(err.code, ENOSPC);

@@ -7,6 +7,7 @@
 #include "recorded.h"
 #include <fcntl.h>
 #include <incise/verify.h>
+#include "../../../lib/record/old/old.h"
 #include "../../../lib/record/frames.h"
 #include "../../../lib/record/ledger.h"
 
@@ -271,8 +272,8 @@ TEST(what_cannot_be_verified, WITH_MODULES)
 	assert_int_equal(incise_verify("none.rec", NULL, &report, &err), -ENOENT);
 	record("a.rec", SIM, 600 * MS);
 	change(DB, TO_FORM_1);
-	assert_error(incise_verify("a.rec", NULL, &report, &err), ENODATA, &err,
-		     "ledger");
+	assert_error(incise_verify("a.rec", NULL, &report, &err), ENOTSUP, &err,
+		     "format 1");
 }
 
 /* A page in the middle is garbage: found, and no crash, wherever it is. */
@@ -449,15 +450,12 @@ static void put_row(const struct incise_frame_record *row)
 static void add_camera(const struct incise_frame_record *rows, int n, bool end)
 {
 	struct incise_ledger_block block;
-	struct incise_ledger_row row;
 	struct incise_ledger ledger;
 
 	incise_ledger_init(&ledger);
 	for (int i = 0; i < n; i++) {
 		put_row(&rows[i]);
-		incise_ledger_row_frame(&row, &rows[i]);
-		row.n -= INCISE_FRAMES_DIGEST; /* form 3 has none */
-		incise_ledger_add(&ledger, &row);
+		incise_ledger_count(&ledger, rows[i].seq, rows[i].t_ns);
 		if (i % BLOCK == BLOCK - 1 && incise_ledger_end(&ledger, &block))
 			put_block("camera", &block);
 	}
@@ -503,68 +501,80 @@ static void seal(bool whole)
 	}
 }
 
-/* The CRCs of rows that the ledger of an older form has: of force and tracker. */
+/* The CRCs of rows that the ledger of an older format has. */
 static void seal_rows(void)
 {
-	sqlite3 *db;
+	struct incise_recording *recording =
+		incise_recording_open_as("a.rec", INCISE_RECORDING_OLDER, &err);
+	size_t size;
+	char *sql;
+	FILE *out = open_memstream(&sql, &size);
 
-	assert_int_equal(sqlite3_open(DB, &db), SQLITE_OK);
-	for (int i = 0; i < INCISE_LEDGER_CAMERA; i++) {
-		const struct incise_ledger_form *form = &incise_ledger_forms[i];
+	succeeds(recording);
+	for (int i = 0; i <= INCISE_LEDGER_CAMERA; i++) {
 		struct incise_ledger_block entry, made;
-		sqlite3_stmt *entries, *rows, *set;
-		struct incise_ledger_row row;
+		struct incise_old_rows rows;
 		struct incise_ledger ledger;
-		char sql[300];
+		sqlite3_stmt *entries;
 
 		incise_ledger_init(&ledger);
-		snprintf(sql, sizeof(sql), "SELECT %s FROM %s WHERE seq BETWEEN ? AND ?",
-			 form->columns, form->table);
-		sqlite3_prepare_v2(db, sql, -1, &rows, NULL);
-		sqlite3_prepare_v2(db,
-				   "UPDATE ledger SET crc = ? WHERE stream = ? AND block "
-				   "= ?",
-				   -1, &set, NULL);
-		assert_int_equal(incise_ledger_select(db, 3, form->stream, INT64_MIN,
-						      false, &entries),
+		assert_int_equal(incise_old_rows_open(&rows, recording, i), SQLITE_OK);
+		assert_int_equal(incise_old_rows_next(&rows), SQLITE_OK);
+		assert_int_equal(incise_ledger_select(recording->db,
+						      incise_ledger_forms[i].stream,
+						      INT64_MIN, false, &entries),
 				 SQLITE_OK);
 		while (sqlite3_step(entries) == SQLITE_ROW) {
 			incise_ledger_block_read(&entry, entries);
-			sqlite3_bind_int64(rows, 1, entry.first_seq);
-			sqlite3_bind_int64(rows, 2, entry.last_seq);
-			for (; sqlite3_step(rows) == SQLITE_ROW;) {
-				assert_true(incise_ledger_row_read(&row, form, rows));
-				incise_ledger_add(&ledger, &row);
-			}
-			sqlite3_reset(rows);
+			for (; rows.has_row && rows.seq <= entry.last_seq;
+			     incise_old_rows_next(&rows))
+				incise_old_ledger_add(&ledger, &rows);
 			if (!incise_ledger_end(&ledger, &made))
 				incise_ledger_close(&ledger, entry.lost, &made);
-			sqlite3_bind_int64(set, 1, made.crc);
-			sqlite3_bind_text(set, 2, form->stream, -1, SQLITE_STATIC);
-			sqlite3_bind_int64(set, 3, made.block);
-			sqlite3_step(set);
-			sqlite3_reset(set);
+			fprintf(out,
+				"UPDATE ledger SET crc = %u WHERE stream = '%s' AND "
+				"block = %lld;",
+				made.crc, incise_ledger_forms[i].stream,
+				(long long)made.block);
 		}
 		sqlite3_finalize(entries);
-		sqlite3_finalize(rows);
-		sqlite3_finalize(set);
+		incise_old_rows_close(&rows);
 	}
-	sqlite3_close(db);
+	incise_recording_close(recording);
+	fclose(out);
+	change(DB, sql);
+	free(sql);
 }
 
 static const struct change none = {.at = -1};
 
-/* A recording with all frames, and rows of the first @n; @closed, or cut off. */
+/* A recording with all frames, and rows of the first @n; @closed, or cut off. Of format 3: no seal knows this camera. */
 static void record_frames(int n, bool closed)
 {
 	struct incise_frame_record rows[FRAMES];
 
 	record("a.rec", "sim:clock=simulated", 600 * MS);
-	change(DB, TO_FORM_3); /* the seal does not know this camera */
-	seal_rows();
+	change(DB, TO_FORM_3);
 	write_frames(FRAMES, &none, rows);
 	add_camera(rows, n, closed);
+	seal_rows();
 	seal(closed);
+}
+
+/* b.rec is what it is converted to. */
+static void convert(void)
+{
+	struct incise_recovered made;
+
+	assert_int_equal(system("rm -rf b.rec"), 0);
+	succeeds(!incise_recording_recover("a.rec", "b.rec", true, &made, &err));
+}
+
+static void record_frames_of_today(void)
+{
+	record_frames(FRAMES, true);
+	convert();
+	assert_int_equal(system("rm -r a.rec; mv b.rec a.rec"), 0);
 }
 
 TEST(frames_are_held_against_their_rows, WITH_MODULES)
@@ -637,7 +647,8 @@ TEST(frames_are_held_against_their_rows, WITH_MODULES)
 	if (!has_frames())
 		skip();
 	record_frames(FRAMES, true);
-	verify("a.rec");
+	convert();
+	verify("b.rec");
 	if (!report.complete || !report.intact)
 		fail_msg("%s", findings.text);
 	assert_int_equal(report.n_streams, 3);
@@ -649,7 +660,8 @@ TEST(frames_are_held_against_their_rows, WITH_MODULES)
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		write_frames(FRAMES, &cases[i].change, NULL);
 		seal(true); /* a file's head has a random number of its own */
-		verify("a.rec");
+		convert();
+		verify("b.rec");
 		assert_true(!report.complete && !report.intact && report.findings == 1);
 		assert_says(findings.text, cases[i].text);
 		assert_int_equal(findings.first.kind, INCISE_VERIFY_FRAMES);
@@ -692,7 +704,8 @@ TEST(rows_of_frames_are_in_the_ledger, WITH_MODULES)
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		assert_int_equal(system("rm -rf a.rec; cp -r good.rec a.rec"), 0);
 		change(DB, cases[i].sql);
-		verify("a.rec");
+		convert();
+		verify("b.rec");
 		assert_true(!report.complete && !report.intact);
 		assert_says(findings.text, cases[i].text);
 	}
@@ -707,7 +720,7 @@ TEST(damaged_file, WITH_MODULES)
 
 	if (!has_frames())
 		skip();
-	record_frames(FRAMES, true);
+	record_frames_of_today();
 	assert_int_equal(stat(FILE_NAME, &st), 0);
 	assert_int_equal(system("cp " FILE_NAME " good.mkv"), 0);
 
@@ -775,14 +788,16 @@ TEST(file_is_ahead_of_an_interrupted_recording, WITH_MODULES)
 	if (!has_frames())
 		skip();
 	record_frames(FRAMES - 4, false);
-	verify("a.rec");
+	convert();
+	verify("b.rec");
 	if (!report.interrupted || !report.intact || report.findings != 1)
 		fail_msg("%s", findings.text);
 	assert_int_equal(report.frames.present, FRAMES - 4);
 	assert_int_equal(report.frames.ahead, 4);
 
 	seal(true);
-	verify("a.rec");
+	convert();
+	verify("b.rec");
 	assert_false(report.intact);
 	assert_says(findings.text, "camera.mkv", "numbers 31 to 34");
 	assert_int_equal(report.frames.extra, 4);
@@ -793,7 +808,7 @@ TEST(without_the_module_it_is_said, WITH_MODULES)
 
 	if (!has_frames())
 		skip();
-	record_frames(FRAMES, true);
+	record_frames_of_today();
 	setenv("INCISE_MODULE_PATH", "/nonexistent", 1);
 	verify("a.rec");
 	assert_false(report.complete);

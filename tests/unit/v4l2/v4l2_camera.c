@@ -11,6 +11,8 @@
 #include "../message.h"
 #include "driver.h"
 
+extern const struct incise_backend incise_camera_v4l2;
+
 /* --- v4l2_camera --- */
 
 #define PATIENCE 60000 /* looks, about a millisecond apart when the thread waits */

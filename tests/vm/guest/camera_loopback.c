@@ -22,6 +22,8 @@
 #include "../../../lib/sim/sim.h"
 #include "../tap.h"
 
+extern const struct incise_backend incise_camera_v4l2;
+
 #define WIDTH 320
 #define HEIGHT 240
 #define SIZE (WIDTH * HEIGHT * 2)

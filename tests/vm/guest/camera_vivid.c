@@ -21,6 +21,8 @@
 #include "../../../lib/device/backends.h"
 #include "../tap.h"
 
+extern const struct incise_backend incise_camera_v4l2;
+
 #define PATIENCE_NS 10000000000LL
 #define JIFFY_NS 4000000
 

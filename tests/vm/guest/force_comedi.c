@@ -27,6 +27,8 @@
 #include "../hold.h"
 #include "../tap.h"
 
+extern const struct incise_backend incise_force_comedi;
+
 #define DEVICE "/dev/comedi0:0"
 #define HZ 10000
 #define MANY 20000

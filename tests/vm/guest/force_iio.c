@@ -26,6 +26,8 @@
 #include "../simulator.h"
 #include "../tap.h"
 
+extern const struct incise_backend incise_force_iio;
+
 #define HZ 10000
 #define PERIOD_NS 100000
 #define SECONDS 20

@@ -32,7 +32,7 @@ struct can_bus_ops {
 	int (*send)(struct can_bus *bus, const struct can_frame *frame);
 	/*
 	 * Returns 1 (a frame; *t_ns: its time of arrival, the kernel's where available, not
-	 * before the previous frame's nor after now), 0 (none); -ENETDOWN, -ENODEV, -EIO.
+	 * before the previous frame's nor after now), 0 (no frame); -ENETDOWN, -ENODEV, -EIO.
 	 */
 	int (*receive)(struct can_bus *bus, struct can_frame *frame, int64_t *t_ns);
 	/* Wait for a frame, at most until @until_ns. Returns 0, -EINTR, -ENETDOWN … */
@@ -63,8 +63,8 @@ struct can_bus_counts {
 struct can_bus {
 	const struct can_bus_ops *ops;
 	char name[40];	     /* "can0", "/dev/ttyACM0": for messages */
-	uint32_t bitrate;    /* bit/s; 0: none (vcan), or unknown */
-	uint32_t restart_ms; /* automatic restart after bus-off; 0: none */
+	uint32_t bitrate;    /* bit/s; 0: no bit rate (vcan), or unknown */
+	uint32_t restart_ms; /* automatic restart after bus-off; 0: no restart */
 	struct can_bus_counts counts;
 };
 

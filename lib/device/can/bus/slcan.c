@@ -9,7 +9,7 @@
  * Nothing here waits for an answer: many adapters give none, and the other end may be another
  * program, for example python-can on a pty.
  *
- * The bit rate is that of the request, or follows the tty, as in "/dev/ttyACM0@500000". The
+ * The bit rate is the requested one, or follows the tty, as in "/dev/ttyACM0@500000". The
  * default is 1 Mbit/s, the factory setting of drives: most adapters have no rate of their own,
  * and the load of the bus must be computed from a known one.
  */
@@ -40,7 +40,7 @@
 struct slcan_tty {
 	int fd;
 	int gone; /* -ENODEV, -EIO; permanent */
-	/* The rest of a line that was written in part; out_n of 0: none. */
+	/* The rest of a line that was written in part; out_n of 0: no rest. */
 	char out[SEND_MAX];
 	unsigned int out_at, out_n;
 };
@@ -86,7 +86,7 @@ static int tty_flush(struct slcan_tty *tty)
 	return 0;
 }
 
-/* Send all of @n bytes, now or later. 0; -ENOBUFS: none of them; -ENODEV, -EIO. */
+/* Send all of @n bytes, now or later. 0; -ENOBUFS: no byte; -ENODEV, -EIO. */
 static int tty_send(struct slcan_tty *tty, const char *text, unsigned int n)
 {
 	int rc = tty->gone ? tty->gone : tty_flush(tty);
@@ -104,7 +104,7 @@ static int tty_send(struct slcan_tty *tty, const char *text, unsigned int n)
 	return rc;
 }
 
-/* Returns the number of bytes read; 0: none yet; -ENODEV, -EIO. */
+/* Returns the number of bytes read; 0: no bytes yet; -ENODEV, -EIO. */
 static ssize_t tty_read(struct slcan_tty *tty, void *bytes, size_t size)
 {
 	ssize_t n;
@@ -236,7 +236,7 @@ static bool passes(const struct slcan *s, canid_t id)
 	return !s->n_filters;
 }
 
-/* Handle a byte. Returns true if *frame is one for the caller. */
+/* Handle a byte. Returns true if *frame is for the caller. */
 static bool receive_byte(struct slcan *s, unsigned char byte, struct can_frame *frame)
 {
 	struct slcan_message message;

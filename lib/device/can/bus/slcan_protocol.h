@@ -76,7 +76,7 @@ struct slcan_status {
 	uint8_t flags;
 	int64_t query_ns;
 	unsigned int refused_queries;
-	bool pending, answers; /* a query is open; one was answered before */
+	bool pending, answers; /* a query is open; a query was answered before */
 	unsigned int refusals; /* of start commands that are still to be expected */
 };
 

@@ -36,7 +36,7 @@
 struct socketcan {
 	struct can_bus bus;
 	int fd;
-	int owner;	 /* socket that holds the node; -1: none */
+	int owner;	 /* socket that holds the node; -1: no socket */
 	int gone;	 /* -ENETDOWN, -ENODEV; permanent */
 	int state;	 /* enum can_state; -EOPNOTSUPP: unknown */
 	uint32_t lost;	 /* the kernel's count, modulo 2^32 */

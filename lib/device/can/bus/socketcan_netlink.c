@@ -19,7 +19,7 @@
 #define NS_PER_S INT64_C(1000000000)
 #define WAIT_S 1
 #define SEQUENCE 1 /* each query has a socket of its own */
-/* An answer has some 1500 bytes, mostly counters; the kernel builds none above 8 KiB. */
+/* An answer has some 1500 bytes, mostly counters, and at most 8 KiB. */
 #define ANSWER_MAX 8192
 
 typedef int read_attribute(struct can_netlink *link, const struct nlattr *attr);

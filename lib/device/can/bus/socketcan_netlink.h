@@ -18,11 +18,11 @@
 
 struct can_netlink {
 	char name[IF_NAMESIZE]; /* its own, also where @name was an alternative name */
-	char kind[16];		/* "can", "vcan" …; "": none */
+	char kind[16];		/* "can", "vcan" …; "": no kind */
 	int index;
 	bool is_can, is_up;
-	uint32_t bitrate;    /* bit/s; 0: none, or unknown to the driver */
-	uint32_t restart_ms; /* automatic restart after bus-off; 0: none */
+	uint32_t bitrate;    /* bit/s; 0: no bit rate, or unknown to the driver */
+	uint32_t restart_ms; /* automatic restart after bus-off; 0: no restart */
 	int state;	     /* enum can_state; -EOPNOTSUPP: not reported */
 };
 

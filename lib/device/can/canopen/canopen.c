@@ -259,7 +259,7 @@ static bool answered(const struct canopen *master)
 	return master->answer.received;
 }
 
-/* Send a request and receive master->answer. @object: that of the transfer. */
+/* Send a request and receive master->answer. @object: the object of the transfer. */
 static int exchange(struct canopen *master, const uint8_t request[8],
 		    const uint8_t object[3])
 {
@@ -404,7 +404,7 @@ int canopen_read_text(struct canopen *master, uint16_t index, uint8_t sub, char 
 
 /*
  * --- numbers in words: SDO abort codes (CiA 301, table 22), error codes of EMCYs (CiA 301,
- * table 26; those of drives: CiA 402-2 by IEC 61800-7-201), NMT states ---
+ * table 26; for drives: CiA 402-2 by IEC 61800-7-201), NMT states ---
  */
 
 struct code_text {

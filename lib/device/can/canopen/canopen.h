@@ -41,7 +41,7 @@ enum canopen_state {
 	CANOPEN_STOPPED = 0x04,
 	CANOPEN_OPERATIONAL = 0x05,
 	CANOPEN_PRE_OPERATIONAL = 0x7f,
-	CANOPEN_UNKNOWN = 0xff, /* none was received */
+	CANOPEN_UNKNOWN = 0xff, /* not received */
 };
 
 /* The last emergency message about an error; those about the end of one are not kept. */
@@ -54,13 +54,13 @@ struct canopen_emcy {
 struct canopen {
 	struct can_bus *bus;
 	uint8_t node;	      /* 1 … 127 */
-	uint8_t own;	      /* node id of this side's heartbeat; 0: none is sent */
+	uint8_t own;	      /* node id of this side's heartbeat; 0: not sent */
 	int64_t heartbeat_ns; /* its period */
 	int64_t answer_ns;    /* timeout of an SDO; 0: CANOPEN_ANSWER_NS */
 
 	/* Received from the node. */
 	enum canopen_state state;
-	int64_t last_heartbeat_ns; /* or boot-up; 0: none */
+	int64_t last_heartbeat_ns; /* or boot-up; 0: not received */
 	uint32_t boots;		   /* boot-up messages */
 	struct canopen_emcy emcy;
 	uint32_t bus_offs; /* how often it was bus-off */
@@ -131,7 +131,7 @@ int canopen_read_text(struct canopen *master, uint16_t index, uint8_t sub, char 
 /* Write "object does not exist (06020000h)", for any code, to @text, and return that. */
 const char *canopen_abort_text(uint32_t code, char *text, size_t size);
 
-/* Likewise "following error too large (8611h)"; for an unknown code that of its class. */
+/* Likewise "following error too large (8611h)"; for an unknown code the text of its class. */
 const char *canopen_emcy_text(uint16_t code, char *text, size_t size);
 
 /* "pre-operational" … */

@@ -371,7 +371,7 @@ static void check_running(struct can_axis *axis)
 
 /* --- phases, from power to no power; drawn in can_axis.h --- */
 
-/* Stop without a fault; @outcome of what was started. */
+/* Stop without a fault; @outcome of the started motion. */
 static void abandon(struct can_axis *axis, int outcome)
 {
 	axis->outcome = outcome;

@@ -445,8 +445,8 @@ void can_session_close(struct can_session *s)
 		return;
 	begin(s, s->name, NULL);
 	/*
-	 * Only a drive that reports to have no power may stop watching this side: else its
-	 * deadman is what stops it now.
+	 * Only a drive that reports to have no power may stop watching this side: else only its
+	 * deadman stops it now.
 	 */
 	if (s->is_setup && s->master.own && !cia402_power_off(&s->client)) {
 		canopen_write(&s->master, 0x1016, 1, 4, 0);

@@ -70,7 +70,7 @@ int can_session_ready(struct can_session *session, bool homing, struct incise_er
 /* Reset the fault, and set the drive up again. */
 int can_session_clear(struct can_session *session, struct incise_error *err);
 
-/* The drive has homed: from now on its 0 is that of the machine. */
+/* The drive has homed: from now on its 0 is the machine's. */
 int can_session_homed(struct can_session *session, struct incise_error *err);
 
 void can_session_close(struct can_session *session);

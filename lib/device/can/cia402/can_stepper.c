@@ -53,12 +53,12 @@ struct can_stepper {
 	_Alignas(64) struct incise_stepper_motor_status status;
 	/* Mailbox: written by the caller while it is NONE, else by the thread. */
 	_Alignas(64) atomic_int command;
-	/* Of a simulated clock; NULL: there is a thread. See can_bus.h. */
+	/* With a simulated clock; NULL: there is a thread. See can_bus.h. */
 	void (*sleep_until)(struct can_bus *bus, int64_t t_ns);
 	int64_t due_ns, idle_ns; /* the next cycle; the next without power */
 	bool lent, ended, runs;
 	pthread_t thread;
-	/* The thread's, or that of the caller who borrowed it. */
+	/* The thread's, or lent to a caller. */
 	_Alignas(64) struct can_session session;
 };
 
@@ -237,7 +237,7 @@ static int await_result(struct can_stepper *c, int64_t most_ns, const volatile i
 	return c->session.axis.result;
 }
 
-/* Make the message from the cause of the last stop; returns @rc if there is none. */
+/* Make the message from the cause of the last stop; returns @rc without a cause. */
 static int refuse_by_cause(struct can_stepper *c, int rc, const char *what,
 			   struct incise_error *err)
 {

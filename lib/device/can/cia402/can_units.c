@@ -12,7 +12,7 @@
 #define COUNTS_MOST 2e9	      /* of a position: 32 bits with a margin */
 #define CYCLE_MOST_US 2000    /* of rig.conf */
 #define DEADMAN_LEAST_S 0.02  /* heartbeats are in whole ms, and four must fit */
-#define MARGIN 1.25	      /* of the drive's limits over those of the profile */
+#define MARGIN 1.25	      /* of the drive's limits over the profile's */
 #define FINEST_STEPS_S 150000 /* of the profile: below its largest */
 
 void can_units_steps(struct can_session *s)

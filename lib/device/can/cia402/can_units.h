@@ -37,8 +37,8 @@ uint32_t bus_load_bits(unsigned int bytes);
 
 /*
  * Returns the cyclic traffic, bit/s: SYNC, RPDO and TPDO per cycle, both heartbeats each
- * @heartbeat_ns (0: none), inputs at their highest rate. UINT32_MAX: more than that, or a cycle
- * of 0.
+ * @heartbeat_ns (0: no heartbeats), inputs at their highest rate. UINT32_MAX: more than that,
+ * or a cycle of 0.
  */
 uint32_t bus_load_of(uint32_t cycle_ns, unsigned int rpdo_bytes, unsigned int tpdo_bytes,
 		     int64_t heartbeat_ns);

@@ -78,7 +78,7 @@ uint16_t cia402_next_controlword(enum cia402_state state);
 void cia402_pack_rpdo(struct can_frame *frame, uint8_t node, enum cia402_mode mode,
 		      uint16_t controlword, int32_t target);
 
-/* TPDO1 and TPDO2. Return false for another frame or one that is too short. */
+/* TPDO1 and TPDO2. Return false for another frame or a short one. */
 bool cia402_parse_status(const struct can_frame *frame, uint16_t *statusword,
 			 int32_t *position);
 bool cia402_parse_inputs(const struct can_frame *frame, uint32_t *inputs);
@@ -166,7 +166,7 @@ struct cia402_setup {
 	uint32_t deadman_ms;   /* silence of this side before the drive quick-stops */
 	uint8_t master;	       /* node id of this side's heartbeat */
 	uint32_t heartbeat_ms; /* 1017: period of the drive's heartbeat */
-	bool limited;	       /* positions are those of the machine */
+	bool limited;	       /* positions are the machine's */
 	int32_t position_min, position_max; /* 607D */
 	uint32_t velocity;		    /* 607F: largest */
 	uint32_t acceleration;	  /* 60C5, 60C6: largest; 6085: of a quick stop */
@@ -210,7 +210,7 @@ int cia402_set_homing(const struct cia402_client *client, int method, uint32_t s
 		      uint32_t slow, uint32_t acceleration);
 
 /*
- * Read whether the drive's position is that of the machine: enter homing mode without power,
+ * Read whether the drive's position is the machine's: enter homing mode without power,
  * read the statusword (bits 10, 12), and enter @mode again.
  */
 int cia402_read_homed(const struct cia402_client *client, enum cia402_mode mode,
@@ -219,7 +219,7 @@ int cia402_read_homed(const struct cia402_client *client, enum cia402_mode mode,
 /* Reset a fault; afterwards the drive has no power. -EBUSY: the cause persists. */
 int cia402_clear(const struct cia402_client *client);
 
-/* Remove power, and wait until the drive has none. */
+/* Remove power, and wait until it is off. */
 int cia402_power_off(const struct cia402_client *client);
 
 #endif

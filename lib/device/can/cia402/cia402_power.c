@@ -4,7 +4,7 @@
  * operation enabled. Positions and speeds are in the drive's units.
  *
  *   homing mode, statusword   bit 13  12  10
- *                                  0   1   1   its position is that of the machine
+ *                                  0   1   1   its position is the machine's
  *                                  1   .   .   it failed
  */
 #include <errno.h>
@@ -170,7 +170,7 @@ int cia402_read_homed(const struct cia402_client *client, enum cia402_mode mode,
 	if (!rc)
 		*homed = word & CIA402_HOMED && word & CIA402_TARGET_REACHED &&
 			 !(word & CIA402_FOLLOWING_ERROR);
-	/* In any case return to @mode; the message is that of the first error. */
+	/* In any case return to @mode, with the message of the first error. */
 	after.err = rc ? NULL : client->err;
 	back = cia402_set_mode(&after, mode);
 	return rc ? rc : back;

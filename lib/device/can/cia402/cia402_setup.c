@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
  * The setup of a drive before it may move, in an order in which a drive that was left half-way
- * has no power and no PDOs that somebody could move it with.
+ * has no power and no PDOs that could move it.
  *
  *   no power? ─▶ pre-operational ─▶ PDOs off, filled, on ─▶ limits ─▶ mode, cycle
  *   ─▶ reaction to silence, heartbeats ─▶ operational
@@ -303,7 +303,7 @@ static int set_limits(const struct cia402_client *client,
 		{setup->velocity, &speed, setup->velocity, &supported->velocity_limit},
 		{setup->acceleration, &acceleration, setup->acceleration,
 		 &supported->acceleration_limit},
-		/* A drive without this limit brakes by that of accelerations. */
+		/* A drive without this limit brakes by the limit of accelerations. */
 		{setup->acceleration, &deceleration, setup->acceleration, &has},
 		{setup->acceleration, &stop_ramp, setup->acceleration, &has},
 		{setup->following, &window, setup->following,

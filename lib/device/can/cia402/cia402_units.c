@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Profile and units of a drive (CiA 402-2, factor group). A turn is one of the screw, that is
- * of the shaft behind the drive's gear, if it has one.
+ * Profile and units of a drive (CiA 402-2, factor group). A turn is a turn of the screw, that
+ * is of the shaft behind the drive's gear, if it has one.
  *
  *   60A8, 60A9, 60AA   31 … 24        23 … 16     15 … 8   7 … 0
  *                      power of ten   numerator   per      –

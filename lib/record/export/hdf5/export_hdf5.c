@@ -22,7 +22,6 @@
 #include <unistd.h>
 #include <hdf5.h>
 #include <zlib.h>
-#include <incise/backend.h>
 #include "../table_writer.h"
 
 #define LEVEL 1 /* noted in the file; readers ignore it */
@@ -72,8 +71,10 @@ static hid_t stored_type(enum incise_column_type type)
 {
 	switch (type) {
 	case INCISE_COLUMN_REAL:
+	case INCISE_COLUMN_SEEN:
 		return H5T_NATIVE_DOUBLE;
 	case INCISE_COLUMN_SINGLE:
+	case INCISE_COLUMN_COARSE:
 		return H5T_NATIVE_FLOAT;
 	case INCISE_COLUMN_FLAG:
 		return H5T_NATIVE_UINT8;
@@ -176,7 +177,7 @@ static int begin_deflate(struct hdf5 *hdf5)
 	return hdf5->shuffled && hdf5->packed ? 0 : -1;
 }
 
-static int hdf5_begin(struct incise_table *table, struct incise_error *err)
+static int hdf5_open(struct incise_table *table, struct incise_error *err)
 {
 	struct hdf5 *hdf5;
 	struct stat st;
@@ -210,19 +211,6 @@ static int hdf5_begin(struct incise_table *table, struct incise_error *err)
 	return bad ? fail(hdf5, "the file cannot be started", err) : 0;
 }
 
-static size_t stored_width(enum incise_column_type type)
-{
-	switch (type) {
-	case INCISE_COLUMN_SINGLE:
-	case INCISE_COLUMN_NAME:
-		return 4;
-	case INCISE_COLUMN_FLAG:
-		return 1;
-	default:
-		return 8;
-	}
-}
-
 /* A column of the block as it is stored. */
 static void narrow(const union incise_cell *cells, size_t n, enum incise_column_type type,
 		   void *to)
@@ -233,6 +221,7 @@ static void narrow(const union incise_cell *cells, size_t n, enum incise_column_
 
 	switch (type) {
 	case INCISE_COLUMN_SINGLE:
+	case INCISE_COLUMN_COARSE:
 		for (size_t i = 0; i < n; i++)
 			singles[i] = cells[i].real;
 		break;
@@ -262,7 +251,7 @@ static int put_chunk(struct hdf5 *hdf5, hid_t set, const union incise_cell *cell
 		     size_t n, hsize_t from, enum incise_column_type type)
 {
 	z_stream *z = &hdf5->deflate;
-	size_t width = stored_width(type);
+	size_t width = H5Tget_size(stored_type(type));
 
 	memset(hdf5->narrow, 0, INCISE_TABLE_BLOCK * width);
 	narrow(cells, n, type, hdf5->narrow);
@@ -278,7 +267,7 @@ static int put_chunk(struct hdf5 *hdf5, hid_t set, const union incise_cell *cell
 		       : 0;
 }
 
-static int hdf5_rows(struct incise_table *table, struct incise_error *err)
+static int hdf5_put(struct incise_table *table, struct incise_error *err)
 {
 	struct hdf5 *hdf5 = table->state;
 	hsize_t from = table->rows, end = from + table->filled;
@@ -290,7 +279,7 @@ static int hdf5_rows(struct incise_table *table, struct incise_error *err)
 
 		bad = H5Dset_extent(hdf5->columns[i], &end) < 0 ||
 		      put_chunk(hdf5, hdf5->columns[i],
-				table->block + (size_t)i * INCISE_TABLE_BLOCK,
+				table->block + (size_t)i * INCISE_TABLE_STRIDE,
 				table->filled, from, type);
 	}
 	return bad ? fail(hdf5, "rows cannot be written", err) : 0;
@@ -349,26 +338,10 @@ static int hdf5_end(struct incise_table *table, struct incise_error *err)
 	return bad ? fail(hdf5, "the file cannot be closed", err) : 0;
 }
 
-static const struct incise_table_format format = {
+const struct incise_table_format incise_table_hdf5 = {
 	.abi = INCISE_TABLE_ABI,
-	.begin = hdf5_begin,
-	.rows = hdf5_rows,
+	.open = hdf5_open,
+	.put = hdf5_put,
 	.end = hdf5_end,
 	.close = hdf5_close,
-};
-
-static void *hdf5_open(const struct incise_backend_request *request,
-		       struct incise_error *err)
-{
-	(void)request;
-	(void)err;
-	return (void *)&format;
-}
-
-/* Found like the module of a device; open() returns a format. */
-const struct incise_backend incise_backend = {
-	.abi = INCISE_BACKEND_ABI,
-	.kind = "export",
-	.name = "hdf5",
-	.open = hdf5_open,
 };

@@ -1,0 +1,779 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * Training from sources; see incise/corpus.h.
+ *
+ *   sources ─► survey ─► sample ─► search of the premises ─┐
+ *      └──────────────────────────► sums of all pairs ─────┴─► model, or a factor
+ *
+ * The sources are shared among processes: each surveys its own, all have all surveys, the first
+ * one searches, each adds the pairs of its own, and the first one solves. With weights the sums are
+ * found three times: weights follow from a model, and the model from the weights.
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <incise/version.h>
+#include "reader.h"
+#include "train.h"
+
+/* Operations for a row: reading it, and its part in the survey. */
+#define READ 5e3
+
+/* Passes by which weights have settled. */
+#define PASSES 3
+
+struct training {
+	const struct incise_sources_options *options;
+	const struct incise_ranks *ranks; /* or NULL */
+	struct incise_trained *trained;
+	struct incise_reader *sources;
+	int n;
+	struct incise_reading reading;
+	char *how;				/* the options that the model notes */
+	struct incise_progress *progress;	/* or NULL */
+	struct incise_propagation *propagation; /* or NULL */
+	struct incise_factor *check;		/* or NULL */
+	struct incise_watch watch;
+	struct incise_error err;
+	bool named; /* the error of a search names what it is of */
+};
+
+static int no_memory(struct training *t)
+{
+	return incise_error_set(&t->err, ENOMEM, "no memory to train");
+}
+
+/* Put what is trained from in front of the error. */
+static int name_error(struct training *t, int rc)
+{
+	struct incise_error own = t->err;
+
+	return t->n == 1
+		       ? incise_error_set(&t->err, -rc, "%s: %s",
+					  t->sources[0].given->name, own.text)
+		       : incise_error_set(&t->err, -rc, "%d sources: %s", t->n, own.text);
+}
+
+/* The same, with the rows that repeat others, which may be the cause. */
+static int name_training(struct training *t, int rc)
+{
+	struct incise_error own;
+
+	rc = name_error(t, rc);
+	own = t->err;
+	return t->trained->repeated
+		       ? incise_error_set(&t->err, -rc,
+					  "%s (%llu of %llu rows repeat another row)",
+					  own.text,
+					  (unsigned long long)t->trained->repeated,
+					  (unsigned long long)(t->trained->pairs +
+							       t->trained->check_pairs))
+		       : rc;
+}
+
+/* The options that a model depends on, for people: free(3). */
+static char *describe_options(const struct training *t)
+{
+	const struct incise_sources_options *options = t->options;
+	size_t tuned = options->train.tuned;
+	char check[60] = "", sample[60] = "", *text;
+
+	if (tuned == SIZE_MAX)
+		strcpy(sample, ", search on all pairs");
+	else if (tuned)
+		snprintf(sample, sizeof(sample), ", search on %zu pairs", tuned);
+	if (options->check > 0)
+		snprintf(check, sizeof(check), ", %g held out with seed %llu",
+			 options->check, (unsigned long long)options->train.seed);
+	if (asprintf(&text, "%sgroups: %s%s%s%s%s%s",
+		     options->train.classic ? "classic, " : "",
+		     t->reading.group ? t->reading.group : "none",
+		     options->all_rows ? ", all rows" : "",
+		     options->averaged ? ", averaged" : "", sample, check,
+		     options->n_parts ? ", weighted by uncertainties" : "") < 0)
+		return NULL;
+	return text;
+}
+
+static void begin_phase(struct training *t, enum incise_train_phase phase, uint64_t total,
+			double cost)
+{
+	t->watch.step = (struct incise_train_step){.phase = phase, .total = total};
+	t->reading.cost = cost;
+	if (phase == INCISE_TRAIN_SURVEY || phase == INCISE_TRAIN_ADD)
+		t->watch.step.sources = t->n;
+	incise_watch_ask(&t->watch);
+}
+
+/* --- many processes ------------------------------------------------------------------ */
+
+static bool is_mine(const struct training *t, int source)
+{
+	return !t->ranks || source % t->ranks->size == t->ranks->rank;
+}
+
+static bool is_first(const struct training *t)
+{
+	return !t->ranks || !t->ranks->rank;
+}
+
+/* Fail if any rank has failed, with the error of the lowest one. */
+static int agree_on_error(struct training *t, int rc)
+{
+	struct incise_error none = {0}, *all;
+	size_t *sizes;
+	void *bytes;
+
+	if (t->watch.stopped)
+		rc = incise_error_set(&t->err, ECANCELED, "training was stopped");
+	if (!t->ranks)
+		return rc;
+	if (t->ranks->gather(rc ? &t->err : &none, sizeof(none), &bytes, &sizes))
+		return no_memory(t);
+	all = bytes;
+	for (int r = 0; r < t->ranks->size && !t->trained->shared; r++)
+		if (all[r].code) {
+			t->trained->shared = true;
+			t->err = all[r];
+			rc = -t->err.code;
+		}
+	free(bytes);
+	free(sizes);
+	return rc;
+}
+
+/* The surveys of all ranks at each. */
+static int share_surveys(struct training *t)
+{
+	struct incise_corpus *corpus = t->trained->corpus;
+	size_t n, *sizes;
+	void *mine = incise_corpus_encode(corpus, &n), *all;
+	int rc = mine ? t->ranks->gather(mine, n, &all, &sizes) : -ENOMEM;
+
+	free(mine);
+	if (rc)
+		return no_memory(t);
+	for (size_t r = 0, at = 0; r < (size_t)t->ranks->size && !rc; at += sizes[r], r++)
+		if (r != (size_t)t->ranks->rank)
+			rc = incise_corpus_add(corpus, (char *)all + at, sizes[r],
+					       &t->err);
+	free(all);
+	free(sizes);
+	t->trained->shared = rc;
+	return rc;
+}
+
+/* A factor without pairs at the premises of rank 0. */
+static int share_premises(struct training *t, struct incise_factor **factor)
+{
+	size_t n = 0, *sizes;
+	void *mine = *factor ? incise_factor_encode(*factor, &n) : NULL, *all;
+	int rc = *factor && !mine ? -ENOMEM : t->ranks->gather(mine, n, &all, &sizes);
+
+	free(mine);
+	if (rc)
+		return no_memory(t);
+	if (!*factor)
+		*factor = incise_factor_decode(all, sizes[0], "rank 0", &t->err);
+	free(all);
+	free(sizes);
+	return *factor ? 0 : -errno;
+}
+
+/* Add the sums of some pairs to those of others, and free them; NULL is an error before. */
+static int add_sums(struct incise_factor *sums, struct incise_factor *more,
+		    const char *name, struct incise_error *err)
+{
+	int rc = more ? incise_factor_merge(sums, more, name, err) : -errno;
+
+	incise_factor_free(more);
+	return rc;
+}
+
+/* The sum of all ranks' factors at rank 0, by a tree: any other gives the same. */
+static int add_ranks(struct training *t, struct incise_factor *factor)
+{
+	static const char *const name = "another rank";
+	const struct incise_ranks *ranks = t->ranks;
+	void *bytes;
+	size_t n;
+	int rc = 0;
+
+	for (int step = 1; step < ranks->size && !rc; step *= 2) {
+		if (ranks->rank % (2 * step)) {
+			bytes = incise_factor_encode(factor, &n);
+			if (!bytes)
+				return no_memory(t);
+			ranks->send(ranks->rank - step, bytes, n);
+			free(bytes);
+			return 0;
+		}
+		if (ranks->rank + step >= ranks->size)
+			continue;
+		bytes = ranks->receive(ranks->rank + step, &n);
+		rc = bytes ? add_sums(factor,
+				      incise_factor_decode(bytes, n, name, &t->err), name,
+				      &t->err)
+			   : no_memory(t);
+		free(bytes);
+	}
+	return rc;
+}
+
+/* --- the progress of an interrupted training ----------------------------------------- */
+
+/* All that the surveys and sums depend on but the premises; NULL: nothing is kept. */
+static struct incise_progress *open_progress(struct training *t)
+{
+	const struct incise_sources_options *options = t->options;
+	struct incise_progress *progress = NULL;
+	char *key = NULL;
+	size_t size;
+	FILE *out;
+
+	if (!options->progress || t->ranks || options->train.classic || options->n_parts)
+		return NULL;
+	out = open_memstream(&key, &size);
+	if (!out)
+		return NULL;
+	fprintf(out, "%s; seed %llu; ", t->how, (unsigned long long)options->train.seed);
+	for (int i = 0; i < t->reading.n_columns; i++)
+		fprintf(out, "%s,", options->columns[i]);
+	if (!fclose(out))
+		progress = incise_progress_open(options->progress, key, t->sources, t->n);
+	free(key);
+	return progress;
+}
+
+static void keep_part(struct training *t, enum incise_progress_part part,
+		      struct incise_factor *factor)
+{
+	size_t size = 0;
+	void *bytes = factor ? incise_factor_encode(factor, &size) : NULL;
+
+	incise_progress_set(t->progress, part, bytes, size);
+}
+
+static void keep_progress(struct training *t)
+{
+	keep_part(t, PROGRESS_FIT, t->trained->factor);
+	keep_part(t, PROGRESS_CHECK, t->check);
+	incise_progress_write(t->progress);
+}
+
+static void keep_surveys(struct training *t)
+{
+	size_t size;
+	void *bytes = incise_corpus_encode(t->trained->corpus, &size);
+
+	incise_progress_set(t->progress, PROGRESS_SURVEYS, bytes, size);
+	keep_progress(t);
+}
+
+static int fail_damaged(struct training *t)
+{
+	return incise_error_set(&t->err, EINVAL,
+				"the progress of an interrupted training is damaged; it "
+				"is removed, start again");
+}
+
+/* Take over the surveys of the first sources; returns how many, or a negative errno. */
+static int resume_surveys(struct training *t)
+{
+	const struct incise_corpus *corpus = t->trained->corpus;
+	size_t size;
+	const void *surveys = incise_progress_part(t->progress, PROGRESS_SURVEYS, &size);
+
+	if (!surveys)
+		return 0;
+	if (incise_corpus_add(t->trained->corpus, surveys, size, &t->err) ||
+	    incise_corpus_sources(corpus) > t->n)
+		return fail_damaged(t);
+	for (int i = 0; i < incise_corpus_sources(corpus); i++)
+		incise_reader_resume(&t->sources[i], incise_corpus_source(corpus, i));
+	return incise_corpus_sources(corpus);
+}
+
+/* The kept sums replace those without pairs, if they are of the same premises. */
+static bool resume_factor(const struct training *t, enum incise_progress_part part,
+			  struct incise_factor **factor)
+{
+	struct incise_factor_info wanted, found;
+	struct incise_factor *kept;
+	size_t size;
+	const void *bytes = incise_progress_part(t->progress, part, &size);
+
+	kept = bytes ? incise_factor_decode(bytes, size, "progress", NULL) : NULL;
+	if (!kept)
+		return false;
+	incise_factor_info(*factor, &wanted);
+	incise_factor_info(kept, &found);
+	if (strcmp(wanted.premises, found.premises)) {
+		incise_factor_free(kept);
+		return false;
+	}
+	incise_factor_free(*factor);
+	*factor = kept;
+	return true;
+}
+
+static int resume_factors(struct training *t)
+{
+	if (resume_factor(t, PROGRESS_FIT, &t->trained->factor) && t->check &&
+	    !resume_factor(t, PROGRESS_CHECK, &t->check))
+		return fail_damaged(t);
+	return 0;
+}
+
+/* --- the survey ---------------------------------------------------------------------- */
+
+static int survey_source(struct training *t, int i)
+{
+	struct incise_reader *source = &t->sources[i];
+	int rc;
+
+	t->watch.step.source = i;
+	rc = incise_reader_open(source, &t->err);
+	if (!rc)
+		rc = incise_corpus_survey(t->trained->corpus, &source->corpus, &t->err);
+	if (!rc && t->progress && (i == t->n - 1 || incise_progress_due(t->progress)))
+		keep_surveys(t);
+	return rc;
+}
+
+/* Rows, ranges, groups, and the sample of all sources. */
+static int survey_sources(struct training *t)
+{
+	const struct incise_sources_options *options = t->options;
+	size_t sample = options->train.classic ? SIZE_MAX : options->train.tuned;
+	struct incise_trained *trained = t->trained;
+	const struct incise_corpus_side *fit, *check;
+	int rc = 0, first;
+
+	trained->corpus = incise_corpus_new(
+		options->n_inputs, t->reading.group, options->train.seed,
+		sample > INCISE_CORPUS_SAMPLE ? sample : INCISE_CORPUS_SAMPLE);
+	if (!trained->corpus)
+		return no_memory(t);
+	first = resume_surveys(t);
+	if (first < 0)
+		return first;
+	begin_phase(t, INCISE_TRAIN_SURVEY, 0, READ);
+	t->watch.step.resumed = first;
+	if (first)
+		incise_watch_ask(&t->watch);
+	for (int i = first; i < t->n && !rc && !t->watch.stopped; i++)
+		if (is_mine(t, i))
+			rc = survey_source(t, i);
+	rc = agree_on_error(t, rc);
+	if (!rc && t->ranks)
+		rc = share_surveys(t);
+	if (rc)
+		return rc;
+	rc = incise_corpus_settle(trained->corpus, options->check, &t->err);
+	trained->shared = rc;
+	if (rc)
+		return name_error(t, rc);
+	fit = incise_corpus_side(trained->corpus, false);
+	check = incise_corpus_side(trained->corpus, true);
+	trained->pairs = fit->rows;
+	trained->check_pairs = check->rows;
+	trained->repeated = fit->rows - fit->different + check->rows - check->different;
+	for (int i = 0; i < incise_corpus_sources(trained->corpus); i++)
+		trained->left_out += incise_corpus_source(trained->corpus, i)->left_out;
+	return 0;
+}
+
+/* --- the sums ------------------------------------------------------------------------ */
+
+static int make_factor(struct training *t, const struct incise_model *premises,
+		       struct incise_factor **factor)
+{
+	incise_factor_free(*factor);
+	*factor = premises ? incise_factor_new(premises, &t->err) : NULL;
+	if (premises && !*factor)
+		return name_error(t, -errno);
+	if (*factor)
+		incise_factor_set_options(*factor, t->how);
+	return t->ranks ? share_premises(t, factor) : 0;
+}
+
+static bool has_source(const struct incise_factor *factor, const char *hash)
+{
+	struct incise_factor_info info;
+	bool found = false;
+
+	incise_factor_info(factor, &info);
+	for (int i = 0; i < info.n_sources; i++)
+		found |= !strcmp(info.sources[i].hash, hash);
+	return found;
+}
+
+static int fold_source(struct training *t, int i)
+{
+	struct incise_trained *trained = t->trained;
+	struct incise_reader *source = &t->sources[i];
+	int rc;
+
+	t->watch.step.source = i;
+	if (has_source(trained->factor, source->hash))
+		return 0;
+	rc = incise_corpus_fold(trained->corpus, &source->corpus, trained->factor,
+				t->check, &t->err);
+	if (!rc && incise_progress_due(t->progress))
+		keep_progress(t);
+	return rc;
+}
+
+/* Premises are those of rank 0, and the sums are complete there. */
+static int fold_sources(struct training *t, const struct incise_model *premises)
+{
+	struct incise_trained *trained = t->trained;
+	struct incise_factor_info info;
+	int rc;
+
+	rc = make_factor(t, premises, &trained->factor);
+	if (!rc && t->options->check > 0)
+		rc = make_factor(t, premises, &t->check);
+	if (!rc)
+		rc = resume_factors(t);
+	if (rc)
+		return rc;
+	incise_factor_info(trained->factor, &info);
+	begin_phase(t, INCISE_TRAIN_ADD, trained->pairs + trained->check_pairs,
+		    READ + 4 * pow(info.n_rules * (info.n_inputs + 1), 2));
+	for (int i = 0; i < t->n && !rc && !t->watch.stopped; i++)
+		if (is_mine(t, i))
+			rc = fold_source(t, i);
+	rc = agree_on_error(t, rc);
+	if (!rc && t->ranks)
+		rc = add_ranks(t, trained->factor);
+	if (!rc && t->ranks && t->check)
+		rc = add_ranks(t, t->check);
+	/* The others are at their end. */
+	trained->shared |= !rc;
+	return rc;
+}
+
+/* Root mean square error of a model on a sample; never 0. */
+static double find_scatter(const struct incise_model *model,
+			   const struct incise_pairs *pairs)
+{
+	int d = pairs->n_inputs;
+	double sum = 0, least = 0;
+
+	for (size_t i = 0; i < pairs->n; i++) {
+		const double *x = pairs->rows + i * (size_t)(d + 1);
+		double e = incise_model_eval(model, x, NULL) - x[d];
+
+		sum += e * e;
+		least = fmax(least, fabs(x[d]));
+	}
+	return fmax(sqrt(sum / (double)pairs->n), 1e-9 * fmax(least, 1e-9));
+}
+
+/* One pass with the weights that follow from a model, which the model of the weights replaces. */
+static int fold_pass(struct training *t, struct incise_model **model, double *scatter)
+{
+	const struct incise_factor_ridge ridge = {1e-3, 1, 1};
+	struct incise_uncertainty *uncertainty = NULL;
+	struct incise_model *next = NULL;
+	int rc = incise_propagation_start(t->propagation, *model, *scatter, &t->err);
+
+	if (!rc)
+		rc = fold_sources(t, *model);
+	if (rc)
+		return rc;
+	next = incise_factor_solve(t->trained->factor, &ridge, NULL, &uncertainty,
+				   &t->watch, &t->err);
+	rc = next ? incise_propagation_end(t->propagation, next, uncertainty,
+					   incise_factor_rmse(t->trained->factor, next,
+							      NULL),
+					   scatter, &t->err)
+		  : -errno;
+	incise_uncertainty_free(uncertainty);
+	incise_model_free(*model);
+	*model = next;
+	return rc ? name_error(t, rc) : 0;
+}
+
+/* The sums of all pairs, of which those with weights are passed over several times. */
+static int fold_passes(struct training *t, const struct incise_model *premises)
+{
+	struct incise_model *model;
+	double scatter;
+	int rc;
+
+	if (!t->propagation)
+		return fold_sources(t, premises);
+	model = incise_model_copy(premises);
+	rc = model ? 0 : no_memory(t);
+	scatter = find_scatter(
+		premises, &incise_corpus_side(t->trained->corpus, false)->sample.pairs);
+	for (int pass = 0; pass < PASSES && !rc; pass++)
+		rc = fold_pass(t, &model, &scatter);
+	incise_model_free(model);
+	return rc;
+}
+
+/* --- the model ----------------------------------------------------------------------- */
+
+static int find_sums(void *user, const struct incise_model *premises,
+		     struct incise_factor **sums)
+{
+	struct training *t = user;
+	int rc = fold_passes(t, premises);
+
+	*sums = t->trained->factor;
+	t->named = rc;
+	return rc;
+}
+
+/* From an even grid over the ranges of all training pairs. */
+static int search_premises(struct training *t)
+{
+	const struct incise_corpus *corpus = t->trained->corpus;
+	const struct incise_corpus_side *fit = incise_corpus_side(corpus, false);
+	const struct incise_corpus_side *check = incise_corpus_side(corpus, true);
+	struct incise_variable ranges[INCISE_MODEL_INPUTS_MAX + 1];
+	double min[INCISE_MODEL_INPUTS_MAX + 1], max[INCISE_MODEL_INPUTS_MAX + 1];
+	struct incise_train_sums sums = {find_sums, t, t->options->n_parts > 0};
+	struct incise_train_options options = t->options->train;
+	int n_mfs[INCISE_MODEL_INPUTS_MAX];
+	struct incise_trained *trained = t->trained;
+	int rc;
+
+	incise_corpus_ranges(corpus, min, max);
+	for (int i = 0; i <= t->options->n_inputs; i++)
+		ranges[i] = (struct incise_variable){.min = min[i], .max = max[i]};
+	options.groups = fit->sample.groups;
+	options.ranges = ranges;
+	options.uncertainty = &trained->uncertainty;
+	memcpy(n_mfs, t->options->n_mfs, sizeof(n_mfs));
+	trained->model = incise_train_start(&fit->sample.pairs, t->options->columns,
+					    t->options->type, n_mfs, &options, &t->err);
+	if (!trained->model)
+		return name_error(t, -errno);
+	trained->initial = incise_model_copy(trained->model);
+	if (!trained->initial)
+		return no_memory(t);
+	rc = incise_train_sample(trained->model, &fit->sample.pairs,
+				 check->sample.pairs.n ? &check->sample.pairs : NULL,
+				 &options, options.classic ? NULL : &sums,
+				 &trained->report, &t->err);
+	return rc && !t->named ? name_training(t, rc) : rc;
+}
+
+/* The consequents of all pairs at given premises. */
+static int solve_premises(struct training *t)
+{
+	const struct incise_factor_ridge ridge = {t->options->train.ridge, 1, NAN};
+	struct incise_trained *trained = t->trained;
+	int rc = fold_passes(t, t->options->premises);
+
+	if (rc || t->options->end == INCISE_TRAIN_TO_FACTOR)
+		return rc;
+	begin_phase(t, INCISE_TRAIN_SOLVE, 0, 0);
+	trained->model = incise_factor_solve(trained->factor, &ridge, &trained->report,
+					     &trained->uncertainty, &t->watch, &t->err);
+	return trained->model ? 0 : name_training(t, -errno);
+}
+
+/* Put the calibrations into the standard deviation of the model. */
+static int finish_weighted(struct training *t)
+{
+	struct incise_trained *trained = t->trained;
+	double scatter;
+	int rc;
+
+	if (!t->propagation)
+		return 0;
+	rc = incise_propagation_end(t->propagation, trained->model, trained->uncertainty,
+				    trained->report.train_rmse, &scatter, &t->err);
+	if (!rc)
+		rc = incise_propagation_finish(t->propagation, trained->uncertainty,
+					       &trained->propagated, &t->err);
+	return rc ? name_error(t, rc) : 0;
+}
+
+/* The share of the sample that is held out within its interval. */
+static void find_coverage(struct training *t)
+{
+	const struct incise_pairs *check =
+		&incise_corpus_side(t->trained->corpus, true)->sample.pairs;
+	struct incise_trained *trained = t->trained;
+	double n = incise_uncertainty_unknowns(trained->uncertainty);
+	size_t inside = 0;
+
+	for (size_t i = 0; i < check->n && !incise_watch_count(&t->watch, n * n); i++) {
+		const double *x = check->rows + i * (check->n_inputs + 1);
+		double e =
+			incise_model_eval(trained->model, x, NULL) - x[check->n_inputs];
+		double sd =
+			incise_uncertainty_sd(trained->uncertainty, trained->model, x);
+
+		inside += fabs(e) <= INCISE_INTERVAL95 * sd;
+	}
+	trained->coverage = check->n ? (double)inside / check->n : NAN;
+}
+
+/* Notes of a model, also of a classic one, which has no factor; free(3), NULL: no memory. */
+static char *make_notes(const struct training *t)
+{
+	const struct incise_corpus *corpus = t->trained->corpus;
+	char *text = NULL;
+	size_t size;
+	FILE *out;
+
+	if (t->trained->factor)
+		return incise_factor_notes(t->trained->factor);
+	out = open_memstream(&text, &size);
+	if (!out)
+		return NULL;
+	fprintf(out, "version: %s\noptions: %s\n", incise_version(), t->how);
+	for (int i = 0; i < t->n; i++) {
+		const struct incise_corpus_survey *survey =
+			incise_corpus_source(corpus, i);
+
+		fprintf(out, "source: %s %llu pairs, %s\n", survey->hash,
+			(unsigned long long)survey->rows, survey->text);
+	}
+	return fclose(out) ? NULL : text;
+}
+
+/* Find what a report says about the model. */
+static int judge_model(struct training *t)
+{
+	struct incise_trained *trained = t->trained;
+	const struct incise_corpus_side *fit = incise_corpus_side(trained->corpus, false);
+	const struct incise_corpus_side *check =
+		incise_corpus_side(trained->corpus, true);
+	struct incise_factor_info info;
+	int rc = finish_weighted(t);
+
+	if (rc)
+		return rc;
+	begin_phase(t, INCISE_TRAIN_SOLVE, 0, 0);
+	if (t->check) {
+		trained->report.check_rmse = incise_factor_rmse(
+			t->check, trained->model, &trained->report.check_r2);
+		incise_factor_info(t->check, &info);
+		trained->check_outside = trained->check_pairs - info.rows;
+	}
+	trained->noise = incise_uncertainty_noise(trained->uncertainty);
+	find_coverage(t);
+	if (t->watch.stopped)
+		return -ECANCELED;
+	if (incise_baselines(&fit->sample.pairs, fit->sample.groups,
+			     &(check->sample.pairs.n ? check : fit)->sample.pairs,
+			     t->watch.progress, t->watch.user, &trained->baselines,
+			     &t->err))
+		return name_error(t, -t->err.code);
+	trained->notes = make_notes(t);
+	return trained->notes ? 0 : no_memory(t);
+}
+
+/* --- all of it ----------------------------------------------------------------------- */
+
+static int train_all(struct training *t)
+{
+	const struct incise_sources_options *options = t->options;
+	int rc;
+
+	if (t->ranks && (options->n_parts || options->train.classic))
+		return incise_error_set(
+			&t->err, EINVAL,
+			"weights and classic trainings are of one process");
+	rc = survey_sources(t);
+	if (rc || options->end == INCISE_TRAIN_TO_CORPUS)
+		return rc;
+	if (options->n_parts) {
+		t->propagation = incise_propagation_new(options->n_inputs, options->parts,
+							options->n_parts, &t->err);
+		if (!t->propagation)
+			return -errno;
+		incise_corpus_weigh(t->trained->corpus, t->propagation);
+	}
+	if (!is_first(t))
+		return fold_sources(t, NULL);
+	rc = options->premises ? solve_premises(t) : search_premises(t);
+	if (!rc && options->end == INCISE_TRAIN_TO_MODEL)
+		rc = judge_model(t);
+	return rc;
+}
+
+int incise_train_sources(struct incise_train_source *sources, int n,
+			 const struct incise_sources_options *options,
+			 struct incise_trained *trained, struct incise_error *err)
+{
+	struct training t = {
+		.options = options,
+		.ranks = options->ranks,
+		.trained = trained,
+		.n = n,
+		.reading = {.columns = options->columns,
+			    .n_columns = options->n_inputs + 1 + options->n_parts,
+			    .where = options->all_rows ? NULL : "advancing",
+			    .watch = &t.watch},
+		.watch = incise_watch_of(&options->train),
+	};
+	int rc;
+
+	*trained = (struct incise_trained){0};
+	t.sources = incise_readers_new(sources, n, options->group, &t.reading);
+	t.how = describe_options(&t);
+	rc = t.sources && t.how ? 0 : no_memory(&t);
+	trained->group = t.reading.group;
+	if (!rc)
+		t.progress = open_progress(&t);
+	if (!rc)
+		rc = train_all(&t);
+	/* A search counts for itself. */
+	if (t.watch.stopped || rc == -ECANCELED)
+		rc = incise_error_set(&t.err, ECANCELED, "training was stopped");
+	incise_progress_close(t.progress, rc == -ECANCELED);
+	incise_propagation_free(t.propagation);
+	incise_factor_free(t.check);
+	incise_readers_free(t.sources, n);
+	free(t.how);
+	return rc ? incise_error_set(err, -rc, "%s", t.err.text) : 0;
+}
+
+int incise_train_factors(const char *const *paths, int n, double ridge,
+			 enum incise_train_end end, struct incise_trained *trained,
+			 struct incise_error *err)
+{
+	const struct incise_factor_ridge wanted = {ridge, 1, NAN};
+	int rc = 0;
+
+	*trained = (struct incise_trained){0};
+	for (int i = 0; i < n && !rc; i++) {
+		struct incise_factor *more = incise_factor_load(paths[i], err);
+
+		if (trained->factor)
+			rc = add_sums(trained->factor, more, paths[i], err);
+		else if (!(trained->factor = more))
+			rc = -errno;
+	}
+	if (rc || end == INCISE_TRAIN_TO_FACTOR)
+		return rc;
+	trained->model = incise_factor_solve(trained->factor, &wanted, &trained->report,
+					     &trained->uncertainty, NULL, err);
+	if (!trained->model)
+		return -errno;
+	trained->notes = incise_factor_notes(trained->factor);
+	return trained->notes ? 0 : incise_error_set(err, ENOMEM, "no memory to train");
+}
+
+void incise_trained_free(struct incise_trained *trained)
+{
+	incise_model_free(trained->model);
+	incise_model_free(trained->initial);
+	incise_uncertainty_free(trained->uncertainty);
+	incise_factor_free(trained->factor);
+	incise_corpus_free(trained->corpus);
+	free(trained->notes);
+	*trained = (struct incise_trained){0};
+}
