@@ -51,7 +51,7 @@ fuzz_statement := lib/base/error.c lib/record/statement.c
 fuzz_block := lib/record/batch.c lib/record/ledger.c lib/base/crc32c.c
 fuzz_libs_block = $(shell $(PKG_CONFIG) --libs sqlite3)
 fuzz_origin := lib/record/export/origin.c
-fuzz_timestamp_reply := lib/base/error.c lib/base/infile.c tools/seal/timestamp.c
+fuzz_timestamp_reply := lib/base/error.c lib/base/infile.c lib/base/crypto/sha256.c lib/record/prove/timestamp.c
 fuzz_libs_timestamp_reply = $(shell $(PKG_CONFIG) --libs libcrypto)
 
 fuzz_state_page := lib/base/error.c $(addprefix lib/loop/state_,file.c page.c reader.c)
@@ -68,7 +68,7 @@ fuzz_libs_sd_file = $(fuzz_libs_scene_file)
 fuzz_session_file := $(fuzz_scene_file) $(addprefix tools/session/,digest.c judge.c \
 	session_file.c) tools/cli/json.c tools/cli/loop_report.c tools/cli/stopwatch.c
 fuzz_libs_session_file = $(fuzz_libs_scene_file) $(shell $(PKG_CONFIG) --libs jansson)
-fuzz_factor_file := $(fuzz_scene_file) $(wildcard lib/learn/*.c)
+fuzz_factor_file := $(fuzz_scene_file) lib/base/crypto/sha256.c $(wildcard lib/learn/*.c)
 fuzz_libs_factor_file = $(fuzz_libs_scene_file) $(shell $(PKG_CONFIG) --libs $(pc_incise-learn))
 
 fuzz_core := $(patsubst %.c,$(O)/obj/fuzz/%.o,$(wildcard lib/fixed/*.c))

@@ -3,8 +3,7 @@
 
 # The keys of rig.conf that a device brings are read where its module is not, too.
 sources = $(sort $(filter-out %.proto.c,$(foreach layer,$(layers_$1),$(wildcard lib/$(layer)/*.c lib/$(layer)/*.cc lib/$(layer)/*/*_settings.c))))
-# also_LIB: objects of another layer, of which it has its own copy.
-objects = $(addprefix $(O)/obj/,$(addsuffix .o,$(basename $(call sources,$1))) $(also_$1))
+objects = $(addprefix $(O)/obj/,$(addsuffix .o,$(basename $(call sources,$1))))
 
 $(O)/obj/%.o: %.c
 	@mkdir -p $(@D)
@@ -36,6 +35,7 @@ tick.i: ## the stages of a tick for each kind of numbers, preprocessed, in build
 .PHONY: tick.i
 
 hidden := $(O)/obj/lib/hidden.a
+crypto_objects := $(O)/obj/lib/base/crypto/sha256.o
 define library
 pc_flags_$1 = $$(if $$(pc_$1),$$(shell $$(PKG_CONFIG) --cflags $$(pc_$1)))
 pc_libs_$1 = $$(if $$(pc_$1),$$(shell $$(PKG_CONFIG) --libs $$(pc_$1)))
@@ -60,9 +60,9 @@ libs: $(O)/lib/lib$1.so
 endef
 $(foreach lib,$(libraries),$(eval $(call library,$(lib))))
 
-# What libincise has and does not export: its other libraries and the add-ons hold what they use of
-# it themselves.
-$(hidden): $(call objects,incise)
+# What libincise has and does not export, and SHA-256, for which it would map libcrypto: its other
+# libraries and the add-ons hold what they use of it themselves.
+$(hidden): $(call objects,incise) $(crypto_objects)
 	@rm -f $@
 	$(call step,AR)
 	$(Q)$(AR) qcs $@ $^
@@ -125,7 +125,7 @@ left-out-%:
 
 # For unit tests, which reach into what the shared objects hide.
 # q, not r: device/vision.c and vision/vision.cc are both vision.o.
-$(O)/lib/libincise-tests.a: $(foreach lib,$(libraries),$(call objects,$(lib))) \
+$(O)/lib/libincise-tests.a: $(foreach lib,$(libraries),$(call objects,$(lib))) $(crypto_objects) \
 		$(sort $(foreach name,$(add_ons),$(objects_$(name)))) $(O)/obj/tests/vision/scalpel_picture.o
 	@mkdir -p $(@D)
 	@rm -f $@

@@ -79,9 +79,6 @@ $(O)/bin/incise-bench: $(O)/obj/lib/control/plant.o
 tool_libs := $(patsubst %,-l%,$(libraries))
 tool_more_libs := $(if $(has_png),-lpng) $(if $(has_jpeg),-ljpeg) -lm
 
-# SHA-256 and time-stamps.
-$(O)/bin/incise-sign $(O)/bin/incise-verify: tool_more_libs += $(shell $(PKG_CONFIG) --libs libcrypto)
-
 $(programs): $(O)/bin/%: $(O)/obj/tools/%.o $(tool_parts) $(foreach lib,$(libraries),$(O)/lib/lib$(lib).so)
 	@mkdir -p $(@D)
 	$(call step,LD)

@@ -8,12 +8,12 @@
 #include <stdlib.h>
 #include <string.h>
 #include <incise/capture.h>
+#include <incise/prove.h>
 #include <incise/rig.h>
 #include "capture/capture.h"
 #include "cli/calibration.h"
 #include "cli/cli.h"
 #include "cli/recording.h"
-#include "seal/seal.h"
 
 enum camera { CAMERA_AUTO, CAMERA_OFF, CAMERA_PICTURES, CAMERA_DEPTH };
 
@@ -237,25 +237,17 @@ struct signing {
 };
 
 /* The recording stays as it is if it cannot be signed. */
-static void sign(const char *path, struct signing *signing)
+static void sign_recording(const char *path, struct signing *signing)
 {
-	struct signature signature;
-	char *bytes, *file;
-	struct seal seal;
+	const struct incise_prove_options options = {.key = signing->key,
+						     .recorded = true};
+	struct incise_proof proof;
 
 	if (!signing->key)
 		return;
-	/* The recorder has just written the rows, and the statement compares them with the seal. */
-	if (!seal_open(&seal, path, false, &signing->err)) {
-		bytes = seal_sign(&seal, signing->key, &signature, &signing->err);
-		file = bytes ? seal_signature_path(&seal, &signature) : NULL;
-		if (bytes &&
-		    !seal_write(&seal, file, bytes, strlen(bytes), &signing->err))
-			strcpy(signing->by, signature.key);
-		free(bytes);
-		free(file);
-	}
-	seal_close(&seal);
+	if (!incise_prove(path, &options, &proof, &signing->err))
+		strcpy(signing->by, proof.seals->vouchers->key);
+	incise_proof_free(&proof);
 }
 
 int main(int argc, char **argv)
@@ -286,7 +278,7 @@ int main(int argc, char **argv)
 	incise_rig_close(rig);
 	recording_replace(target, options.output);
 	free(target);
-	sign(options.output, &signing);
+	sign_recording(options.output, &signing);
 	capture_report(options.output, &result, &calibration, signing.by, options.json);
 	if (signing.err.code)
 		cli_error("%s: recorded, but not signed: %s; 'incise sign' signs it",

@@ -24,10 +24,10 @@
 #include "cli/json.h"
 #include "cli/keys.h"
 #include "cli/plan_report.h"
+#include "cli/proof_report.h"
 #include "cli/recording.h"
 #include "cli/stream_report.h"
 #include "cli/wall_report.h"
-#include "seal/seal_report.h"
 #include "stepper/module.h"
 #include "train/sources.h"
 
@@ -490,7 +490,7 @@ static void force_text(const struct incise_recording_info *info)
 
 static void recording_text(const char *path, const struct incise_recording_info *info,
 			   const char *codec, const struct incise_wall *wall,
-			   json_t *calibrations, json_t *seals)
+			   json_t *calibrations, const struct incise_proof *proof)
 {
 	bool tracker = has_stream(info, "tracker");
 
@@ -524,8 +524,7 @@ static void recording_text(const char *path, const struct incise_recording_info 
 		wall_text(wall, info->start_ns, info->end_ns);
 	else
 		puts("wall time  none");
-	seal_report_print(seals);
-	json_decref(seals);
+	proof_print_heads(proof);
 	if (info->summary)
 		printf("samples  not read: 'incise verify %s' proves them\n", path);
 	stream_table(info->streams, info->n_streams);
@@ -533,7 +532,9 @@ static void recording_text(const char *path, const struct incise_recording_info 
 
 static void show_recording(const char *path, bool json, bool damaged)
 {
+	const struct incise_prove_options listed = {.level = INCISE_PROVE_SEALS};
 	struct incise_recording_info info;
+	struct incise_proof proof;
 	struct incise_error err = {0};
 	const struct incise_session_info *members = NULL;
 	char *any = cli_text("%s:*", path);
@@ -556,18 +557,20 @@ static void show_recording(const char *path, bool json, bool damaged)
 		cli_fail_with(&err);
 	err = (struct incise_error){0};
 	codec = camera_codec(recording);
+	if (incise_prove(path, &listed, &proof, &err))
+		cli_fail_with(&err);
 	intact = recording_intact(path, !info.summary, damaged, &err);
 	if (json)
 		recording_json(&info, codec, intact, wall,
 			       n ? joined_json(members, n) : json_null(),
 			       calibrations_json(path, members, n),
-			       seal_report_json(path));
+			       proof_heads_json(&proof));
 	else
 		recording_text(path, &info, codec, wall,
-			       calibrations_json(path, members, n),
-			       seal_report_json(path));
+			       calibrations_json(path, members, n), &proof);
 	if (!json)
 		joined_print(members, n);
+	incise_proof_free(&proof);
 	incise_wall_free(wall);
 	incise_recording_close(recording);
 	if (err.code)

@@ -13,6 +13,7 @@
 #include "cli/file_kind.h"
 #include "cli/folder.h"
 #include "cli/plot.h"
+#include "origin/origins.h"
 #include "plot/figure.h"
 
 struct job {
@@ -153,7 +154,7 @@ int main(int argc, char **argv)
 				  .folder = folder,
 				  .name = "figure",
 			  }};
-	struct origins origins = {0};
+	struct incise_origins origins = {0};
 	const struct drawn *kind;
 	const char *form;
 	FILE *script;
@@ -180,7 +181,7 @@ int main(int argc, char **argv)
 	if (job.output && job.figure.data)
 		origins_add(&origins, job.figure.data);
 	plot_draw_form(script, folder, job.figure.name, form, job.output, &origins);
-	origins_end(&origins);
+	incise_origins_free(&origins);
 	if (job.output)
 		cli_written();
 	cli_finish();

@@ -8,15 +8,15 @@
 #include <sys/stat.h>
 #include <unistd.h>
 #include <incise/factor.h>
+#include <incise/origin.h>
 #include <incise/recalibration.h>
 #include <incise/recording.h>
 #include <incise/seal.h>
 #include "cli/cli.h"
-#include "cli/control_character.h"
+#include "../lib/base/control_character.h"
 #include "cli/file_kind.h"
 #include "cli/json.h"
 #include "cli/recording.h"
-#include "origin/origins.h"
 
 struct job {
 	const char *recording;
@@ -49,7 +49,7 @@ static const char *const states[STATES] = {"same", "other", "later", "missing"};
 
 /* An origin, and the file of its name that is here. */
 struct step {
-	const struct incise_origin *origin;
+	struct incise_origin *origin;
 	enum state state;
 	char *why; /* of a recording with this head that is not what it was; NULL: none */
 	char *found;	/* path; NULL: none */
@@ -194,21 +194,15 @@ static void compare_calibration(struct step *step, const struct step *recording)
 
 /* --- report ------------------------------------------------------------------------------- */
 
-static char *shown(const char *text)
+static void print_step(struct step *step)
 {
-	char *copy = cli_text("%s", text);
-
-	control_characters_hide(copy);
-	return copy;
-}
-
-static void print_step(const struct step *step)
-{
-	const struct incise_origin *origin = step->origin;
+	struct incise_origin *origin = step->origin;
 	bool recording = !strcmp(origin->kind, "recording");
-	char *name = shown(origin->name), *found = shown(step->found ? step->found : "");
+	char *found = step->found ? step->found : origin->name;
 
-	printf("%*s%s %s, ", 2 * origin->depth, "", origin->kind, name);
+	control_characters_hide(origin->name);
+	control_characters_hide(found);
+	printf("%*s%s %s, ", 2 * origin->depth, "", origin->kind, origin->name);
 	if (recording)
 		printf("commit %llu, head %.16s…: ", (unsigned long long)origin->commit,
 		       origin->sha256);
@@ -223,10 +217,8 @@ static void print_step(const struct step *step)
 		break;
 	case OTHER:
 		if (step->why) {
-			char *why = shown(step->why);
-
-			printf("%s\n", why);
-			free(why);
+			control_characters_hide(step->why);
+			printf("%s\n", step->why);
 			break;
 		}
 		printf(recording ? "%s is another recording, or was changed\n"
@@ -239,8 +231,6 @@ static void print_step(const struct step *step)
 	default:
 		printf("not here\n");
 	}
-	free(name);
-	free(found);
 }
 
 static json_t *step_json(const struct step *step)
@@ -257,8 +247,8 @@ static json_t *step_json(const struct step *step)
 		states[step->state]);
 }
 
-static void report(const struct job *job, const char *path, const struct step *steps,
-		   int n, bool cut)
+static void report(const struct job *job, const char *path, struct step *steps, int n,
+		   bool cut)
 {
 	json_t *list = json_array();
 
@@ -271,7 +261,7 @@ static void report(const struct job *job, const char *path, const struct step *s
 			print_step(&steps[i]);
 	if (cut)
 		cli_warn("%s: names more than %d files; the others are left out", path,
-			 ORIGINS_MAX);
+			 INCISE_ORIGINS_MAX);
 	if (job->json)
 		json_print(json_pack("{so so sb}", "path", json_text(path), "origins",
 				     list, "cut", cut));
@@ -307,7 +297,7 @@ _Noreturn static void fail_without(const char *path)
 
 int main(int argc, char **argv)
 {
-	struct origins origins = {0};
+	struct incise_origins origins = {0};
 	struct incise_error err = {0};
 	struct job job = {0};
 	bool recorded = false, differs = false;
@@ -318,9 +308,9 @@ int main(int argc, char **argv)
 	path = cli_operand(argc, argv, "FILE", "figure, model or export");
 	if (job.recording)
 		file_expect(job.recording, FILE_RECORDING);
-	cli_catch_signals();
-	if (origins_read(&origins, path, &err))
+	if (incise_origins_read(&origins, path, file_kind_of(path) == FILE_MODEL, &err))
 		cli_fail_with(&err);
+	cli_catch_signals();
 	if (!origins.n)
 		fail_without(path);
 	steps = cli_alloc((size_t)origins.n, sizeof(*steps));
@@ -345,7 +335,7 @@ int main(int argc, char **argv)
 	for (int i = 0; i < origins.n; i++)
 		free(steps[i].found);
 	free(steps);
-	origins_end(&origins);
+	incise_origins_free(&origins);
 	cli_finish();
 	if (differs)
 		cli_fail("%s: a file here differs from the one that it was made of",

@@ -5,30 +5,25 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
-#include <incise/infile.h>
-#include <incise/outfile.h>
 #include "cli/cli.h"
 #include "cli/file_kind.h"
 #include "cli/json.h"
-#include "seal/members.h"
-#include "seal/seal.h"
+#include "cli/proof_report.h"
 
 struct job {
-	const char *key, *timestamp;
+	struct incise_prove_options prove;
 	bool json;
-	json_t *signed_by, *stamped; /* of the report */
 };
 
 static const struct cli_option options[] = {
 	{0, "key", "FILE",
 	 "sign with this private key of ssh-keygen, or with the agent if it is a "
 	 "public one, such as ~/.ssh/id_ed25519.pub",
-	 CLI_INPUT(struct job, key)},
+	 CLI_INPUT(struct job, prove.key)},
 	{0, "timestamp", "WHERE",
 	 "have the time certified (RFC 3161): http://… asks this authority, "
 	 "FILE.tsq writes a query for one, FILE.tsr takes its reply",
-	 CLI_OUTPUTS(struct job, timestamp)},
+	 CLI_OUTPUTS(struct job, prove.timestamp)},
 	{0, "json", NULL, "report as one JSON object", CLI_FLAG(struct job, json)},
 	{0},
 };
@@ -44,191 +39,101 @@ static const struct cli_command command = {
 	.examples = "incise sign liver.rec --key ~/.ssh/id_ed25519",
 };
 
-/* Commit of the statement; null: it is that of a join. */
-static json_t *commit(const struct seal *seal)
+/* Note an output, which may exist with --overwrite alone. */
+static int write_file(void *user, const char *path)
 {
-	return seal->joined ? json_null()
-			    : json_integer((json_int_t)seal->statement.last.commit);
+	(void)user;
+	cli_output_within(path);
+	return 0;
 }
 
-static void store(struct seal *seal, const char *path, const void *bytes, size_t n)
+static json_t *voucher_json(const struct incise_proof_seal *seal,
+			    const struct incise_proof_voucher *v)
 {
-	struct incise_error err = {0};
+	const bool stamp = v->kind == INCISE_PROOF_TIMESTAMP;
+	char *path = cli_text("%s/seal/%s", seal->path, v->file);
+	json_t *object =
+		json_pack("{so so so so}", "path", json_text(path), stamp ? "utc" : "key",
+			  json_text(stamp ? v->utc : v->key), "recording",
+			  json_text(seal->path), "commit",
+			  seal->join && !stamp
+				  ? json_null()
+				  : json_integer((json_int_t)seal->statements->commit));
 
-	if (!seal->stored) {
-		char *statement = seal_statement_path(seal);
-
-		cli_output_within(statement);
-		free(statement);
-	}
-	if (path)
-		cli_output_within(path);
-	if (seal_write(seal, path, bytes, n, &err))
-		cli_fail_with(&err);
-}
-
-/* @member: of a joined recording; one that the same key has signed keeps that signature. */
-static void sign(struct job *job, struct seal *seal, bool member)
-{
-	struct incise_error err = {0};
-	struct signature signature;
-	char *bytes = cli_require(seal_sign(seal, job->key, &signature, &err), &err);
-	char *path = seal_signature_path(seal, &signature);
-	char *extent = seal_extent(seal);
-
-	if (!member || cli_overwrite() || access(path, F_OK))
-		store(seal, path, bytes, strlen(bytes));
-	if (job->json)
-		json_array_append_new(job->signed_by,
-				      json_pack("{so ss so so}", "path", json_text(path),
-						"key", signature.key, "recording",
-						json_text(seal->recording), "commit",
-						commit(seal)));
-	else
-		printf("%s: signed with %s, %s\n", seal->recording, signature.key,
-		       extent);
-	free(bytes);
-	free(extent);
+	if (stamp)
+		json_object_set_new(object, "authority", json_text_or_null(v->by));
 	free(path);
+	return object;
 }
 
-/* --- time-stamps ------------------------------------------------------------------------ */
-
-static void write_query(struct job *job, struct seal *seal, const struct der *query)
+static void print_json(const char *path, const struct incise_proof *proof)
 {
-	struct incise_error err = {0};
-	struct incise_outfile *file;
+	json_t *vouchers[] = {json_array(), json_array()};
 
-	store(seal, NULL, NULL, 0);
-	file = cli_require(incise_outfile_open(job->timestamp, &err), &err);
-	fwrite(query->bytes, 1, query->n, incise_outfile_stream(file));
-	if (incise_outfile_commit(file, &err))
-		cli_fail_with(&err);
-	if (!job->json)
-		printf("%s: query for a time-stamp, statement of commit %lld; send it to "
-		       "an authority, and store its reply with --timestamp FILE.tsr\n",
-		       seal->recording, (long long)seal->statement.last.commit);
+	for (int i = 0; i < proof->n; i++)
+		for (int k = 0; k < proof->seals[i].n_vouchers; k++) {
+			const struct incise_proof_voucher *v =
+				&proof->seals[i].vouchers[k];
+
+			json_array_append_new(vouchers[v->kind == INCISE_PROOF_TIMESTAMP],
+					      voucher_json(&proof->seals[i], v));
+		}
+	json_print(json_pack("{so so so}", "path", json_text(path), "signatures",
+			     vouchers[0], "timestamps", vouchers[1]));
 }
 
-static void read_reply(const char *path, struct der *reply)
+static bool is_server(const char *where)
 {
-	static const struct incise_infile_kind kind = {
-		.name = "a reply of RFC 3161",
-		.advice = "give the reply of a time-stamp authority",
-		.size_max = TIMESTAMP_MAX,
-	};
-	struct incise_error err = {0};
-
-	reply->bytes =
-		cli_require(incise_infile_read(path, &kind, &reply->n, &err), &err);
+	return !strncmp(where, "http://", 7) || !strncmp(where, "https://", 8);
 }
-
-static void take_reply(struct job *job, struct seal *seal, const struct der *reply,
-		       const struct der *query)
-{
-	unsigned char digest[TIMESTAMP_DIGEST];
-	struct timestamp timestamp;
-	struct incise_error err = {0};
-	char *path, *extent = seal_extent(seal);
-
-	timestamp_digest(seal->text, seal->n, digest);
-	if (timestamp_read(reply, job->timestamp, digest, query, &timestamp, &err))
-		cli_fail_with(&err);
-	path = seal_timestamp_path(seal, &timestamp);
-	store(seal, path, reply->bytes, reply->n);
-	if (job->json)
-		json_array_append_new(
-			job->stamped,
-			json_pack("{so ss so so so}", "path", json_text(path), "utc",
-				  timestamp.utc, "authority",
-				  json_text_or_null(timestamp.authority), "recording",
-				  json_text(seal->recording), "commit",
-				  (json_int_t)seal->statement.last.commit));
-	else
-		printf("%s: time-stamped %s by %s, %s\n", seal->recording, timestamp.utc,
-		       *timestamp.authority ? timestamp.authority
-					    : "an unnamed authority",
-		       extent);
-	free(path);
-	free(extent);
-}
-
-static void stamp(struct job *job, struct seal *seal)
-{
-	unsigned char digest[TIMESTAMP_DIGEST];
-	struct der query = {0}, reply = {0};
-	struct incise_error err = {0};
-
-	if (cli_ends_with(job->timestamp, ".tsr")) {
-		read_reply(job->timestamp, &reply);
-		take_reply(job, seal, &reply, NULL);
-		free(reply.bytes);
-		return;
-	}
-	timestamp_digest(seal->text, seal->n, digest);
-	if (timestamp_query(digest, &query, &err))
-		cli_fail_with(&err);
-	if (timestamp_is_server(job->timestamp)) {
-		if (timestamp_ask(job->timestamp, &query, &reply, &err))
-			cli_fail_with(&err);
-		take_reply(job, seal, &reply, &query);
-		free(reply.bytes);
-	} else {
-		write_query(job, seal, &query);
-	}
-	free(query.bytes);
-}
-
-/* --- the command ------------------------------------------------------------------------- */
 
 static char *parse(struct job *job, int argc, char **argv)
 {
+	const char *timestamp;
 	char *path;
 
 	cli_parse(&command, argc, argv, job);
+	timestamp = job->prove.timestamp;
 	path = cli_operand(argc, argv, "NAME.rec", "recording to sign");
-	if (!job->key && !job->timestamp)
+	if (!job->prove.key && !timestamp)
 		cli_usage("missing --key FILE (key to sign with) or --timestamp WHERE");
-	if (job->timestamp && !timestamp_is_server(job->timestamp) &&
-	    !cli_ends_with(job->timestamp, ".tsq") &&
-	    !cli_ends_with(job->timestamp, ".tsr"))
+	if (timestamp && !is_server(timestamp) && !cli_ends_with(timestamp, ".tsq") &&
+	    !cli_ends_with(timestamp, ".tsr"))
 		cli_usage("--timestamp: expected http://…, FILE.tsq or FILE.tsr, found "
 			  "'%.60s'",
-			  job->timestamp);
-	if (job->timestamp && cli_ends_with(job->timestamp, ".tsq"))
-		cli_output(job->timestamp);
-	else if (job->timestamp)
-		cli_input(job->timestamp);
+			  timestamp);
+	if (timestamp && cli_ends_with(timestamp, ".tsq"))
+		cli_output(timestamp);
+	else if (timestamp)
+		cli_input(timestamp);
 	return (char *)file_operand(path, FILE_RECORDING);
 }
 
 int main(int argc, char **argv)
 {
-	struct job job = {.signed_by = json_array(), .stamped = json_array()};
+	struct job job = {.prove.write = write_file};
 	struct incise_error err = {0};
 	const char *path = parse(&job, argc, argv);
-	struct members members;
+	const struct incise_proof_seal *last;
+	struct incise_proof proof;
+	int rc;
 
-	members_find(&members, path);
-	for (int i = 0; i < members.n; i++) {
-		struct seal seal;
-
-		if (seal_open(&seal, members.path[i], true, &err))
-			cli_fail_with(&err);
-		if (job.key)
-			sign(&job, &seal, i < members.n - 1);
-		/* A file is one time-stamp: of the join, whose statement names the members'. */
-		if (job.timestamp &&
-		    (i == members.n - 1 || timestamp_is_server(job.timestamp)))
-			stamp(&job, &seal);
-		seal_close(&seal);
-	}
-	members_free(&members);
+	job.prove.renew = cli_overwrite();
+	rc = incise_prove(path, &job.prove, &proof, &err);
+	if (!job.json)
+		proof_print(&proof, true);
+	if (rc)
+		cli_fail_with(&err);
+	last = &proof.seals[proof.n - 1];
 	if (job.json)
-		json_print(json_pack("{so so so}", "path", json_text(path), "signatures",
-				     job.signed_by, "timestamps", job.stamped));
-	else
+		print_json(path, &proof);
+	else if (job.prove.timestamp && cli_ends_with(job.prove.timestamp, ".tsq"))
+		printf("%s: query for a time-stamp, statement of commit %lld; send it to "
+		       "an authority, and store its reply with --timestamp FILE.tsr\n",
+		       last->path, (long long)last->statements->commit);
+	if (!job.json)
 		cli_written();
+	incise_proof_free(&proof);
 	cli_finish();
 	return 0;
 }

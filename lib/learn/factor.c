@@ -16,10 +16,10 @@
 #include <incise/version.h>
 #include "../base/c_locale.h"
 #include "../base/crc32c.h"
+#include "../base/crypto/sha256.h"
 #include "../base/random.h"
 #include "design.h"
 #include "factor.h"
-#include "sha256.h"
 #include "tune.h"
 
 #define FORM 2 /* of the file */
@@ -47,6 +47,11 @@ struct incise_factor {
 	int at; /* the source that pairs are added to */
 	char version[40], options[INCISE_FACTOR_TEXT_MAX];
 };
+
+int incise_file_sha256(const char *path, char hex[65], struct incise_error *err)
+{
+	return incise_sha256_file(path, hex, NULL, NULL, err);
+}
 
 uint64_t incise_group_key(const char *source, const char *name)
 {
@@ -137,7 +142,6 @@ struct incise_factor *incise_factor_new(const struct incise_model *premises,
 {
 	const struct incise_variable *out = &incise_model_info(premises)->output;
 	struct incise_factor *factor = calloc(1, sizeof(*factor));
-	struct incise_sha256 sha;
 	int rc = factor ? 0 : -ENOMEM;
 
 	if (factor) {
@@ -167,11 +171,9 @@ struct incise_factor *incise_factor_new(const struct incise_model *premises,
 		if (!factor->fold[f])
 			rc = -ENOMEM;
 	}
-	if (!rc) {
-		incise_sha256_start(&sha);
-		incise_sha256_add(&sha, factor->premises, strlen(factor->premises));
-		rc = incise_sha256_end(&sha, factor->hash);
-	}
+	if (!rc)
+		rc = incise_sha256_text(factor->premises, strlen(factor->premises),
+					factor->hash);
 	if (rc)
 		incise_error_set(
 			err, -rc,

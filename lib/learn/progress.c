@@ -12,7 +12,7 @@
 #include <incise/outfile.h>
 #include <incise/version.h>
 #include "../base/monotonic.h"
-#include "sha256.h"
+#include "../base/crypto/sha256.h"
 #include "reader.h"
 
 #define KIND "incise progress 1 "
@@ -34,7 +34,7 @@ static double now(void)
 static bool make_key(struct incise_progress *progress, const char *options,
 		     const struct incise_reader *sources, int n)
 {
-	struct incise_sha256 sha;
+	struct incise_sha256 sha = {0};
 	bool known = true;
 
 	incise_sha256_start(&sha);

@@ -7,7 +7,7 @@
 #include <string.h>
 #include <sys/stat.h>
 #include <incise/arrow.h>
-#include "sha256.h"
+#include "../base/crypto/sha256.h"
 #include "reader.h"
 
 /* The column with the groups of rows, or NULL. */
@@ -146,18 +146,20 @@ static const char *base_name(const char *path)
 	return slash && slash[1] ? slash + 1 : path;
 }
 
+static bool count_bytes(void *watch, size_t n)
+{
+	return incise_watch_count(watch, 16.0 * (double)n);
+}
+
 static int find_hash(struct incise_reader *source, struct incise_error *err)
 {
 	const struct incise_train_source *given = source->given;
 	const char *file = given->hashed ? given->hashed : given->path;
-	struct incise_sha256 sha;
 
 	if (file)
-		return incise_file_sha256_watched(file, source->hash,
-						  source->reading->watch, err);
-	incise_sha256_start(&sha);
-	incise_sha256_add(&sha, given->name, strlen(given->name));
-	return incise_sha256_end(&sha, source->hash)
+		return incise_sha256_file(file, source->hash, count_bytes,
+					  source->reading->watch, err);
+	return incise_sha256_text(given->name, strlen(given->name), source->hash)
 		       ? incise_error_set(err, ENOMEM, "%s: no memory", given->name)
 		       : 0;
 }

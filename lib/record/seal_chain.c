@@ -37,52 +37,18 @@ static const char *const meta_sql[INCISE_SEAL_PARTS] = {
 
 /* --- digests -------------------------------------------------------------------------- */
 
-static void add(bool *failed, EVP_MD_CTX *to, const void *bytes, size_t n)
-{
-	*failed |= !EVP_DigestUpdate(to, bytes, n);
-}
-
-static void add_integer(bool *failed, EVP_MD_CTX *to, uint64_t value)
+static void add_integer(struct incise_sha256 *to, uint64_t value)
 {
 	uint8_t bytes[8];
 
 	for (int i = 0; i < 8; i++)
 		bytes[i] = value >> 8 * i;
-	add(failed, to, bytes, sizeof(bytes));
+	incise_sha256_add(to, bytes, sizeof(bytes));
 }
-
-static void start(const struct incise_seal *seal, bool *failed, EVP_MD_CTX *digest)
-{
-	*failed |= !EVP_DigestInit_ex(digest, seal->sha256, NULL);
-}
-
-static void end(bool *failed, EVP_MD_CTX *digest, uint8_t bytes[INCISE_SEAL_BYTES])
-{
-	*failed |= !EVP_DigestFinal_ex(digest, bytes, NULL);
-}
-
-void incise_seal_hex(const uint8_t bytes[INCISE_SEAL_BYTES],
-		     char hex[2 * INCISE_SEAL_BYTES + 1])
-{
-	static const char digits[] = "0123456789abcdef";
-
-	for (int i = 0; i < INCISE_SEAL_BYTES; i++) {
-		hex[2 * i] = digits[bytes[i] >> 4];
-		hex[2 * i + 1] = digits[bytes[i] & 15];
-	}
-	hex[2 * INCISE_SEAL_BYTES] = '\0';
-}
-
-struct sink {
-	EVP_MD_CTX *digest;
-	bool failed;
-};
 
 static void to_digest(void *user, const void *bytes, size_t n)
 {
-	struct sink *sink = user;
-
-	add(&sink->failed, sink->digest, bytes, n);
+	incise_sha256_add(user, bytes, n);
 }
 
 int incise_seal_table(const struct incise_seal *seal, sqlite3 *db,
@@ -93,74 +59,71 @@ int incise_seal_table(const struct incise_seal *seal, sqlite3 *db,
 			  : part == INCISE_SEAL_DEPTH && !seal->old
 				  ? NO_ROWS
 				  : incise_ledger_sql(incise_seal_parts[part]);
-	struct sink sink = {.digest = EVP_MD_CTX_new()};
-	int rc = SQLITE_NOMEM;
-
-	if (sink.digest) {
-		start(seal, &sink.failed, sink.digest);
-		rc = incise_ledger_values(db, sql, to_digest, &sink, rows);
-		end(&sink.failed, sink.digest, digest);
-	}
-	EVP_MD_CTX_free(sink.digest);
-	return rc == SQLITE_OK && sink.failed ? SQLITE_NOMEM : rc;
-}
-
-int incise_seal_file(const struct incise_seal *seal, int fd, int64_t length,
-		     uint8_t digest[INCISE_SEAL_BYTES])
-{
-	EVP_MD_CTX *context = EVP_MD_CTX_new();
-	bool failed = !context;
-	size_t n;
-	uint8_t *head;
+	struct incise_sha256 sha = {0};
 	int rc;
 
-	if (failed)
-		return -ENOMEM;
-	rc = incise_ledger_file_head(fd, &head, &n);
-	if (!rc) {
-		start(seal, &failed, context);
-		add(&failed, context, head, n);
-		add_integer(&failed, context, length);
-		end(&failed, context, digest);
-		free(head);
-	}
-	EVP_MD_CTX_free(context);
-	return !rc && failed ? -ENOMEM : rc;
+	incise_sha256_start(&sha);
+	rc = incise_ledger_values(db, sql, to_digest, &sha, rows);
+	incise_sha256_take(&sha, digest);
+	if (rc == SQLITE_OK && sha.failed)
+		rc = SQLITE_NOMEM;
+	incise_sha256_free(&sha);
+	return rc;
+}
+
+int incise_seal_file(int fd, int64_t length, uint8_t digest[INCISE_SEAL_BYTES])
+{
+	struct incise_sha256 sha = {0};
+	size_t n;
+	uint8_t *head;
+	int rc = incise_ledger_file_head(fd, &head, &n);
+
+	if (rc)
+		return rc;
+	incise_sha256_start(&sha);
+	incise_sha256_add(&sha, head, n);
+	add_integer(&sha, length);
+	incise_sha256_take(&sha, digest);
+	free(head);
+	rc = sha.failed ? -ENOMEM : 0;
+	incise_sha256_free(&sha);
+	return rc;
 }
 
 /* --- the chain ------------------------------------------------------------------------ */
 
+/* Libcrypto did, which has no memory then. */
+static bool has_failed(const struct incise_seal *seal)
+{
+	bool failed = seal->commit.failed;
+
+	for (int i = 0; i < INCISE_LEDGER_FORMS; i++)
+		failed |= seal->rows[i].failed;
+	return failed;
+}
+
 int incise_seal_init(struct incise_seal *seal)
 {
 	*seal = (struct incise_seal){0};
-	seal->sha256 = EVP_MD_fetch(NULL, "SHA256", NULL);
-	if (!seal->sha256)
-		return -ENOTSUP;
-	seal->commit = EVP_MD_CTX_new();
-	seal->failed = !seal->commit;
-	for (int i = 0; i < INCISE_LEDGER_FORMS && !seal->failed; i++) {
-		seal->rows[i] = EVP_MD_CTX_new();
-		seal->failed = !seal->rows[i];
-		if (!seal->failed)
-			start(seal, &seal->failed, seal->rows[i]);
-	}
-	return seal->failed ? -ENOMEM : 0;
+	incise_sha256_start(&seal->commit);
+	for (int i = 0; i < INCISE_LEDGER_FORMS; i++)
+		incise_sha256_start(&seal->rows[i]);
+	return has_failed(seal) ? -ENOMEM : 0;
 }
 
 void incise_seal_free(struct incise_seal *seal)
 {
 	for (int i = 0; i < INCISE_LEDGER_FORMS; i++)
-		EVP_MD_CTX_free(seal->rows[i]);
-	EVP_MD_CTX_free(seal->commit);
-	EVP_MD_free(seal->sha256);
+		incise_sha256_free(&seal->rows[i]);
+	incise_sha256_free(&seal->commit);
 	*seal = (struct incise_seal){0};
 }
 
 void incise_seal_resume(struct incise_seal *seal, const uint8_t head[INCISE_SEAL_BYTES])
 {
 	memmove(seal->head, head, INCISE_SEAL_BYTES);
-	start(seal, &seal->failed, seal->commit);
-	add(&seal->failed, seal->commit, seal->head, INCISE_SEAL_BYTES);
+	incise_sha256_start(&seal->commit);
+	incise_sha256_add(&seal->commit, seal->head, INCISE_SEAL_BYTES);
 }
 
 int incise_seal_start(struct incise_seal *seal, sqlite3 *db)
@@ -169,20 +132,20 @@ int incise_seal_start(struct incise_seal *seal, sqlite3 *db)
 	uint64_t rows;
 	int rc = SQLITE_OK;
 
-	start(seal, &seal->failed, seal->commit);
-	add(&seal->failed, seal->commit, GENESIS(seal->old), strlen(GENESIS(seal->old)));
+	incise_sha256_start(&seal->commit);
+	incise_sha256_add(&seal->commit, GENESIS(seal->old), strlen(GENESIS(seal->old)));
 	for (int i = INCISE_SEAL_START; i < INCISE_SEAL_STREAM && rc == SQLITE_OK; i++) {
 		rc = incise_seal_table(seal, db, i, &rows, part);
-		add(&seal->failed, seal->commit, part, sizeof(part));
+		incise_sha256_add(&seal->commit, part, sizeof(part));
 	}
-	end(&seal->failed, seal->commit, head);
+	incise_sha256_take(&seal->commit, head);
 	incise_seal_resume(seal, head);
-	return rc == SQLITE_OK && seal->failed ? SQLITE_NOMEM : rc;
+	return rc == SQLITE_OK && has_failed(seal) ? SQLITE_NOMEM : rc;
 }
 
 void incise_seal_row(struct incise_seal *seal, int stream, const void *bytes, size_t n)
 {
-	add(&seal->failed, seal->rows[stream], bytes, n);
+	incise_sha256_add(&seal->rows[stream], bytes, n);
 	seal->n_rows[stream]++;
 }
 
@@ -193,19 +156,18 @@ void incise_seal_rows_block(struct incise_seal *seal, int stream,
 	const uint64_t values[] = {block->block,    block->first_seq, block->last_seq,
 				   block->first_ns, block->last_ns,   block->count,
 				   block->lost,	    block->crc};
-	EVP_MD_CTX *rows = seal->rows[stream]; /* it has none now */
-	bool *failed = &seal->failed;
+	struct incise_sha256 *rows = &seal->rows[stream]; /* it has none now */
 
-	add_integer(failed, seal->commit, stream);
-	add(failed, rows, seal->chain[stream], INCISE_SEAL_BYTES);
+	add_integer(&seal->commit, stream);
+	incise_sha256_add(rows, seal->chain[stream], INCISE_SEAL_BYTES);
 	for (size_t i = 0; i < sizeof(values) / sizeof(*values); i++) {
-		add_integer(failed, seal->commit, values[i]);
-		add_integer(failed, rows, values[i]);
+		add_integer(&seal->commit, values[i]);
+		add_integer(rows, values[i]);
 	}
-	add(failed, seal->commit, digest, INCISE_SEAL_BYTES);
-	add(failed, rows, digest, INCISE_SEAL_BYTES);
-	end(failed, rows, seal->chain[stream]);
-	start(seal, failed, rows);
+	incise_sha256_add(&seal->commit, digest, INCISE_SEAL_BYTES);
+	incise_sha256_add(rows, digest, INCISE_SEAL_BYTES);
+	incise_sha256_take(rows, seal->chain[stream]);
+	incise_sha256_start(rows);
 	seal->blocks[stream]++;
 }
 
@@ -213,8 +175,8 @@ void incise_seal_block(struct incise_seal *seal, int stream,
 		       const struct incise_ledger_block *block,
 		       uint8_t digest[INCISE_SEAL_BYTES])
 {
-	end(&seal->failed, seal->rows[stream], digest);
-	start(seal, &seal->failed, seal->rows[stream]);
+	incise_sha256_take(&seal->rows[stream], digest);
+	incise_sha256_start(&seal->rows[stream]);
 	incise_seal_rows_block(seal, stream, block, digest);
 }
 
@@ -222,7 +184,7 @@ void incise_seal_data(struct incise_seal *seal, int stream,
 		      const struct incise_ledger_block *block, const void *data,
 		      size_t size, uint8_t digest[INCISE_SEAL_BYTES])
 {
-	add(&seal->failed, seal->rows[stream], data, size);
+	incise_sha256_add(&seal->rows[stream], data, size);
 	seal->n_rows[stream] += block->count;
 	incise_seal_block(seal, stream, block, digest);
 }
@@ -235,13 +197,13 @@ int incise_seal_tables(struct incise_seal *seal, sqlite3 *db, int fd, int64_t le
 
 	for (int i = INCISE_SEAL_DEPTH; i < INCISE_SEAL_FILE && rc == SQLITE_OK; i++) {
 		rc = incise_seal_table(seal, db, i, &rows, digest);
-		add(&seal->failed, seal->commit, digest, sizeof(digest));
+		incise_sha256_add(&seal->commit, digest, sizeof(digest));
 	}
 	if (rc != SQLITE_OK || fd < 0)
 		return rc;
-	if (incise_seal_file(seal, fd, length, digest))
+	if (incise_seal_file(fd, length, digest))
 		return SQLITE_IOERR;
-	add(&seal->failed, seal->commit, digest, sizeof(digest));
+	incise_sha256_add(&seal->commit, digest, sizeof(digest));
 	return SQLITE_OK;
 }
 
@@ -249,11 +211,11 @@ bool incise_seal_commit(struct incise_seal *seal, int64_t t_ns)
 {
 	uint8_t head[INCISE_SEAL_BYTES];
 
-	add_integer(&seal->failed, seal->commit, seal->next++);
-	add_integer(&seal->failed, seal->commit, t_ns);
+	add_integer(&seal->commit, seal->next++);
+	add_integer(&seal->commit, t_ns);
 	for (int i = 0; i < INCISE_LEDGER_FORMS; i++)
-		add_integer(&seal->failed, seal->commit, seal->blocks[i]);
-	end(&seal->failed, seal->commit, head);
+		add_integer(&seal->commit, seal->blocks[i]);
+	incise_sha256_take(&seal->commit, head);
 	incise_seal_resume(seal, head);
-	return !seal->failed;
+	return !has_failed(seal);
 }

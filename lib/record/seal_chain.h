@@ -16,11 +16,11 @@
 
 #include <stdbool.h>
 #include <stdint.h>
-#include <openssl/evp.h>
 #include <sqlite3.h>
+#include "../base/crypto/sha256.h"
 #include "ledger.h"
 
-#define INCISE_SEAL_BYTES 32
+#define INCISE_SEAL_BYTES INCISE_SHA256_BYTES
 
 /* Parts with a digest in a statement, in its order; the streams are those of the ledger. */
 enum incise_seal_number {
@@ -39,18 +39,16 @@ enum incise_seal_number {
 
 struct incise_seal {
 	bool old; /* of format 4: over rows, and table depth; after the init */
-	EVP_MD *sha256;
-	EVP_MD_CTX *rows[INCISE_LEDGER_FORMS]; /* of the open blocks */
-	EVP_MD_CTX *commit;		       /* of the open commit */
-	bool failed;			     /* libcrypto did, which has no memory then */
-	int64_t next;			     /* number of the open commit */
-	int64_t blocks[INCISE_LEDGER_FORMS]; /* so far */
-	uint64_t n_rows[INCISE_LEDGER_FORMS]; /* so far */
+	struct incise_sha256 rows[INCISE_LEDGER_FORMS]; /* of the open blocks */
+	struct incise_sha256 commit;			/* of the open commit */
+	int64_t next;					/* number of the open commit */
+	int64_t blocks[INCISE_LEDGER_FORMS];		/* so far */
+	uint64_t n_rows[INCISE_LEDGER_FORMS];		/* so far */
 	uint8_t chain[INCISE_LEDGER_FORMS][INCISE_SEAL_BYTES];
 	uint8_t head[INCISE_SEAL_BYTES];
 };
 
-/* Returns 0, -ENOMEM, or -ENOTSUP: a libcrypto without SHA-256. Free it in any case. */
+/* Returns 0, or -ENOMEM: libcrypto gives no SHA-256. Free it in any case. */
 int incise_seal_init(struct incise_seal *seal);
 void incise_seal_free(struct incise_seal *seal);
 
@@ -91,11 +89,6 @@ int incise_seal_table(const struct incise_seal *seal, sqlite3 *db,
 		      uint8_t digest[INCISE_SEAL_BYTES]);
 
 /* That of camera.mkv: its head, and its length, 0 where it is not known. Returns 0 or -errno. */
-int incise_seal_file(const struct incise_seal *seal, int fd, int64_t length,
-		     uint8_t digest[INCISE_SEAL_BYTES]);
-
-/* 64 lower-case digits and a NUL. */
-void incise_seal_hex(const uint8_t bytes[INCISE_SEAL_BYTES],
-		     char hex[2 * INCISE_SEAL_BYTES + 1]);
+int incise_seal_file(int fd, int64_t length, uint8_t digest[INCISE_SEAL_BYTES]);
 
 #endif

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Proof that a recording is complete: its rows and frames compared with its ledger."""
+"""Proof that a recording is complete, and who vouches for it."""
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import errno
 import os
-from typing import Any, List, NamedTuple, Optional, Tuple, Union
+from typing import Any, Iterator, List, NamedTuple, Tuple, Union
 
 from . import _library
 from ._library import Failure, Invalid, c_bool, c_char, c_char_p, c_int, c_int64, c_uint64, c_void_p
@@ -24,9 +25,10 @@ KINDS = (
     "damaged",
     "ended",
     "times",
+    "seal",
 )
-# Findings by which rows are not those that were recorded; a loss was counted while recording.
-_NOT_RECORDED = ("altered", "ledger", "extra", "count", "damaged")
+VERDICTS = ("unchecked", "good", "bad")
+_ROWS, _ALL = 2, 3  # enum incise_prove_level
 
 
 class FindingStruct(ctypes.Structure):
@@ -105,17 +107,97 @@ class WatchStruct(ctypes.Structure):
     c_name = "struct incise_verify_watch"
 
 
+_Write = ctypes.CFUNCTYPE(c_int, c_void_p, c_char_p)
+
+
+class OptionsStruct(ctypes.Structure):
+    """struct incise_prove_options"""
+
+    _fields_ = [
+        ("level", c_int),
+        ("signers", c_char_p),
+        ("revoked", c_char_p),
+        ("authorities", c_char_p),
+        ("watch", ctypes.POINTER(WatchStruct)),
+        ("key", c_char_p),
+        ("timestamp", c_char_p),
+        ("recorded", c_bool),
+        ("renew", c_bool),
+        ("write", _Write),
+        ("user", c_void_p),
+    ]
+    c_name = "struct incise_prove_options"
+
+
+class VoucherStruct(ctypes.Structure):
+    """struct incise_proof_voucher"""
+
+    _fields_ = [
+        ("file", c_char * 100),
+        ("kind", c_int),
+        ("statement", c_int),
+        ("verdict", c_int),
+        ("made", c_bool),
+        ("by", c_char * 300),
+        ("key", c_char * 160),
+        ("utc", c_char * 32),
+        ("t_s", c_int64),
+        ("why", c_char * 500),
+    ]
+    c_name = "struct incise_proof_voucher"
+
+
+class HeadStruct(ctypes.Structure):
+    """struct incise_seal_head"""
+
+    _fields_ = [("commit", c_int64), ("t_ns", c_int64), ("head", c_char * 65)]
+    c_name = "struct incise_seal_head"
+
+
+class SealStruct(ctypes.Structure):
+    """struct incise_proof_seal"""
+
+    _fields_ = [
+        ("path", c_char_p),
+        ("join", c_bool),
+        ("identity", c_char * 33),
+        ("head", HeadStruct),
+        ("why", c_char * 200),
+        ("n_statements", c_int),
+        ("n_vouchers", c_int),
+        ("statements", c_void_p),
+        ("vouchers", ctypes.POINTER(VoucherStruct)),
+        ("signatures", c_int),
+        ("timestamps", c_int),
+        ("vouched", c_bool),
+        ("bad", c_int),
+    ]
+    c_name = "struct incise_proof_seal"
+
+
+class ProofStruct(ctypes.Structure):
+    """struct incise_proof"""
+
+    _fields_ = [
+        ("report", ReportStruct),
+        ("altered", c_char * 400),
+        ("n", c_int),
+        ("seals", ctypes.POINTER(SealStruct)),
+    ]
+    c_name = "struct incise_proof"
+
+
 _library.declare(
     "libincise-record",
     {
-        name: (
+        "incise_prove": (
             c_int,
             c_char_p,
-            ctypes.POINTER(WatchStruct),
-            ctypes.POINTER(ReportStruct),
+            ctypes.POINTER(OptionsStruct),
+            ctypes.POINTER(ProofStruct),
             c_void_p,
-        )
-        for name in ("incise_verify", "incise_verify_rows")
+        ),
+        "incise_proof_free": (None, ctypes.POINTER(ProofStruct)),
     },
 )
 
@@ -142,6 +224,27 @@ class StreamReport(NamedTuple):
     altered: int  #: blocks of the ledger that do not agree with the rows
 
 
+class Voucher(NamedTuple):
+    """A signature or a time-stamp in the folder seal/ of a recording."""
+
+    file: str
+    statement: int  #: number of the statement that it is for
+    verdict: str  #: one of incise.verify.VERDICTS; unchecked without signers or authorities
+    by: str  #: signer, or subject of the authority's certificate; empty: not known
+    key: str  #: of a signature, kind and fingerprint; empty: not known
+    utc: str  #: of a time-stamp; empty: a signature
+    why: str  #: of a bad one
+
+
+class Seal(NamedTuple):
+    """Signatures and time-stamps of a recording, of a member of a joined one, or of the join."""
+
+    path: str
+    vouched: bool  #: a signer signed what it is now
+    bad: int  #: number of vouchers and statements that are not good
+    vouchers: Tuple[Voucher, ...]
+
+
 class Report(NamedTuple):
     """All findings of :func:`incise.verify`."""
 
@@ -151,12 +254,15 @@ class Report(NamedTuple):
     interrupted: bool  #: not closed, or being written
     streams: Tuple[StreamReport, ...]
     findings: Tuple[Finding, ...]
+    seals: Tuple[Seal, ...]  #: of the members of a joined recording, then of the join
 
 
-def _run(name: str, path: Union[str, "os.PathLike[str]"]) -> Report:
-    found: List[Finding] = []
+@contextlib.contextmanager
+def _proved(
+    path: Union[str, "os.PathLike[str]"], level: int, found: List[Finding], *trust: Any
+) -> Iterator[ProofStruct]:
+    """What incise_prove() says. Ctrl-C ends it."""
     stop: List[bool] = []
-    failure, report = Failure(), ReportStruct()
 
     def on_found(user: Any, pointer: Any) -> None:
         finding = pointer.contents
@@ -172,50 +278,81 @@ def _run(name: str, path: Union[str, "os.PathLike[str]"]) -> Report:
         )
 
     watch = WatchStruct(_Found(on_found), _Progress(lambda user, share: len(stop)), None)
-    call = function(name)
-    rc = _library.call_interruptible(
-        lambda: call(
-            _library.path_bytes(path), ctypes.byref(watch), ctypes.byref(report), failure.ref
-        ),
-        lambda: stop.append(True),
-    )
-    failure.check(rc)
-    streams = tuple(
-        StreamReport(
-            text(stream.name),
-            stream.expected,
-            stream.present,
-            stream.lost,
-            stream.lost_at_capture,
-            stream.altered,
+    files = [None if file is None else _library.path_bytes(file) for file in trust]
+    options = OptionsStruct(level, *files)
+    options.watch = ctypes.pointer(watch)
+    failure, proof, call = Failure(), ProofStruct(), function("incise_prove")
+    try:
+        rc = _library.call_interruptible(
+            lambda: call(
+                _library.path_bytes(path),
+                ctypes.byref(options),
+                ctypes.byref(proof),
+                failure.ref,
+            ),
+            lambda: stop.append(True),
         )
-        for stream in report.streams[: report.n_streams]
-    )
-    return Report(
-        report.complete,
-        report.intact,
-        report.unverified,
-        report.interrupted,
-        streams,
-        tuple(found),
-    )
+        failure.check(rc)
+        yield proof
+    finally:
+        function("incise_proof_free")(ctypes.byref(proof))
 
 
-def verify(path: Union[str, "os.PathLike[str]"]) -> Report:
-    """Verify a recording, rows and frames, as `incise verify` does. Ctrl-C ends it."""
-    return _run("incise_verify", path)
+def _seal(seal: SealStruct) -> Seal:
+    vouchers = tuple(
+        Voucher(
+            text(one.file),
+            one.statement,
+            VERDICTS[one.verdict],
+            text(one.by),
+            text(one.key),
+            text(one.utc),
+            text(one.why),
+        )
+        for one in seal.vouchers[: seal.n_vouchers]
+    )
+    return Seal(text(seal.path), seal.vouched, seal.bad, vouchers)
+
+
+def verify(
+    path: Union[str, "os.PathLike[str]"],
+    signers: Union[None, str, "os.PathLike[str]"] = None,
+    revoked: Union[None, str, "os.PathLike[str]"] = None,
+    authorities: Union[None, str, "os.PathLike[str]"] = None,
+) -> Report:
+    """Verify a recording as `incise verify` does, with its options --signers, --revoked and --ca."""
+    found: List[Finding] = []
+    with _proved(path, _ALL, found, signers, revoked, authorities) as proof:
+        report = proof.report
+        streams = tuple(
+            StreamReport(
+                text(stream.name),
+                stream.expected,
+                stream.present,
+                stream.lost,
+                stream.lost_at_capture,
+                stream.altered,
+            )
+            for stream in report.streams[: report.n_streams]
+        )
+        return Report(
+            report.complete,
+            report.intact,
+            report.unverified,
+            report.interrupted,
+            streams,
+            tuple(found),
+            tuple(_seal(seal) for seal in proof.seals[: proof.n]),
+        )
 
 
 def check_rows(path: Union[str, "os.PathLike[str]"]) -> None:
     """Raise :class:`incise.Invalid` unless the rows are those that were recorded."""
-    first: Optional[Finding] = None
-    report = _run("incise_verify_rows", path)
-    for finding in report.findings:
-        if finding.kind in _NOT_RECORDED and first is None:
-            first = finding
-    if first is not None:
+    with _proved(path, _ROWS, []) as proof:
+        altered = text(proof.altered)
+    if altered:
         raise Invalid(
             errno.EINVAL,
-            f"{os.fspath(path)}: is not what was recorded: {first.text}; incise.verify() says all; "
+            f"{os.fspath(path)}: is not what was recorded: {altered}; incise.verify() says all; "
             "damaged=True takes it as it is",
         )

@@ -92,7 +92,7 @@ declared_by() {
 			complain "$file includes what is not there"
 		for name in $names; do
 			case $name in
-			"$root"/tools/* | "$root"/lib/base/ascending.h | "$root"/lib/base/vector.h) ;;
+			"$root"/tools/* | "$root"/lib/base/ascending.h | "$root"/lib/base/control_character.h | "$root"/lib/base/vector.h) ;;
 			"$root"/lib/base/random.h | "$root"/lib/control/plant.h)
 				[[ "$file" == "$root"/tools/bench/* ]] || complain "$file: $name" ;;
 			"$root"/lib/device/igtl/igtl_message.h)

@@ -8,7 +8,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include "../../tools/seal/timestamp.h"
+#include "../../lib/record/prove/prove.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
@@ -23,24 +23,24 @@ static void wrong(const char *what)
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-	struct der reply = {malloc(size ? size : 1), size};
-	unsigned char digest[TIMESTAMP_DIGEST];
-	struct timestamp timestamp;
+	struct incise_bytes reply = {malloc(size ? size : 1), size};
+	uint8_t digest[INCISE_SHA256_BYTES];
+	struct incise_proof_voucher taken = {.verdict = INCISE_PROOF_BAD};
 	struct incise_error err = {0};
 	int rc;
 
 	memcpy(reply.bytes, data, size);
-	timestamp_digest(text, strlen(text), digest);
-	rc = timestamp_read(&reply, "input", digest, NULL, &timestamp, &err);
+	incise_sha256_of(text, strlen(text), digest);
+	rc = incise_timestamp_read(&reply, "input", digest, NULL, NULL, &taken, &err);
 	if (rc &&
 	    (!err.code || strncmp(err.text, "input: ", 7) || strchr(err.text, '\n')))
 		wrong("refused without a reason in one line");
-	if (!rc && strlen(timestamp.utc) < 20)
+	if (!rc && strlen(taken.utc) < 20)
 		wrong("taken without a time");
 	if (!rc) {
 		digest[0] ^= 1;
-		if (timestamp_read(&reply, "input", digest, NULL, &timestamp, &err) !=
-		    -EBADMSG)
+		if (incise_timestamp_read(&reply, "input", digest, NULL, NULL, &taken,
+					  &err) != -EBADMSG)
 			wrong("taken for another digest");
 	}
 	free(reply.bytes);

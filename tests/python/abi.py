@@ -18,7 +18,7 @@ import incise
 
 MODULES = "_corpus _library arrow calibrate capture model plan recording verify wall".split()
 HEADERS = (
-    "arrow camera capture calibrate_depth calibrate_force calibrate_tip calibration corpus fixed model plan recording "
+    "arrow camera capture calibrate_depth calibrate_force calibrate_tip calibration corpus fixed model plan prove recording "
     "stability tracker train uncertainty verify wall"
 ).split()
 

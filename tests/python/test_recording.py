@@ -172,7 +172,28 @@ class Recordings(Case):
         self.assertTrue(report.complete and report.intact)
         self.assertEqual(report.findings, ())
         self.assertEqual(report.streams[0].present, self.rec.info.force)
+        self.assertEqual(report.seals[0][1:], (False, 0, ()))
         self.says(incise.NotFound, "no such recording", incise.verify, self.path("none.rec"))
+
+    def test_verify_signers(self):
+        path, key, signers = self.copy(), self.path("kim"), self.path("signers")
+        run("ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", key)
+        run("incise", "sign", path, "--key", key)
+        with open(key + ".pub") as public, open(signers, "w") as file:
+            file.write("kim@lab " + public.read())
+        seal, = incise.verify(path, signers=signers).seals
+        self.assertTrue(seal.vouched)
+        self.assertEqual([(one.verdict, one.by) for one in seal.vouchers], [("good", "kim@lab")])
+        seal, = incise.verify(path, signers=signers, revoked=key + ".pub").seals
+        self.assertFalse(seal.vouched)
+        self.assertIn("revoked", seal.vouchers[0].why)
+        self.assertEqual(incise.verify(path).seals[0].vouchers[0].verdict, "unchecked")
+        self.says(incise.Error, "none: ", incise.verify, path, signers=self.path("none"))
+        # rows and ledger that agree with each other, and not with the seal
+        self.sql(path, "UPDATE seal SET t_ns = t_ns + 1 WHERE number = 1")
+        report = incise.verify(path, signers=signers)
+        self.assertEqual(report.findings[0].kind, "seal")
+        self.assertFalse(report.seals[0].vouched)
 
     def test_wrong_arguments(self):
         self.says(incise.Invalid, "expected 1 to 1000 each", rows, self.rec.pairs(12))

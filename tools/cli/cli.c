@@ -21,7 +21,7 @@
 #include <incise/rig.h>
 #include <incise/version.h>
 #include "cli.h"
-#include "control_character.h"
+#include "../../lib/base/control_character.h"
 #include "complete.h"
 #include "file_kind.h"
 #include "help.h"

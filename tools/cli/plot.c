@@ -14,7 +14,8 @@
 #include <incise/infile.h>
 #include "child.h"
 #include "cli.h"
-#include "control_character.h"
+#include "../../lib/base/control_character.h"
+#include "../origin/origins.h"
 #include "file.h"
 #include "folder.h"
 #include "plot.h"
@@ -321,7 +322,8 @@ static int wait_for(pid_t gnuplot)
 	return status;
 }
 
-static void copy_file(const char *from, const char *to, const struct origins *origins)
+static void copy_file(const char *from, const char *to,
+		      const struct incise_origins *origins)
 {
 	static const struct incise_infile_kind kind = {.name = "a figure",
 						       .size_max = FIGURE_MAX};
@@ -339,7 +341,7 @@ static void copy_file(const char *from, const char *to, const struct origins *or
 }
 
 void plot_draw_form(FILE *script, const char *folder, const char *name, const char *form,
-		    const char *path, const struct origins *origins)
+		    const char *path, const struct incise_origins *origins)
 {
 	char *command = cli_text("cd \"$0/plot\" && exec gnuplot -e \"ext='%s'\" %s.gp",
 				 form, name);

@@ -14,7 +14,7 @@
 
 #include <stdbool.h>
 #include <stdio.h>
-#include "../origin/origins.h"
+#include <incise/origin.h>
 
 /*
  * Split the argument of @option, "a/b/name", perhaps with .png or .svg, into folder "a/b" and
@@ -66,7 +66,7 @@ const char *plot_window(void);
  * and carries its origins, or in a window, until that is closed. Fails the program.
  */
 void plot_draw_form(FILE *script, const char *folder, const char *name, const char *form,
-		    const char *path, const struct origins *origins);
+		    const char *path, const struct incise_origins *origins);
 
 /*
  * Write a text, which may hold anything, as a string of a script, or in data. What a string or an

@@ -12,9 +12,8 @@
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include <incise/prove.h>
 #include <incise/recalibration.h>
-#include <incise/verify.h>
-#include "../seal/seal.h"
 #include "cli.h"
 #include "file_kind.h"
 #include "recording.h"
@@ -27,43 +26,20 @@ struct incise_recording *recording_open(const char *path)
 	return cli_require(incise_recording_open(path, &err), &err);
 }
 
-struct first {
-	bool found;
-	char text[300];
-};
-
-/* Keep the first finding that is no loss, which was counted when it was recorded. */
-static void find_first(void *user, const struct incise_verify_finding *finding)
-{
-	struct first *first = user;
-
-	switch (finding->kind) {
-	case INCISE_VERIFY_ALTERED:
-	case INCISE_VERIFY_LEDGER:
-	case INCISE_VERIFY_EXTRA:
-	case INCISE_VERIFY_COUNT:
-	case INCISE_VERIFY_DAMAGED:
-		if (!first->found)
-			snprintf(first->text, sizeof(first->text), "%s", finding->text);
-		first->found = true;
-		break;
-	default:
-		break;
-	}
-}
-
 int recording_altered(const char *path, bool samples, struct incise_error *err)
 {
-	struct first first = {0};
-	const struct incise_verify_watch watch = {.found = find_first, .user = &first};
-	struct incise_verify_report report;
-	int rc = (samples ? incise_verify_rows : incise_verify_tables)(path, &watch,
-								       &report, err);
+	const struct incise_prove_options options = {
+		.level = samples ? INCISE_PROVE_ROWS : INCISE_PROVE_TABLES};
+	struct incise_proof proof;
+	int rc = incise_prove(path, &options, &proof, err);
 
-	if (!rc && first.found)
+	if (!rc && *proof.altered) {
 		incise_error_set(err, EINVAL, "%s: not as it was recorded: %s", path,
-				 first.text);
-	return rc ? rc : first.found;
+				 proof.altered);
+		rc = 1;
+	}
+	incise_proof_free(&proof);
+	return rc;
 }
 
 bool recording_intact(const char *path, bool samples, bool damaged,
@@ -117,34 +93,13 @@ static void remove_calibrations(int folder, const char *path)
 		cli_fail("%s/calibration: cannot be removed: %s", path, strerror(errno));
 }
 
-/* Signatures and time-stamps; a folder with anything else in it stays. */
-static void remove_seal(const char *path, const char *name)
-{
-	char *folder = cli_text("%s/%s", path, name);
-	struct incise_error err = {0};
-	struct seal_files files;
-
-	if (seal_files_read(&files, path, name, &err))
-		cli_fail_with(&err);
-	for (int i = 0; i < files.n; i++) {
-		char *file = cli_text("%s/%s", folder, files.all[i].name);
-
-		if (unlink(file))
-			cli_fail("%s: cannot be removed: %s", file, strerror(errno));
-		free(file);
-	}
-	if (rmdir(folder) && errno != ENOENT)
-		cli_fail("%s: cannot be removed: %s", folder, strerror(errno));
-	seal_files_free(&files);
-	free(folder);
-}
-
 void recording_remove(const char *path)
 {
 	static const char *const files[] = {"recording.db", "recording.db-wal",
 					    "recording.db-shm", "recording.db-journal",
 					    "camera.mkv"};
 	int folder = open(path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+	struct incise_error err = {0};
 
 	if (folder < 0 && errno == ENOENT)
 		return;
@@ -156,8 +111,8 @@ void recording_remove(const char *path)
 			 path);
 	remove_members(path);
 	remove_calibrations(folder, path);
-	remove_seal(path, "seal");
-	remove_seal(path, "seal-before");
+	if (incise_proof_remove(path, &err))
+		cli_fail_with(&err);
 	for (size_t i = 0; i < sizeof(files) / sizeof(*files); i++)
 		if (unlinkat(folder, files[i], 0) && errno != ENOENT)
 			cli_fail("%s/%s: cannot be removed: %s", path, files[i],

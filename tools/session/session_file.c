@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <incise/infile.h>
-#include "../cli/control_character.h"
+#include "../../lib/base/control_character.h"
 #include "../cli/json.h"
 #include "../cli/loop_report.h"
 #include "session.h"

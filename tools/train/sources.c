@@ -12,12 +12,12 @@
 #include <incise/dataset.h>
 #include <incise/infile.h>
 #include <incise/recalibration.h>
+#include <incise/origin.h>
 #include <incise/recording.h>
 #include "../cli/cli.h"
 #include "../cli/file.h"
 #include "../cli/file_kind.h"
 #include "../cli/recording.h"
-#include "../origin/origins.h"
 #include "sources.h"
 
 #define ORIGINS_TEXT 480 /* bytes of a recording's origins in its text */
@@ -172,9 +172,10 @@ static int open_file(struct incise_train_source *source, struct incise_error *er
 	size_t at = (size_t)snprintf(own->text, sizeof(own->text), "%.300s",
 				     source_is_pipe(source) ? "a pipe"
 							    : name_of(source->path));
-	struct origins origins = {0};
+	struct incise_origins origins = {0};
 	char text[INCISE_ORIGIN_TEXT];
-	int rc = origins_read(&origins, source->path, err);
+	int rc = incise_origins_read(&origins, source->path,
+				     file_kind_of(source->path) == FILE_MODEL, err);
 
 	for (int i = 0; i < origins.n; i++) {
 		origins.all[i].depth++;
@@ -184,7 +185,7 @@ static int open_file(struct incise_train_source *source, struct incise_error *er
 			break;
 		at += (size_t)sprintf(own->text + at, "%s%s", i ? " " : ", ", text);
 	}
-	origins_end(&origins);
+	incise_origins_free(&origins);
 	return rc;
 }
 

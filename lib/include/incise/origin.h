@@ -77,5 +77,48 @@ struct incise_recording;
 INCISE_API size_t incise_recording_origins(struct incise_recording *recording, char *text,
 					   size_t size);
 
+/** Largest number of origins that are kept. */
+#define INCISE_ORIGINS_MAX 4096
+
+/**
+ * The files that a file was made of, in its order: each is followed by those of a larger depth that
+ * it was made of. Begins as {0}; incise_origins_free().
+ */
+struct incise_origins {
+	struct incise_origin *all;
+	int n;
+	bool cut; /**< there were more than were kept */
+};
+
+/**
+ * Add those that a file carries; one that is not regular carries none. Thread safe.
+ *
+ * @param model whether it is a .fis file, which has them in its notes
+ * @return 0; negative errno of open(2) and read(2), -ENOMEM
+ */
+INCISE_API int incise_origins_read(struct incise_origins *origins, const char *path,
+				   bool model, struct incise_error *err);
+
+/**
+ * Add a file as one that something is made of, and below it those that it carries.
+ *
+ * @param kind "model", "table", "export", …, as of struct incise_origin
+ * @return as incise_origins_read()
+ */
+INCISE_API int incise_origins_file(struct incise_origins *origins, const char *path,
+				   const char *kind, struct incise_error *err);
+
+/**
+ * Add a recording at its present commit, or each member of a joined one, as
+ * incise_recording_origins(); nothing of one without a seal.
+ *
+ * @return 0; -ENOENT, -ENOMEM
+ */
+INCISE_API int incise_origins_recording(struct incise_origins *origins, const char *path,
+					struct incise_error *err);
+
+/** Free what origins hold. */
+INCISE_API void incise_origins_free(struct incise_origins *origins);
+
 INCISE_END_DECLS
 #endif

@@ -110,24 +110,5 @@ INCISE_API int incise_verify(const char *path, const struct incise_verify_watch 
 			     struct incise_verify_report *report,
 			     struct incise_error *err);
 
-/**
- * Verify rows, ledger and the seals of the tables before a program reads them, without
- * camera.mkv and without SQLite's check of all pages. report->frames is 0.
- */
-INCISE_API int incise_verify_rows(const char *path,
-				  const struct incise_verify_watch *watch,
-				  struct incise_verify_report *report,
-				  struct incise_error *err);
-
-/**
- * Verify the tables that are sealed, of which incise_recording_info() takes the summary, without a sample: its
- * time does not grow with the recording. Recordings that have no summary are verified as by
- * incise_verify_rows().
- */
-INCISE_API int incise_verify_tables(const char *path,
-				    const struct incise_verify_watch *watch,
-				    struct incise_verify_report *report,
-				    struct incise_error *err);
-
 INCISE_END_DECLS
 #endif

@@ -15,7 +15,7 @@
 #include <incise/version.h>
 #include <incise/wall.h>
 #include "writers.h"
-#include "../../learn/sha256.h"
+#include "../../base/crypto/sha256.h"
 #include "../read/recalibration.h"
 #include "../read/recording.h"
 #include "../read/session.h"
@@ -174,22 +174,13 @@ size_t incise_recording_origins(struct incise_recording *recording, char *text,
 static size_t put_given(const char *path, char *text, size_t size, size_t at)
 {
 	struct incise_origin origin = {.depth = 1, .kind = "calibration"};
-	struct incise_sha256 sha;
-	char bytes[4096];
 	struct stat st;
-	FILE *in = stat(path, &st) || !S_ISREG(st.st_mode) ? NULL : fopen(path, "re");
-	size_t n;
 
-	if (!in)
+	if (stat(path, &st) || !S_ISREG(st.st_mode) ||
+	    incise_sha256_file(path, origin.sha256, NULL, NULL, NULL))
 		return at;
-	incise_sha256_start(&sha);
-	while ((n = fread(bytes, 1, sizeof(bytes), in)) > 0)
-		incise_sha256_add(&sha, bytes, n);
-	fclose(in);
 	snprintf(origin.name, sizeof(origin.name), "%s", basename(path));
-	return incise_sha256_end(&sha, origin.sha256)
-		       ? at
-		       : put_token(&origin, text, size, at);
+	return put_token(&origin, text, size, at);
 }
 
 /* The origins of an export. */

@@ -26,7 +26,7 @@
 #include <libavutil/crc.h>
 #include <libavutil/frame.h>
 #include <libavutil/intreadwrite.h>
-#include <openssl/evp.h>
+#include "../../base/crypto/sha256.h"
 #include "../frames.h"
 
 #define BUFFER_BYTES (1 << 20) /* one write(2) for most frames */
@@ -70,8 +70,7 @@ static uint32_t crc_of(const uint8_t *bytes, size_t size)
 
 static bool digest_of(const AVPacket *packet, struct incise_frames_stored *stored)
 {
-	return EVP_Digest(packet->data, (size_t)packet->size, stored->sha256, NULL,
-			  EVP_sha256(), NULL);
+	return !incise_sha256_of(packet->data, (size_t)packet->size, stored->sha256);
 }
 
 /*

@@ -13,7 +13,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-#include <incise/verify.h>
 #include "../frames.h"
 #include "../schema.h"
 #include "../verify/verify.h"

@@ -12,7 +12,7 @@
 #include <string.h>
 #include <unistd.h>
 #include <incise/infile.h>
-#include "../../learn/sha256.h"
+#include "../../base/crypto/sha256.h"
 #include "../schema.h"
 #include "database.h"
 #include "recalibration.h"
@@ -114,16 +114,6 @@ int incise_recalibration_list(const char *folder, struct incise_recalibration **
 	return n;
 }
 
-int incise_recalibration_digest(struct incise_recalibration *entry, const char *text,
-				size_t size)
-{
-	struct incise_sha256 sha;
-
-	incise_sha256_start(&sha);
-	incise_sha256_add(&sha, text, size);
-	return incise_sha256_end(&sha, entry->sha256);
-}
-
 /* The text of a calibration in a recording, with its digest; to be freed; NULL with errno. */
 static char *read_text(const char *folder, struct incise_recalibration *entry,
 		       struct incise_error *err)
@@ -137,7 +127,7 @@ static char *read_text(const char *folder, struct incise_recalibration *entry,
 	}
 	text = incise_infile_read(path, &incise_recalibration_kind, &size, err);
 	free(path);
-	if (text && incise_recalibration_digest(entry, text, size)) {
+	if (text && incise_sha256_text(text, size, entry->sha256)) {
 		free(text);
 		incise_schema_no_memory(folder, err);
 		return NULL;

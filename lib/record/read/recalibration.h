@@ -58,8 +58,4 @@ int incise_recalibration_folder(const char *folder, struct incise_error *err);
 int incise_recalibration_list(const char *folder, struct incise_recalibration **list,
 			      struct incise_error *err);
 
-/* The digest of its text. Returns 0 or -ENOMEM. */
-int incise_recalibration_digest(struct incise_recalibration *entry, const char *text,
-				size_t size);
-
 #endif

@@ -87,7 +87,7 @@ int incise_seal_head(struct incise_recording *recording, char identity[33],
 		has = sqlite3_column_type(stmt, 2) == SQLITE_BLOB &&
 		      sqlite3_column_bytes(stmt, 2) == INCISE_SEAL_BYTES;
 		if (has)
-			incise_seal_hex(sqlite3_column_blob(stmt, 2), head->head);
+			incise_sha256_hex(sqlite3_column_blob(stmt, 2), head->head);
 	}
 	if (sqlite3_finalize(stmt) != SQLITE_OK)
 		return incise_schema_fail(recording->db, recording->path, err);

@@ -22,24 +22,20 @@ static double plain(double value)
 /* "map 12 0123…": the number of knots and the SHA-256 of their lines. Returns 0 or -errno. */
 static int write_map(FILE *out, const struct incise_session_map *map)
 {
-	EVP_MD_CTX *sha256 = EVP_MD_CTX_new();
-	uint8_t digest[INCISE_SEAL_BYTES];
-	char text[2 * INCISE_SEAL_BYTES + 1];
-	bool good = sha256 && EVP_DigestInit_ex(sha256, EVP_sha256(), NULL);
+	struct incise_sha256 sha = {0};
+	char text[INCISE_SHA256_TEXT];
 
-	for (size_t i = 0; i < map->n && good; i++) {
+	incise_sha256_start(&sha);
+	for (size_t i = 0; i < map->n; i++) {
 		const struct incise_session_knot *knot = &map->knots[i];
 		char line[100];
 		int n = snprintf(line, sizeof(line), "%" PRId64 " %" PRId64 " %.17g\n",
 				 knot->t_ns, knot->to_ns, knot->bound_ns);
 
-		good = EVP_DigestUpdate(sha256, line, (size_t)n);
+		incise_sha256_add(&sha, line, (size_t)n);
 	}
-	good = good && EVP_DigestFinal_ex(sha256, digest, NULL);
-	EVP_MD_CTX_free(sha256);
-	if (!good)
+	if (incise_sha256_end(&sha, text))
 		return -ENOMEM;
-	incise_seal_hex(digest, text);
 	fprintf(out, "map %zu %s\n", map->n, text);
 	return 0;
 }

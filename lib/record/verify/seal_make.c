@@ -218,8 +218,7 @@ uint64_t incise_seal_walk_behind(struct incise_seal_walk *walk, bool *blocks)
 /* --- the statement ---------------------------------------------------------------------- */
 
 /* Head and length of camera.mkv. */
-static int make_file_part(struct incise_recording *recording,
-			  const struct incise_seal *seal, uint64_t *bytes,
+static int make_file_part(struct incise_recording *recording, uint64_t *bytes,
 			  uint8_t digest[INCISE_SEAL_BYTES], struct incise_error *err)
 {
 	const int fd = open_file(recording);
@@ -237,7 +236,7 @@ static int make_file_part(struct incise_recording *recording,
 	if (recording->meta.complete)
 		*bytes = st.st_size;
 	if (!rc)
-		rc = incise_seal_file(seal, fd, *bytes, digest);
+		rc = incise_seal_file(fd, *bytes, digest);
 	close(fd);
 	return rc ? incise_error_set(err, -rc, "%s/" INCISE_FRAMES_FILE ": %s",
 				     recording->path, strerror(-rc))
@@ -257,12 +256,12 @@ static int make_parts(struct incise_seal_statement *statement,
 		if (i >= INCISE_SEAL_STREAM && i < INCISE_SEAL_DEPTH)
 			continue;
 		if (i == INCISE_SEAL_FILE)
-			rc = make_file_part(recording, seal, &part->rows, digest, err);
+			rc = make_file_part(recording, &part->rows, digest, err);
 		else if (incise_seal_table(seal, recording->db, i, &part->rows, digest))
 			rc = incise_schema_fail(recording->db, recording->path, err);
 		if (rc)
 			return rc;
-		incise_seal_hex(digest, part->digest);
+		incise_sha256_hex(digest, part->digest);
 	}
 	return 0;
 }
@@ -275,11 +274,11 @@ static void take_commit(struct incise_seal_statement *statement,
 
 	statement->last.commit = walk->number;
 	statement->last.t_ns = walk->t_ns;
-	incise_seal_hex(seal->head, statement->last.head);
+	incise_sha256_hex(seal->head, statement->last.head);
 	for (int i = 0; i < INCISE_LEDGER_FORMS; i++) {
 		statement->parts[INCISE_SEAL_STREAM + i].rows = seal->n_rows[i];
-		incise_seal_hex(seal->chain[i],
-				statement->parts[INCISE_SEAL_STREAM + i].digest);
+		incise_sha256_hex(seal->chain[i],
+				  statement->parts[INCISE_SEAL_STREAM + i].digest);
 	}
 }
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Inside a verification; for lib/record/verify/ only. Each file calls only those below it.
+ * Inside a verification; for lib/record only. Each file calls only those below it.
  *
  *     verify.c          the recording as a whole: seals, pages, counts, the report
  *     verify_stream.c   one stream: its data compared with its blocks
@@ -44,6 +44,12 @@ struct incise_verification {
 	bool hashed;
 	struct incise_seal rows_seal;
 };
+
+/* As incise_verify(), without what INCISE_VERIFY_ROWS and INCISE_VERIFY_TABLES leave out. */
+int incise_verify_rows(const char *path, const struct incise_verify_watch *watch,
+		       struct incise_verify_report *report, struct incise_error *err);
+int incise_verify_tables(const char *path, const struct incise_verify_watch *watch,
+			 struct incise_verify_report *report, struct incise_error *err);
 
 /*
  * Verify a stream, INCISE_LEDGER_*; @rows and @lost are the recorder's counts. Fills @out. Returns 0 or

@@ -13,6 +13,7 @@
 #include <unistd.h>
 #include <incise/infile.h>
 #include <incise/outfile.h>
+#include "../../base/crypto/sha256.h"
 #include "../read/database.h"
 #include "../read/recalibration.h"
 #include "../read/session.h"
@@ -132,7 +133,7 @@ static int add(const char *folder, const char *calibration,
 				      folder);
 	if (!rc)
 		rc = next_name(folder, &list[n - 1], !calibration, made, err);
-	if (!rc && text && incise_recalibration_digest(made, text, size))
+	if (!rc && text && incise_sha256_text(text, size, made->sha256))
 		rc = incise_schema_no_memory(folder, err);
 	if (!rc)
 		rc = write_entry(folder, made, text ? text : "", size, err);

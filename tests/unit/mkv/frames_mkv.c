@@ -13,7 +13,7 @@
 #include <time.h>
 #include <incise/backend.h>
 #include <incise/rig.h>
-#include "../../../lib/learn/sha256.h"
+#include "../../../lib/base/crypto/sha256.h"
 #include "../../../lib/record/frames.h"
 #include "../../../lib/record/write/frame_pump.h"
 #include "../message.h"
@@ -179,18 +179,14 @@ static uint64_t count(const char *path, const struct incise_frames_shape *shape)
 	return n;
 }
 
-/* SHA-256 of a frame in the file, by another implementation; that of a JPEG is the camera's. */
+/* SHA-256 of a frame in the file; that of a JPEG is the camera's. */
 static void is_digest(const struct incise_camera_frame *frame,
 		      const struct incise_frames_stored *stored)
 {
-	struct incise_sha256 sha;
-	char hex[65], text[65];
+	char hex[INCISE_SHA256_TEXT], text[INCISE_SHA256_TEXT];
 
-	incise_sha256_start(&sha);
-	incise_sha256_add(&sha, frame->data, frame->size);
-	incise_sha256_end(&sha, hex);
-	for (int i = 0; i < INCISE_FRAMES_DIGEST; i++)
-		snprintf(text + 2 * i, 3, "%02x", stored->sha256[i]);
+	incise_sha256_text(frame->data, frame->size, hex);
+	incise_sha256_hex(stored->sha256, text);
 	assert_string_equal(text, hex);
 }
 
