@@ -65,7 +65,7 @@ enum incise_proof_kind {
 	INCISE_PROOF_TIMESTAMP,
 };
 
-/** Of a signature or a time-stamp. */
+/** The state of a signature or a time-stamp. */
 enum incise_proof_verdict {
 	INCISE_PROOF_UNCHECKED, /**< nobody to trust was given */
 	INCISE_PROOF_GOOD,
