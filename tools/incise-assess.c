@@ -95,7 +95,7 @@ static void number_text(double value, int digits, char *text, size_t size)
 
 /* --- reading --------------------------------------------------------------------------- */
 
-static void parse(struct job *job, int argc, char **argv)
+static void parse_assess(struct job *job, int argc, char **argv)
 {
 	cli_parse(&command, argc, argv, job);
 	job->n = argc - optind;
@@ -110,7 +110,7 @@ static void parse(struct job *job, int argc, char **argv)
 			  "a file name");
 }
 
-static void load(struct assessed *a, const char *path)
+static void load_assess(struct assessed *a, const char *path)
 {
 	struct incise_error err = {0};
 
@@ -128,11 +128,11 @@ static void load_all(struct job *job, char **paths)
 {
 	job->session = cli_alloc((size_t)job->n + 1, sizeof(*job->session));
 	for (int i = 0; i < job->n; i++)
-		load(&job->session[i], paths[i]);
+		load_assess(&job->session[i], paths[i]);
 	if (!job->reference_path)
 		return;
 	job->reference = &job->session[job->n];
-	load(job->reference, job->reference_path);
+	load_assess(job->reference, job->reference_path);
 	for (int i = 0; i < job->n; i++)
 		if (strcmp(job->session[i].session->scene.crc32c,
 			   job->reference->session->scene.crc32c))
@@ -446,7 +446,7 @@ static json_t *session_report(const struct assessed *a, const struct assessed *r
 			 reference ? difference_json(a, reference) : json_null());
 }
 
-static void print_json(const struct job *job)
+static void print_assess_json(const struct job *job)
 {
 	json_t *list = json_array();
 
@@ -693,7 +693,7 @@ int main(int argc, char **argv)
 	struct job job = {0};
 	bool quiet;
 
-	parse(&job, argc, argv);
+	parse_assess(&job, argc, argv);
 	load_all(&job, argv + optind);
 	if (job.csv)
 		write_csv(&job);
@@ -702,7 +702,7 @@ int main(int argc, char **argv)
 	quiet = (job.csv && !strcmp(job.csv, "-")) ||
 		(job.page && !strcmp(job.page, "-"));
 	if (job.json)
-		print_json(&job);
+		print_assess_json(&job);
 	else if (!quiet && job.n == 1)
 		print_one(&job.session[0], job.reference);
 	else if (!quiet)

@@ -295,7 +295,7 @@ static const json_t *benchmarks_of(const json_t *report)
 }
 
 /* The comparison goes into the report, or the reason why there is none. */
-static void compare(const char *path, const json_t *old, json_t *report)
+static void compare_bench_all(const char *path, const json_t *old, json_t *report)
 {
 	struct incise_error err = {0};
 	json_t *comparison = compare_reports(benchmarks_of(old), path,
@@ -308,7 +308,7 @@ static void compare(const char *path, const json_t *old, json_t *report)
 	json_object_set_new(report, "against", comparison);
 }
 
-static json_t *measure(const struct job *job)
+static json_t *measure_bench_all(const struct job *job)
 {
 	json_t *old = job->against ? compare_load(job->against) : NULL;
 	json_t *names = json_array(), *report;
@@ -331,7 +331,7 @@ static json_t *measure(const struct job *job)
 			 job->folder);
 	}
 	if (old)
-		compare(job->against, old, report);
+		compare_bench_all(job->against, old, report);
 	json_decref(old);
 	if (write_report(folder.unfinished, report, &err)) {
 		folder_abandon(&folder);
@@ -344,7 +344,7 @@ static json_t *measure(const struct job *job)
 
 /* --- the command line --- */
 
-static void parse(struct job *job, int argc, char **argv)
+static void parse_bench_all(struct job *job, int argc, char **argv)
 {
 	*job = (struct job){0};
 	cli_parse(&command, argc, argv, job);
@@ -361,7 +361,7 @@ static void parse(struct job *job, int argc, char **argv)
 }
 
 /* One line for the worst that is not as it should be. */
-static void judge(const struct job *job, const json_t *report)
+static void judge_bench_all(const struct job *job, const json_t *report)
 {
 	const json_t *against = json_object_get(report, "against");
 	size_t failed = json_array_size(json_object_get(report, "failed"));
@@ -387,7 +387,7 @@ int main(int argc, char **argv)
 	struct job job;
 	json_t *report;
 
-	parse(&job, argc, argv);
+	parse_bench_all(&job, argc, argv);
 	cli_catch_signals();
 	if (job.from) {
 		report = load_report(job.from);
@@ -395,7 +395,7 @@ int main(int argc, char **argv)
 		if (report_script("bench", job.from, NULL, NULL, &err))
 			cli_fail_with(&err);
 	} else {
-		report = measure(&job);
+		report = measure_bench_all(&job);
 	}
 	if (job.json)
 		json_print(json_incref(report));
@@ -406,7 +406,7 @@ int main(int argc, char **argv)
 		       json_object_size(json_object_get(report, "runs")));
 	cli_finish();
 	if (job.folder)
-		judge(&job, report);
+		judge_bench_all(&job, report);
 	json_decref(report);
 	return 0;
 }

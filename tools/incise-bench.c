@@ -91,7 +91,7 @@ static const struct cli_command *help(void)
 
 /* --- the command line --- */
 
-static _Noreturn void compare(const struct bench_run *run, int argc, char **argv)
+static _Noreturn void compare_bench(const struct bench_run *run, int argc, char **argv)
 {
 	struct incise_error err = {0};
 	json_t *reports[2], *comparison;
@@ -160,7 +160,7 @@ int main(int argc, char **argv)
 	argc -= optind;
 	argv += optind;
 	if (argc && !strcmp(argv[0], "compare"))
-		compare(&run, argc, argv);
+		compare_bench(&run, argc, argv);
 	run.bench = bench = bench_of(argc, argv);
 	allow(bench, run.plot, bench->plots->script, "plot");
 	allow(bench, run.seconds > 0, bench->takes_duration, "duration");

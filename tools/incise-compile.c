@@ -109,8 +109,8 @@ static void write_c(const struct incise_fixed *fx, const char *path)
 	free(symbol);
 }
 
-static void report(const struct incise_fixed *fx, const char *model, const char *path,
-		   bool json)
+static void report_compile(const struct incise_fixed *fx, const char *model,
+			   const char *path, bool json)
 {
 	const char *name = incise_fixed_arithmetic_name(fx->arithmetic);
 	json_t *cells = json_array();
@@ -148,7 +148,7 @@ static void compile_model(const struct job *job, const char *path)
 		cli_fail_with(&err);
 	if (job->c_source)
 		write_c(fx, job->c_source);
-	report(fx, path, job->output, job->json);
+	report_compile(fx, path, job->output, job->json);
 	incise_fixed_free(fx);
 	incise_model_free(model);
 }

@@ -135,7 +135,7 @@ static void print_command(char *const *argv)
 }
 
 /* @out: descriptor of its output, or -1 for ours. */
-static pid_t start(char *const *argv, int out)
+static pid_t start_demo(char *const *argv, int out)
 {
 	posix_spawn_file_actions_t files;
 	char *program = cli_text("%s/incise-%s", cli_folder(), argv[0]);
@@ -221,7 +221,7 @@ static json_t *read_report(char *const *argv, const char *folder,
 
 	if (pipe2(pipe_fd, O_CLOEXEC))
 		cli_fail("pipe: %s", strerror(errno));
-	pid = start(argv, pipe_fd[1]);
+	pid = start_demo(argv, pipe_fd[1]);
 	close(pipe_fd[1]);
 	text = read_output(pipe_fd[0], pid);
 	close(pipe_fd[0]);
@@ -399,7 +399,7 @@ static void run_view(char *const *argv, const char *folder)
 
 	argv = handed_on(argv);
 	print_command(argv);
-	if (wait_for(start(argv, -1), argv, folder, &err))
+	if (wait_for(start_demo(argv, -1), argv, folder, &err))
 		cli_fail_with(&err);
 }
 

@@ -521,7 +521,7 @@ static void check_disk(struct doctor *doctor)
 		    "the current folder may not be written to");
 }
 
-static int count(const struct doctor *doctor, enum state state)
+static int count_doctor(const struct doctor *doctor, enum state state)
 {
 	int n = 0;
 
@@ -547,11 +547,11 @@ static void print(const struct doctor *doctor)
 		if (check->state != OK && *check->fix)
 			printf("  %21s→ %s\n", "", check->fix);
 	}
-	printf("\n%s, %s\n", cli_count(count(doctor, PROBLEM), "problem"),
-	       cli_count(count(doctor, WARNING), "warning"));
+	printf("\n%s, %s\n", cli_count(count_doctor(doctor, PROBLEM), "problem"),
+	       cli_count(count_doctor(doctor, WARNING), "warning"));
 }
 
-static void print_json(const struct doctor *doctor)
+static void print_doctor_json(const struct doctor *doctor)
 {
 	json_t *checks = json_array();
 
@@ -568,8 +568,9 @@ static void print_json(const struct doctor *doctor)
 							: json_text(check->fix)));
 	}
 	json_print(json_pack("{s:o, s:i, s:i, s:o}", "checks", checks, "problems",
-			     count(doctor, PROBLEM), "warnings", count(doctor, WARNING),
-			     "recording_min", json_number(doctor->recording_min)));
+			     count_doctor(doctor, PROBLEM), "warnings",
+			     count_doctor(doctor, WARNING), "recording_min",
+			     json_number(doctor->recording_min)));
 }
 
 int main(int argc, char **argv)
@@ -589,9 +590,9 @@ int main(int argc, char **argv)
 	check_calibration(&doctor);
 	check_disk(&doctor);
 	if (doctor.json)
-		print_json(&doctor);
+		print_doctor_json(&doctor);
 	else
 		print(&doctor);
 	cli_finish();
-	return count(&doctor, PROBLEM) ? 1 : 0;
+	return count_doctor(&doctor, PROBLEM) ? 1 : 0;
 }

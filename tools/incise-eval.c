@@ -78,7 +78,7 @@ static void find_parts(const struct evaluator *e, const double *x, double parts[
 	parts[2] = hypot(all.calibration, all.rig);
 }
 
-static void add_row(struct evaluator *e, const double *x, double y, bool outside)
+static void add_eval_row(struct evaluator *e, const double *x, double y, bool outside)
 {
 	const char *unit = strrchr(e->output, '_');
 	json_t *row = json_object();
@@ -116,7 +116,7 @@ static void evaluate(struct evaluator *e, const double *x, size_t outside, bool 
 	e->unfired += !outside && flags & INCISE_MODEL_EXTRAPOLATED;
 	outside |= flags & INCISE_MODEL_EXTRAPOLATED;
 	if (e->rows) {
-		add_row(e, x, y, outside);
+		add_eval_row(e, x, y, outside);
 		return;
 	}
 	for (int i = 0; inputs && i < e->n_inputs; i++)
@@ -297,7 +297,7 @@ static void eval_file(struct evaluator *e, const char *path)
 	incise_infile_close(in);
 }
 
-static void parse(struct job *job, int argc, char **argv)
+static void parse_eval(struct job *job, int argc, char **argv)
 {
 	cli_parse(&command, argc, argv, job);
 	if (optind >= argc)
@@ -334,7 +334,7 @@ int main(int argc, char **argv)
 	struct evaluator e = {0};
 	struct job job = {0};
 
-	parse(&job, argc, argv);
+	parse_eval(&job, argc, argv);
 	open_model(&e, argv[optind], job.arith, !job.no_clamp);
 	e.rows = job.json ? json_array() : NULL;
 	e.parts = job.parts;

@@ -132,7 +132,8 @@ static json_t *unstated(const struct incise_export_report *report)
 	return list;
 }
 
-static void print_report(const struct incise_export_report *report, const char *output)
+static void print_export_report(const struct incise_export_report *report,
+				const char *output)
 {
 	json_print(json_pack("{so sI si sI so so so}", "path", json_text(output), "rows",
 			     (json_int_t)report->rows, "cuts", report->cuts, "clipped",
@@ -204,7 +205,7 @@ static bool has_messages(const struct job *job)
 	return cli_extension_in(job->output, INCISE_MESSAGE_EXTENSIONS);
 }
 
-static void parse(struct job *job, int argc, char **argv)
+static void parse_export(struct job *job, int argc, char **argv)
 {
 	struct incise_export_options *how = &job->how;
 
@@ -254,12 +255,12 @@ int main(int argc, char **argv)
 	struct incise_export_report report = {0};
 	struct job job;
 
-	parse(&job, argc, argv);
+	parse_export(&job, argc, argv);
 	export(argv + optind, argc - optind, &job, &report);
 	warn_unstated(&report);
 	warn_camera(&report);
 	if (job.json)
-		print_report(&report, job.output);
+		print_export_report(&report, job.output);
 	else if (strcmp(job.output, "-") && !report.cuts && !job.how.resample)
 		printf("wrote %s: %s\n", job.output, cli_count(report.rows, "message"));
 	else if (strcmp(job.output, "-"))

@@ -110,7 +110,7 @@ static void watch_kernel(struct haptic_job *job)
 		arguments[n++] = cli_text("--verbose");
 }
 
-static void parse(struct haptic_job *job, int argc, char **argv)
+static void parse_haptic(struct haptic_job *job, int argc, char **argv)
 {
 	job->realtime = (struct incise_realtime_setup){
 		.priority = INCISE_REALTIME_PRIORITY, .cpu = INCISE_REALTIME_ANY_CPU};
@@ -142,6 +142,6 @@ int main(int argc, char **argv)
 
 	/* Before there is another thread. */
 	incise_realtime_prepare();
-	parse(&job, argc, argv);
+	parse_haptic(&job, argc, argv);
 	return haptic_run(&job);
 }

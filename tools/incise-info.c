@@ -612,7 +612,7 @@ static bool is_bus(const char *what)
 	return true;
 }
 
-static int keep(void *context, const struct incise_scan_device *device)
+static int keep_info(void *context, const struct incise_scan_device *device)
 {
 	struct found *found = context;
 	struct answer *one;
@@ -718,7 +718,7 @@ static void show_attached(bool json)
 	int rc;
 
 	cli_progress("looking for devices");
-	rc = incise_scan(NULL, NULL, keep, &found, NULL);
+	rc = incise_scan(NULL, NULL, keep_info, &found, NULL);
 	cli_progress_end();
 	if (rc)
 		cli_fail("devices: %s", strerror(-rc));
@@ -740,7 +740,7 @@ static void show_bus(const char *what, bool json)
 	int rc;
 
 	cli_progress("looking on %s", what);
-	rc = incise_scan(NULL, what, keep, &found, &err);
+	rc = incise_scan(NULL, what, keep_info, &found, &err);
 	cli_progress_end();
 	if (rc)
 		cli_fail_with(&err);

@@ -54,7 +54,8 @@ static void print_note(void *context, const char *text)
 }
 
 /* Name the file that --overwrite replaces as the user did. */
-static void fail(const struct incise_error *err, const char *target, const char *given)
+static void fail_join(const struct incise_error *err, const char *target,
+		      const char *given)
 {
 	size_t n = strlen(target);
 
@@ -87,7 +88,7 @@ int main(int argc, char **argv)
 	target = recording_target(job.output);
 	if (incise_session_join((const char *const *)argv + optind, argc - optind,
 				&job.how, target, &err))
-		fail(&err, target, job.output);
+		fail_join(&err, target, job.output);
 	recording_replace(target, job.output);
 	/* Each stream of the first member that has it: what is reported is the same for all. */
 	path = cli_text("%s:*", job.output);

@@ -39,7 +39,7 @@ static const struct cli_command command = {
 	.examples = "incise merge lyon.fac graz.fac -o liver.fis",
 };
 
-static void parse(struct options *options, int argc, char **argv)
+static void parse_merge(struct options *options, int argc, char **argv)
 {
 	char *sd;
 
@@ -75,9 +75,9 @@ static void save_model(const struct options *options,
 	free(sd);
 }
 
-static void print_report(const struct options *options,
-			 const struct incise_factor_info *info,
-			 const struct incise_train_report *report)
+static void print_merge_report(const struct options *options,
+			       const struct incise_factor_info *info,
+			       const struct incise_train_report *report)
 {
 	if (options->json) {
 		json_t *object = json_pack("{sIsIsI}", "pairs", (json_int_t)info->rows,
@@ -116,7 +116,7 @@ int main(int argc, char **argv)
 	struct incise_error err = {0};
 	struct options options;
 
-	parse(&options, argc, argv);
+	parse_merge(&options, argc, argv);
 	for (int i = 0; i < options.n; i++)
 		file_expect(options.paths[i], FILE_FACTOR);
 	end = cli_ends_with(options.output, ".fac") ? INCISE_TRAIN_TO_FACTOR
@@ -130,7 +130,8 @@ int main(int argc, char **argv)
 		cli_fail_with(&err);
 	incise_factor_info(trained.factor, &info);
 	if (strcmp(options.output, "-"))
-		print_report(&options, &info, trained.model ? &trained.report : &none);
+		print_merge_report(&options, &info,
+				   trained.model ? &trained.report : &none);
 	incise_trained_free(&trained);
 	cli_finish();
 	return 0;

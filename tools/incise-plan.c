@@ -211,8 +211,8 @@ static json_t *surface_json(const struct incise_plan *plan)
 			 s.open_edges ? json_numbers(s.open_hi_mm, 3) : json_null());
 }
 
-static void report_json(const struct job *job, const struct incise_plan *plan,
-			struct incise_rig *rig, const struct tick_cost *cost)
+static void report_plan_json(const struct job *job, const struct incise_plan *plan,
+			     struct incise_rig *rig, const struct tick_cost *cost)
 {
 	json_t *kept = json_array(), *stages = json_array(), *left = json_array();
 	json_t *mapped = mapped_libraries(0), *object;
@@ -387,9 +387,9 @@ static void print_axes(struct incise_rig *rig, const struct incise_plan_stabilit
 	}
 }
 
-static void report_text(const struct job *job, const struct incise_plan *plan,
-			struct incise_rig *rig, const struct tick_cost *cost,
-			const char *size)
+static void report_plan_text(const struct job *job, const struct incise_plan *plan,
+			     struct incise_rig *rig, const struct tick_cost *cost,
+			     const char *size)
 {
 	json_t *mapped = mapped_libraries(0), *absent = unmapped_libraries(mapped);
 	const char *name, *why;
@@ -476,9 +476,9 @@ int main(int argc, char **argv)
 	cli_progress_end();
 	size = scene_argument_size(job.scene.path, incise_plan_surface(plan));
 	if (job.json)
-		report_json(&job, plan, rig, &cost);
+		report_plan_json(&job, plan, rig, &cost);
 	else
-		report_text(&job, plan, rig, &cost, size);
+		report_plan_text(&job, plan, rig, &cost, size);
 	if (strstr(size, "open edges"))
 		cli_warn(
 			"%s: its surface is open: a contact ends at the border, which is "

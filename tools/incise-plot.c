@@ -138,7 +138,7 @@ static const char *window_form(void)
 	return form;
 }
 
-static void parse(struct job *job, int argc, char **argv)
+static void parse_plot(struct job *job, int argc, char **argv)
 {
 	cli_parse(&command, argc, argv, job);
 	job->figure.path =
@@ -159,7 +159,7 @@ int main(int argc, char **argv)
 	const char *form;
 	FILE *script;
 
-	parse(&job, argc, argv);
+	parse_plot(&job, argc, argv);
 	form = job.output ? form_of(job.output) : NULL;
 	kind = find_drawn(job.figure.path);
 	if (job.figure.data && !(kind->kind & MODELS))

@@ -139,7 +139,7 @@ static char *beside(const char *file, const char *name)
 	return path;
 }
 
-static void compare(struct step *step, const struct job *job, const char *file)
+static void compare_provenance(struct step *step, const struct job *job, const char *file)
 {
 	bool recording = !strcmp(step->origin->kind, "recording");
 	char *path = beside(file, step->origin->name);
@@ -247,8 +247,8 @@ static json_t *step_json(const struct step *step)
 		states[step->state]);
 }
 
-static void report(const struct job *job, const char *path, struct step *steps, int n,
-		   bool cut)
+static void report_provenance(const struct job *job, const char *path, struct step *steps,
+			      int n, bool cut)
 {
 	json_t *list = json_array();
 
@@ -322,7 +322,7 @@ int main(int argc, char **argv)
 		if (recording)
 			compare_calibration(&steps[i], recording);
 		else
-			compare(&steps[i], &job, path);
+			compare_provenance(&steps[i], &job, path);
 		if (!strcmp(origins.all[i].kind, "recording") && steps[i].found &&
 		    steps[i].state != OTHER)
 			compare_rows(&steps[i], i + 1 < origins.n ? &steps[i + 1] : NULL);
@@ -331,7 +331,7 @@ int main(int argc, char **argv)
 	}
 	if (cli_stop)
 		cli_fail("interrupted");
-	report(&job, path, steps, origins.n, origins.cut);
+	report_provenance(&job, path, steps, origins.n, origins.cut);
 	for (int i = 0; i < origins.n; i++)
 		free(steps[i].found);
 	free(steps);

@@ -62,7 +62,7 @@ static const struct cli_command command = {
 	.examples = "incise replay liver.rec scenes/liver.scene --log liver.csv",
 };
 
-static void parse(struct job *job, int argc, char **argv)
+static void parse_replay(struct job *job, int argc, char **argv)
 {
 	*job = (struct job){.how.stop = &cli_stop};
 	cli_parse(&command, argc, argv, job);
@@ -182,9 +182,9 @@ static double relative(const struct incise_replay_report *report)
 	return report->range_N > 0 ? report->rms_N / report->range_N : NAN;
 }
 
-static void report_json(const struct job *job, double rate_hz,
-			const struct incise_loop_stats *stats,
-			const struct incise_replay_report *r)
+static void report_replay_json(const struct job *job, double rate_hz,
+			       const struct incise_loop_stats *stats,
+			       const struct incise_replay_report *r)
 {
 	char crc[9];
 
@@ -236,9 +236,9 @@ static void held_line(const struct incise_loop_stats *stats,
 		putchar('\n');
 }
 
-static void report_text(const struct job *job, double rate_hz,
-			const struct incise_loop_stats *stats,
-			const struct incise_replay_report *r)
+static void report_replay_text(const struct job *job, double rate_hz,
+			       const struct incise_loop_stats *stats,
+			       const struct incise_replay_report *r)
 {
 	printf("%s: %.1f s, %s at %g Hz, %s, %s\n", job->recording, r->seconds,
 	       cli_count(stats->ticks, "tick"), rate_hz, cli_count(r->poses, "pose"),
@@ -281,7 +281,7 @@ int main(int argc, char **argv)
 	double rate_hz;
 	int rc;
 
-	parse(&job, argc, argv);
+	parse_replay(&job, argc, argv);
 	if (job.calibration) {
 		calibration_use(&calibration, job.calibration, NULL);
 		job.how.calibration = &calibration.values;
@@ -317,9 +317,9 @@ int main(int argc, char **argv)
 	if (job.plot)
 		draw_plot(&sink.plot);
 	if (job.json) {
-		report_json(&job, rate_hz, &stats, &report);
+		report_replay_json(&job, rate_hz, &stats, &report);
 	} else if (sink.bar) {
-		report_text(&job, rate_hz, &stats, &report);
+		report_replay_text(&job, rate_hz, &stats, &report);
 		cli_written();
 	}
 	cli_finish();

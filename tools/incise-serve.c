@@ -184,7 +184,7 @@ static void wait_until(struct run *run, int64_t t_ns)
 	}
 }
 
-static void show(const struct run *run, double seconds)
+static void show_serve(const struct run *run, double seconds)
 {
 	char text[400];
 	int n = snprintf(text, sizeof(text), "%s, %.0f s", run->info.name, seconds);
@@ -217,7 +217,7 @@ static void serve(struct run *run, const struct job *job)
 						       &next);
 		if (now >= tick) {
 			tick_sinks(run, now);
-			show(run, (now - start) / 1e9);
+			show_serve(run, (now - start) / 1e9);
 			tick = now + TICK_NS;
 		}
 		wait_until(run, next < tick ? next : tick);
@@ -237,7 +237,7 @@ static void serve(struct run *run, const struct job *job)
 	cli_progress_end();
 }
 
-static void report(const struct run *run, const struct job *job)
+static void report_serve(const struct run *run, const struct job *job)
 {
 	const struct serve_stream *stream = run->stream;
 	json_t *object;
@@ -286,7 +286,7 @@ int main(int argc, char **argv)
 	serve(&run, &job);
 	for (int i = 0; i < run.sinks; i++)
 		run.sink[i]->ops->close(run.sink[i]);
-	report(&run, &job);
+	report_serve(&run, &job);
 	for (int i = 0; i < run.sinks; i++)
 		run.sink[i]->ops->free(run.sink[i]);
 	serve_stream_free(run.stream);

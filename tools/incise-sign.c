@@ -66,7 +66,7 @@ static json_t *voucher_json(const struct incise_proof_seal *seal,
 	return object;
 }
 
-static void print_json(const char *path, const struct incise_proof *proof)
+static void print_sign_json(const char *path, const struct incise_proof *proof)
 {
 	json_t *vouchers[] = {json_array(), json_array()};
 
@@ -87,7 +87,7 @@ static bool is_server(const char *where)
 	return !strncmp(where, "http://", 7) || !strncmp(where, "https://", 8);
 }
 
-static char *parse(struct job *job, int argc, char **argv)
+static char *parse_sign(struct job *job, int argc, char **argv)
 {
 	const char *timestamp;
 	char *path;
@@ -113,7 +113,7 @@ int main(int argc, char **argv)
 {
 	struct job job = {.prove.write = write_file};
 	struct incise_error err = {0};
-	const char *path = parse(&job, argc, argv);
+	const char *path = parse_sign(&job, argc, argv);
 	const struct incise_proof_seal *last;
 	struct incise_proof proof;
 	int rc;
@@ -126,7 +126,7 @@ int main(int argc, char **argv)
 		cli_fail_with(&err);
 	last = &proof.seals[proof.n - 1];
 	if (job.json)
-		print_json(path, &proof);
+		print_sign_json(path, &proof);
 	else if (job.prove.timestamp && cli_ends_with(job.prove.timestamp, ".tsq"))
 		printf("%s: query for a time-stamp, statement of commit %lld; send it to "
 		       "an authority, and store its reply with --timestamp FILE.tsr\n",

@@ -51,7 +51,7 @@ static const struct cli_command command = {
 #define LINE_NS 1000000000LL
 
 /* Bytes of a line that fill at most so many columns; UTF-8. */
-static size_t width_of(const char *line, size_t n, int columns)
+static size_t width_of_status(const char *line, size_t n, int columns)
 {
 	size_t i;
 
@@ -62,7 +62,7 @@ static size_t width_of(const char *line, size_t n, int columns)
 }
 
 /* Draw over the view before, cut to the size of the terminal. */
-static void draw(const char *text)
+static void draw_status(const char *text)
 {
 	struct winsize size = {.ws_row = 24, .ws_col = 80};
 
@@ -71,7 +71,7 @@ static void draw(const char *text)
 	for (int row = 1; *text && row < size.ws_row; row++) {
 		size_t n = strcspn(text, "\n");
 
-		printf("%.*s\033[K\n", (int)width_of(text, n, size.ws_col), text);
+		printf("%.*s\033[K\n", (int)width_of_status(text, n, size.ws_col), text);
 		text += n + (text[n] == '\n');
 	}
 	fputs("\033[J", stdout);
@@ -88,11 +88,11 @@ static void draw_look(const struct state_look *look)
 	state_report_text(out, look);
 	fputs("Ctrl-C ends this view\n", out);
 	fclose(out);
-	draw(text);
+	draw_status(text);
 	free(text);
 }
 
-static void show(const struct state_look *look, bool view, bool json)
+static void show_status(const struct state_look *look, bool view, bool json)
 {
 	if (json) {
 		json_t *report = state_report_json(look);
@@ -151,7 +151,7 @@ static bool state_follow(const struct state_page_file *page, bool json)
 		look.now = &looks[i];
 		state_look_since(&look, &looks[!i],
 				 view ? VIEW_NS * 1e-9 : LINE_NS * 1e-9);
-		show(&look, view, json);
+		show_status(&look, view, json);
 	}
 	if (view && look.now)
 		screen(false);
@@ -163,7 +163,7 @@ static bool state_follow(const struct state_page_file *page, bool json)
 		if (view)
 			state_report_text(stdout, &look);
 		else
-			show(&look, false, json);
+			show_status(&look, false, json);
 	}
 	return state_is_well(&look);
 }

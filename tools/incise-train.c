@@ -209,7 +209,7 @@ static const char *default_model(const struct options *options)
 	return path;
 }
 
-static void parse(struct options *options, int argc, char **argv)
+static void parse_train(struct options *options, int argc, char **argv)
 {
 	char *sd;
 
@@ -467,7 +467,7 @@ static void choose_uncertainties(struct options *options, struct uncertainties *
 #define PAIRS_PER_PARAMETER 3
 
 /* The unit of a column, from its name: force_N is in N. */
-static const char *unit_of(const char *column)
+static const char *unit_of_train(const char *column)
 {
 	const char *score = strrchr(column, '_');
 
@@ -478,7 +478,7 @@ static const char *unit_of(const char *column)
 static void set_in_unit(json_t *object, const char *name, const struct options *options,
 			double value)
 {
-	const char *unit = unit_of(options->target);
+	const char *unit = unit_of_train(options->target);
 	char key[80];
 
 	snprintf(key, sizeof(key), "%s%s%.50s", name, *unit ? "_" : "", unit);
@@ -488,7 +488,7 @@ static void set_in_unit(json_t *object, const char *name, const struct options *
 static json_t *error_object(const struct options *options, double rmse, double r2,
 			    uint64_t pairs)
 {
-	const char *unit = unit_of(options->target);
+	const char *unit = unit_of_train(options->target);
 	json_t *object = json_object();
 	char key[80];
 
@@ -596,8 +596,8 @@ static json_t *propagated_json(const struct options *options,
 	return object;
 }
 
-static void report_json(const struct options *options,
-			const struct incise_trained *trained, json_t *warned)
+static void report_train_json(const struct options *options,
+			      const struct incise_trained *trained, json_t *warned)
 {
 	const struct incise_model *model = trained->model;
 	const struct incise_train_report *report = &trained->report;
@@ -666,8 +666,8 @@ static void print_row(const char *name, double train, double check)
 	isnan(check) ? printf("\n") : printf("%14.5g\n", check);
 }
 
-static void report_text(const struct options *options,
-			const struct incise_trained *trained)
+static void report_train_text(const struct options *options,
+			      const struct incise_trained *trained)
 {
 	const struct incise_model *model = trained->model;
 	const struct incise_corpus_side *fit = incise_corpus_side(trained->corpus, false);
@@ -718,16 +718,16 @@ static void report_text(const struct options *options,
 	      : printf("\n");
 	print_row("R² of this model", report->train_r2, report->check_r2);
 	printf("  95 %% interval: noise %.4g %s", trained->noise,
-	       unit_of(options->target));
+	       unit_of_train(options->target));
 	if (check)
 		printf(", holds %.1f %% of the %s", 100 * trained->coverage, unseen);
 	printf("\n");
 	if (options->how.n_parts)
 		printf("  uncertainties: own parts %.3g %s; calibrations %.3g %s on the "
 		       "model, %.3g %s of another rig\n",
-		       trained->propagated.own, unit_of(options->target),
-		       trained->propagated.calibration, unit_of(options->target),
-		       trained->propagated.rig, unit_of(options->target));
+		       trained->propagated.own, unit_of_train(options->target),
+		       trained->propagated.calibration, unit_of_train(options->target),
+		       trained->propagated.rig, unit_of_train(options->target));
 	if (report->pairs_tuned && report->pairs_tuned < fit->different)
 		printf("  membership functions from a random %zu of the pairs, consequents "
 		       "from all\n",
@@ -826,9 +826,9 @@ static void report_model(const struct options *options,
 	json_t *warned = warnings(options, trained);
 
 	if (options->json)
-		report_json(options, trained, warned);
+		report_train_json(options, trained, warned);
 	else if (strcmp(options->model, "-"))
-		report_text(options, trained);
+		report_train_text(options, trained);
 	if (!options->json)
 		json_decref(warned);
 }
@@ -844,7 +844,7 @@ int main(int argc, char **argv)
 	struct options options;
 	char *data;
 
-	parse(&options, argc, argv);
+	parse_train(&options, argc, argv);
 	if (options.mpi)
 		join_job();
 	if (!job || !job->rank) {

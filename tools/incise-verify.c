@@ -144,8 +144,8 @@ static bool recalibrated(const char *path, struct incise_recalibration *active)
 	return is;
 }
 
-static void print_json(const struct incise_verify_report *report, const struct sink *sink,
-		       json_t *vouches)
+static void print_verify_json(const struct incise_verify_report *report,
+			      const struct sink *sink, json_t *vouches)
 {
 	struct incise_recalibration active;
 	json_t *streams = json_array();
@@ -293,7 +293,7 @@ int main(int argc, char **argv)
 		cli_fail_with(&err);
 	cli_progress_end();
 	if (job.json) {
-		print_json(&proof.report, &sink, proof_json(&proof));
+		print_verify_json(&proof.report, &sink, proof_json(&proof));
 	} else {
 		print_table(&proof.report, sink.path);
 		proof_print(&proof, job.prove.signers);

@@ -271,7 +271,7 @@ static char *program_of(const char *command, const char *subcommand)
 }
 
 /* Print what the last of @n words may be, which follow "incise". */
-static int complete(int n, char **words)
+static int complete_incise(int n, char **words)
 {
 	char *program = n > 2 ? program_of(words[0], words[1]) : NULL;
 	bool help = n > 1 && !strcmp(words[0], "help");
@@ -321,7 +321,7 @@ int main(int argc, char **argv)
 		return finish();
 	}
 	if (!strcmp(command, "--complete"))
-		return complete(argc - 2, argv + 2);
+		return complete_incise(argc - 2, argv + 2);
 	if (!strcmp(command, "--table")) { /* for the manual page */
 		for (size_t i = 0; i < COMMANDS; i++)
 			printf("command\t%s\t%s\n", commands[i].name, commands[i].does);

@@ -368,8 +368,8 @@ static int read_onto(struct file_content *file, const char *path,
 	return rc ? rc : read_config(file, path, base, &config, err);
 }
 
-static int read_file(struct file_content *file, const char *path,
-		     struct incise_error *err)
+static int read_calibration_file(struct file_content *file, const char *path,
+				 struct incise_error *err)
 {
 	return read_onto(file, path, NULL, err);
 }
@@ -436,7 +436,7 @@ int incise_calibration_history(const char *path,
 			       struct incise_error *err)
 {
 	struct file_content file;
-	int rc = read_file(&file, path, err);
+	int rc = read_calibration_file(&file, path, err);
 
 	*records = rc ? NULL : file.records;
 	return rc ? rc : file.n;
@@ -459,7 +459,7 @@ const struct incise_calibration_value *incise_calibration_last(
 /* --- writing --- */
 
 /* The shortest number that reads back the same; libconfig recognizes floats by their point. */
-static void put_number(double value, FILE *out)
+static void put_calibration_number(double value, FILE *out)
 {
 	char text[40];
 	int digits = 6;
@@ -478,7 +478,7 @@ static void put_quoted(const char *key, const char *text, FILE *out)
 	fputs("\";", out);
 }
 
-static void put_text(const char *key, const char *text, FILE *out)
+static void put_calibration_text(const char *key, const char *text, FILE *out)
 {
 	fputs("  ", out);
 	put_quoted(key, text, out);
@@ -500,7 +500,7 @@ static void put_key(const struct file_content *file, const struct incise_setting
 	fprintf(out, "%s = ", row->key);
 	for (int i = 0; i < n; i++) {
 		fputs(n == 1 ? "" : i ? ", " : "[", out);
-		put_number(value[i], out);
+		put_calibration_number(value[i], out);
 	}
 	fprintf(out, "%s; ## %s", n > 1 ? "]" : "", row->unit);
 	/* Else a person wrote it. */
@@ -531,26 +531,26 @@ static void put_value(const struct incise_calibration_value *value, FILE *out)
 	}
 	if (isfinite(value->found)) {
 		fputs("found = ", out);
-		put_number(value->found, out);
+		put_calibration_number(value->found, out);
 		fputs("; ", out);
 	}
 	fputs("left = ", out);
-	put_number(value->left, out);
+	put_calibration_number(value->left, out);
 	fputs("; u = ", out);
-	put_number(value->u, out);
+	put_calibration_number(value->u, out);
 	fputs("; }", out);
 }
 
 static void put_record(const struct incise_calibration_record *record, FILE *out)
 {
-	put_text("kind", record->kind, out);
-	put_text("date", record->date, out);
+	put_calibration_text("kind", record->kind, out);
+	put_calibration_text("date", record->date, out);
 	if (*record->device)
-		put_text("device", record->device, out);
+		put_calibration_text("device", record->device, out);
 	if (*record->method)
-		put_text("method", record->method, out);
+		put_calibration_text("method", record->method, out);
 	if (*record->raw) {
-		put_text("raw", record->raw, out);
+		put_calibration_text("raw", record->raw, out);
 		fprintf(out, "  raw_crc32c = \"%08x\";\n", record->raw_crc);
 	}
 	fputs("  values = (\n", out);
@@ -560,25 +560,25 @@ static void put_record(const struct incise_calibration_record *record, FILE *out
 	}
 	for (int i = 0; i < record->n_covariance; i++) {
 		fputs(i ? ", " : "  covariance = [", out);
-		put_number(record->covariance[i], out);
+		put_calibration_number(record->covariance[i], out);
 	}
 	if (record->n_covariance)
 		fputs("];\n", out);
 	if (isfinite(record->low)) {
 		fputs("  low = ", out);
-		put_number(record->low, out);
+		put_calibration_number(record->low, out);
 		fputs(";\n", out);
 	}
 	if (isfinite(record->high)) {
 		fputs("  high = ", out);
-		put_number(record->high, out);
+		put_calibration_number(record->high, out);
 		fputs(";\n", out);
 	}
 	if (*record->range_unit)
-		put_text("range_unit", record->range_unit, out);
+		put_calibration_text("range_unit", record->range_unit, out);
 	fprintf(out, "  pass = %s;\n", record->pass ? "true" : "false");
 	if (*record->verdict)
-		put_text("verdict", record->verdict, out);
+		put_calibration_text("verdict", record->verdict, out);
 }
 
 /* Write all of a file; @notes are lines of comment to begin with. */
@@ -740,7 +740,7 @@ int incise_calibration_append(const char *path,
 {
 	struct incise_error failed = {0};
 	struct file_content file;
-	int rc = read_file(&file, path, &failed);
+	int rc = read_calibration_file(&file, path, &failed);
 
 	if (rc == -ENOENT) {
 		file = (struct file_content){0};

@@ -143,8 +143,8 @@ static int include_line(FILE *stream)
 	return found;
 }
 
-static int parse(config_t *config, const char *path, FILE *stream,
-		 struct incise_error *err)
+static int parse_conf(config_t *config, const char *path, FILE *stream,
+		      struct incise_error *err)
 {
 	int rc = 0;
 
@@ -178,7 +178,7 @@ int incise_conf_read_text(config_t *config, const char *path, char *text, size_t
 	else if (!stream || fseek(stream, 0, SEEK_SET))
 		rc = incise_error_set(err, ENOMEM, "%.200s: no memory to read it", path);
 	else
-		rc = parse(config, path, stream, err);
+		rc = parse_conf(config, path, stream, err);
 	if (stream)
 		fclose(stream);
 	return rc;

@@ -27,7 +27,7 @@ int incise_error_set(struct incise_error *err, int code, const char *fmt, ...)
 	return -code;
 }
 
-static bool is_digit(char c)
+static bool is_error_digit(char c)
 {
 	return c >= '0' && c <= '9';
 }
@@ -65,7 +65,7 @@ static bool package_of(const char *soname, size_t length, char *package, size_t 
 		return false;
 	for (const char *c = soname; c < so; c++)
 		package[n++] = *c == '_' ? '-' : *c >= 'A' && *c <= 'Z' ? *c + 32 : *c;
-	if (is_digit(so[-1]))
+	if (is_error_digit(so[-1]))
 		package[n++] = '-';
 	for (const char *c = so + 4; c < soname + length; c++)
 		package[n++] = *c;

@@ -28,8 +28,8 @@ struct incise_infile {
 	size_t capacity;
 };
 
-static int fail(const struct incise_infile *file, struct incise_error *err, int code,
-		const char *why)
+static int fail_infile(const struct incise_infile *file, struct incise_error *err,
+		       int code, const char *why)
 {
 	const char *advice = code == EACCES ? "change its permissions (chmod), or run as "
 					      "its owner"
@@ -58,10 +58,10 @@ static int check_type(const struct incise_infile *file, const struct stat *st,
 	if (S_ISREG(st->st_mode) || (S_ISFIFO(st->st_mode) && !file->kind->regular))
 		return 0;
 	if (S_ISDIR(st->st_mode))
-		return fail(file, err, EISDIR, strerror(EISDIR));
-	return fail(file, err, EINVAL,
-		    file->kind->regular ? "not a regular file"
-					: "not a regular file or a pipe");
+		return fail_infile(file, err, EISDIR, strerror(EISDIR));
+	return fail_infile(file, err, EINVAL,
+			   file->kind->regular ? "not a regular file"
+					       : "not a regular file or a pipe");
 }
 
 /* Read the available bytes into the buffer: 1, 0 at the end, or a negative errno. */
@@ -86,11 +86,11 @@ static int begin_pipe(struct incise_infile *file, struct incise_error *err)
 	poll(&ready, 1, WRITER_MS);
 	rc = read_some(file);
 	if (!rc)
-		return fail(file, err, ENODATA, "no program writes to this pipe");
+		return fail_infile(file, err, ENODATA, "no program writes to this pipe");
 	if (rc < 0 && rc != -EAGAIN)
-		return fail(file, err, -rc, strerror(-rc));
+		return fail_infile(file, err, -rc, strerror(-rc));
 	if (fcntl(file->fd, F_SETFL, 0))
-		return fail(file, err, errno, strerror(errno));
+		return fail_infile(file, err, errno, strerror(errno));
 	return 0;
 }
 
@@ -100,13 +100,13 @@ static int open_path(struct incise_infile *file, struct incise_error *err)
 	int rc;
 
 	if (stat(file->path, &st))
-		return fail(file, err, errno, strerror(errno));
+		return fail_infile(file, err, errno, strerror(errno));
 	rc = check_type(file, &st, err);
 	if (rc)
 		return rc;
 	file->fd = open(file->path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
 	if (file->fd < 0 || fstat(file->fd, &st))
-		return fail(file, err, errno, strerror(errno));
+		return fail_infile(file, err, errno, strerror(errno));
 	rc = check_type(file, &st, err);
 	if (!rc && S_ISFIFO(st.st_mode))
 		rc = begin_pipe(file, err);
@@ -160,7 +160,7 @@ void incise_infile_close(struct incise_infile *file)
 }
 
 /* Make capacity for more, and read: 1, 0 at the end, or a negative errno. */
-static int fill(struct incise_infile *file, struct incise_error *err)
+static int fill_infile(struct incise_infile *file, struct incise_error *err)
 {
 	int rc;
 
@@ -173,13 +173,13 @@ static int fill(struct incise_infile *file, struct incise_error *err)
 		char *more = realloc(file->data, 2 * file->capacity + 1);
 
 		if (!more)
-			return fail(file, err, ENOMEM, strerror(ENOMEM));
+			return fail_infile(file, err, ENOMEM, strerror(ENOMEM));
 		file->data = more;
 		file->capacity *= 2;
 	}
 	rc = file->ended ? 0 : read_some(file);
 	if (rc < 0)
-		return fail(file, err, -rc, strerror(-rc));
+		return fail_infile(file, err, -rc, strerror(-rc));
 	if (rc && file->kind->size_max && file->size > file->kind->size_max)
 		return too_large(file, err);
 	return rc;
@@ -217,7 +217,7 @@ int incise_infile_line(struct incise_infile *file, char **line, struct incise_er
 	file->line++;
 	while (!(rc = find_end(file, from, &newline, err)) && !newline) {
 		from = file->end - file->at;
-		rc = fill(file, err);
+		rc = fill_infile(file, err);
 		if (rc <= 0)
 			break;
 	}
@@ -246,7 +246,7 @@ char *incise_infile_read(const char *path, const struct incise_infile_kind *kind
 
 	if (!file)
 		return NULL;
-	while ((rc = fill(file, err)) > 0)
+	while ((rc = fill_infile(file, err)) > 0)
 		;
 	if (!rc) {
 		data = file->data;

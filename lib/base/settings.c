@@ -54,7 +54,8 @@ static double scale_of(const struct incise_setting *row)
 	return row->scale > 0 ? row->scale : 1;
 }
 
-static void put_number(const struct incise_setting *row, void *to, int i, double value)
+static void put_settings_number(const struct incise_setting *row, void *to, int i,
+				double value)
 {
 	void *at = (char *)to + row->offset;
 
@@ -235,7 +236,7 @@ static bool numbers_fit(const struct incise_setting *row, const struct value *va
 	return row->kind != SETTING_IS_DIRECTION || v3_unit(unit, value->number, 1e-6);
 }
 
-static bool fits(const struct incise_setting *row, const struct value *value)
+static bool fits_settings(const struct incise_setting *row, const struct value *value)
 {
 	bool good;
 
@@ -278,12 +279,12 @@ static void store(const struct incise_setting *row, const struct value *value, v
 		else
 			strcpy((char *)to + row->offset, value->text);
 	} else if (row->kind == SETTING_IS_WORD) {
-		put_number(row, to, 0, word_index(row, value->text));
+		put_settings_number(row, to, 0, word_index(row, value->text));
 	} else if (row->kind == SETTING_IS_DIRECTION) {
 		v3_unit((double *)((char *)to + row->offset), value->number, 1e-6);
 	} else {
 		for (int i = 0; i < value->n; i++)
-			put_number(row, to, i, value->number[i]);
+			put_settings_number(row, to, i, value->number[i]);
 		if (row->count)
 			*counter(row, to) = value->n;
 	}
@@ -377,7 +378,7 @@ static int read_one(const struct incise_setting *row, const config_setting_t *se
 	if (row->kind == SETTING_IS_OWN)
 		return row->read ? row->read(to, setting, path, err) : 0;
 	value_of_setting(&value, setting);
-	if (fits(row, &value)) {
+	if (fits_settings(row, &value)) {
 		store(row, &value, to);
 		return 0;
 	}
@@ -452,7 +453,7 @@ int incise_settings_set(const struct incise_setting *rows, const char *group,
 	locale = incise_c_locale_begin();
 	value_of_text(&value, row, text);
 	incise_c_locale_end(locale);
-	if (!fits(row, &value)) {
+	if (!fits_settings(row, &value)) {
 		say_expected(row, expected, sizeof(expected));
 		return incise_error_set(err, EINVAL,
 					"%s.%.60s: expected %s, found %.40s; correct it",
@@ -462,7 +463,7 @@ int incise_settings_set(const struct incise_setting *rows, const char *group,
 		store(row, &value, to);
 		return 0;
 	}
-	put_number(row, to, index, value.number[0]);
+	put_settings_number(row, to, index, value.number[0]);
 	if (*counter(row, to) <= index)
 		*counter(row, to) = index + 1;
 	return 0;
@@ -479,7 +480,7 @@ int incise_settings_check(const struct incise_setting *rows, const char *group,
 			continue;
 		value_of_member(&value, rows, of);
 		if (rows->kind == SETTING_IS_WORD ? has_word(rows, *value.number)
-						  : fits(rows, &value))
+						  : fits_settings(rows, &value))
 			continue;
 		say_expected(rows, expected, sizeof(expected));
 		snprintf(found, sizeof(found), "%d numbers", value.n);
@@ -544,7 +545,7 @@ static bool is_none(const struct incise_setting *row, const void *of)
 	if (*row->initial != '(' || row->kind > SETTING_IS_TRUTH)
 		return false;
 	value_of_member(&value, row, of);
-	return !fits(row, &value);
+	return !fits_settings(row, &value);
 }
 
 void incise_setting_text(const struct incise_setting *row, const void *of, char *text,

@@ -171,7 +171,7 @@ struct state {
 	double pose[BOARD_POSE];
 };
 
-static double *number_of(struct state *state, int i)
+static double *number_of_calibrate_board(struct state *state, int i)
 {
 	return i < BOARD_LENS ? &state->lens.number[i] : &state->pose[i - BOARD_LENS];
 }
@@ -222,7 +222,7 @@ static void gradient(const struct incise_board_views *views, const struct soluti
 
 	for (int i = 0; i < BOARD_LENS + BOARD_POSE; i++) {
 		double step = fmax(0.1 * sqrt(fmax(0, cov(s, i, i))), 1e-12);
-		double *x = number_of(&moved, i), was = *x, up, down;
+		double *x = number_of_calibrate_board(&moved, i), was = *x, up, down;
 
 		*x = was + step;
 		up = metric(views, &moved, k);
@@ -527,7 +527,7 @@ static void accumulate(struct board *b, const struct solution *s)
 }
 
 /* The unit of an unknown in which the normal matrix N has a diagonal of 1. */
-static double unit_of(const struct board *b, int i)
+static double unit_of_calibrate_board(const struct board *b, int i)
 {
 	return sqrt(b->normal[(size_t)i * b->n + i]);
 }
@@ -538,35 +538,36 @@ static int scale_normal(const struct board *b, double damping)
 	int n = b->n;
 
 	for (int i = 0; i < n; i++) {
-		if (!(unit_of(b, i) > 0))
+		if (!(unit_of_calibrate_board(b, i) > 0))
 			return -EDOM;
 		for (int j = 0; j < n; j++)
 			b->work[(size_t)i * n + j] = b->normal[(size_t)i * n + j] /
-						     unit_of(b, i) / unit_of(b, j);
+						     unit_of_calibrate_board(b, i) /
+						     unit_of_calibrate_board(b, j);
 		b->work[(size_t)i * n + i] += damping;
 	}
 	return 0;
 }
 
 /* (N + damping diag N) step = right */
-static int solve(const struct board *b, double damping, double *step)
+static int solve_calibrate_board(const struct board *b, double damping, double *step)
 {
 	int n = b->n;
 
 	if (scale_normal(b, damping))
 		return -EDOM;
 	for (int i = 0; i < n; i++)
-		step[i] = b->right[i] / unit_of(b, i);
+		step[i] = b->right[i] / unit_of_calibrate_board(b, i);
 	if (!incise_cholesky(b->work, n))
 		return -EDOM;
 	incise_cholesky_solve(b->work, n, step);
 	for (int i = 0; i < n; i++)
-		step[i] /= unit_of(b, i);
+		step[i] /= unit_of_calibrate_board(b, i);
 	return 0;
 }
 
-static void go(const struct board *b, const struct solution *from, const double *step,
-	       struct solution *to)
+static void go_calibrate_board(const struct board *b, const struct solution *from,
+			       const double *step, struct solution *to)
 {
 	*to = *from;
 	for (int i = 0; i < BOARD_LENS; i++)
@@ -590,11 +591,11 @@ static int descend(struct board *b, struct solution *s, double *step)
 	now = power(b, s);
 	accumulate(b, s);
 	for (int round = 0; round < ROUNDS && damping < 1e10; round++) {
-		if (solve(b, damping, step)) {
+		if (solve_calibrate_board(b, damping, step)) {
 			damping *= 10;
 			continue;
 		}
-		go(b, s, step, &try);
+		go_calibrate_board(b, s, step, &try);
 		next = power(b, &try);
 		if (!(next < now)) {
 			damping *= 10;
@@ -611,7 +612,8 @@ static int descend(struct board *b, struct solution *s, double *step)
 }
 
 /* Leave out a view that is far worse than the others; true if there is one. */
-static bool leave_out(struct board *b, const struct solution *s, double *rms)
+static bool leave_calibrate_board_out(struct board *b, const struct solution *s,
+				      double *rms)
 {
 	double sorted[INCISE_BOARD_VIEWS], middle;
 	bool any = false;
@@ -667,10 +669,10 @@ static int covariance(struct board *b, struct solution *s, double variance,
 		double *row = s->covariance + (size_t)i * n;
 
 		memset(row, 0, n * sizeof(*row));
-		row[i] = variance / unit_of(b, i);
+		row[i] = variance / unit_of_calibrate_board(b, i);
 		incise_cholesky_solve(b->work, n, row);
 		for (int j = 0; j < n; j++)
-			row[j] /= unit_of(b, j);
+			row[j] /= unit_of_calibrate_board(b, j);
 	}
 	s->n_unknowns = n;
 	s->plane_at = b->at[b->views->plane];
@@ -691,7 +693,7 @@ static int fit_views(struct board *b, struct solution *s, double *step,
 				err, EDOM,
 				"no lens and poses fit the corners; check that all "
 				"views are of one board, with corners in the same order");
-	} while (leave_out(b, s, fit->view_rms_px));
+	} while (leave_calibrate_board_out(b, s, fit->view_rms_px));
 	fit->views = 0;
 	for (int v = 0; v < b->views->n; v++)
 		fit->views += b->believed[v];
@@ -726,7 +728,8 @@ static int fit_views(struct board *b, struct solution *s, double *step,
 	return rc;
 }
 
-static int check(const struct incise_board_views *v, struct incise_error *err)
+static int check_calibrate_board(const struct incise_board_views *v,
+				 struct incise_error *err)
 {
 	size_t numbers;
 	double all;
@@ -775,7 +778,7 @@ int incise_calibrate_depth_board(const struct incise_board_views *views,
 	int rc;
 
 	*fit = (struct incise_board_fit){.mm_px = NAN, .u_mm_px = NAN, .n = views->n};
-	rc = check(views, err);
+	rc = check_calibrate_board(views, err);
 	if (rc)
 		return rc;
 	n = BOARD_LENS + BOARD_POSE * views->n;

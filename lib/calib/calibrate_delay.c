@@ -47,7 +47,7 @@ struct tangent {
 
 #define TINY 1e-12
 
-static void add_row(struct normal *normal, const double *row, double y)
+static void add_calibrate_delay_row(struct normal *normal, const double *row, double y)
 {
 	int m = normal->m;
 
@@ -69,7 +69,7 @@ static void add_normal(struct normal *to, const struct normal *from)
 }
 
 /* Columns are scaled alike first; one of zeros gets 0. False: singular. */
-static bool solve(const struct normal *normal, double *x)
+static bool solve_calibrate_delay(const struct normal *normal, double *x)
 {
 	double a[UNKNOWNS * UNKNOWNS] = {0}, scale[UNKNOWNS];
 	int m = normal->m;
@@ -103,7 +103,8 @@ static void tangent_normal(const struct tangent *t, int from, int to, int withou
 	normal->m = t->m - without;
 	for (int i = from; i < to && i < t->n; i++)
 		if (!isnan(t->rest[i]))
-			add_row(normal, t->row + (size_t)i * t->m, t->rest[i]);
+			add_calibrate_delay_row(normal, t->row + (size_t)i * t->m,
+						t->rest[i]);
 }
 
 /* --- rough delay: the peak of the correlation, and the start of contact --- */
@@ -194,7 +195,7 @@ static void coarse_normal(const struct delay *d, int shift, struct normal *norma
 			continue;
 		for (int k = 0; k < grid->columns; k++)
 			row[k] = grid->column[k][i + shift];
-		add_row(normal, row, grid->target[i]);
+		add_calibrate_delay_row(normal, row, grid->target[i]);
 	}
 }
 
@@ -204,7 +205,7 @@ static double correlation(const struct normal *normal)
 	double x[UNKNOWNS], explained = 0, slope = 0;
 	int m = normal->m;
 
-	if (!(normal->yy > 0) || !solve(normal, x))
+	if (!(normal->yy > 0) || !solve_calibrate_delay(normal, x))
 		return 0;
 	for (int k = 0; k < m; k++) {
 		explained += x[k] * normal->b[k];
@@ -215,7 +216,8 @@ static double correlation(const struct normal *normal)
 	return slope < 0 ? -explained : explained;
 }
 
-static int search(struct delay *d, struct incise_delay_fit *fit, struct incise_error *err)
+static int search_calibrate_delay(struct delay *d, struct incise_delay_fit *fit,
+				  struct incise_error *err)
 {
 	int lags = 2 * (d->range / COARSE_LAG) + 1, best = 0;
 	double *r = calloc((size_t)lags, sizeof(*r));
@@ -273,7 +275,7 @@ static double coarse_rest(const struct delay *d, int shift)
 	double x[UNKNOWNS], rest;
 
 	coarse_normal(d, shift, &normal);
-	if (!(normal.yy > 0) || !solve(&normal, x))
+	if (!(normal.yy > 0) || !solve_calibrate_delay(&normal, x))
 		return HUGE_VAL;
 	rest = normal.yy;
 	for (int k = 0; k < normal.m; k++)
@@ -362,14 +364,14 @@ static int bootstrap(struct delay *d, const struct tangent *t,
 		for (int b = 0; b < used; b++)
 			add_normal(&sum,
 				   &blocks[incise_random_draw(&state, (uint32_t)used)]);
-		drifts[draw] = solve(&sum, x) ? x[t->m - 1] : 0;
+		drifts[draw] = solve_calibrate_delay(&sum, x) ? x[t->m - 1] : 0;
 		without = (struct normal){.m = t->m - 1, .yy = sum.yy};
 		for (int i = 0; i < without.m; i++) {
 			without.b[i] = sum.b[i];
 			for (int j = 0; j <= i; j++)
 				without.a[i * without.m + j] = sum.a[i * sum.m + j];
 		}
-		delays[draw] = solve(&without, x) ? x[at] : 0;
+		delays[draw] = solve_calibrate_delay(&without, x) ? x[at] : 0;
 	}
 	ms = DELAY_STEP_S * 1e3;
 	fit->sd_ms = spread(delays, DRAWS, used) * ms;
@@ -379,7 +381,7 @@ static int bootstrap(struct delay *d, const struct tangent *t,
 
 		for (int b = 0; b < used; b++)
 			add_normal(&sum, &blocks[b]);
-		fit->drift_ms = solve(&sum, x) ? x[t->m - 1] * ms : NAN;
+		fit->drift_ms = solve_calibrate_delay(&sum, x) ? x[t->m - 1] * ms : NAN;
 	}
 	free(blocks);
 	/* the quantiles are widened as the standard deviation was */
@@ -418,9 +420,9 @@ static double make_tangent(struct delay *d, struct tangent *t)
 		for (int k = 0; k < grid->columns && !isnan(t->rest[i]); k++)
 			row[k] = delay_grid_at(grid->column[k], i, d->shift);
 		if (!isnan(t->rest[i]))
-			add_row(&normal, row, grid->target[i]);
+			add_calibrate_delay_row(&normal, row, grid->target[i]);
 	}
-	if (!solve(&normal, d->c))
+	if (!solve_calibrate_delay(&normal, d->c))
 		return -1;
 	for (int i = 0; i < grid->n; i++) {
 		double *row = t->row + (size_t)i * t->m, slope = 0, sum = 0;
@@ -459,7 +461,7 @@ static bool refine(struct delay *d, struct tangent *t)
 
 	for (int pass = 0; pass < ITERATIONS && moved > 1e-4 && squares > 0; pass++) {
 		tangent_normal(t, 0, t->n, 1, &normal);
-		if (!solve(&normal, step))
+		if (!solve_calibrate_delay(&normal, step))
 			return false;
 		shift = fmax(-3, fmin(3, step[d->grid.columns]));
 		contact =
@@ -527,7 +529,7 @@ static int fit_delay(struct delay *d, struct incise_delay_fit *fit,
 	int rc = measure_motion(d, err);
 
 	if (!rc)
-		rc = search(d, fit, err);
+		rc = search_calibrate_delay(d, fit, err);
 	if (rc)
 		return rc;
 	search_contact(d);

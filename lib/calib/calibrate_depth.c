@@ -32,7 +32,7 @@ static double repeats_sd(double *absolute, int n)
 }
 
 /* Half of Student's t for 95.45 %, by degrees of freedom. */
-static double widen(int dof)
+static double widen_calibrate_depth(int dof)
 {
 	static const double t[] = {13.97, 4.53, 3.31, 2.87, 2.65, 2.52, 2.43, 2.37};
 
@@ -84,7 +84,7 @@ static double repeats_u(const double *residual, int n, int fitted, int *effectiv
 	if (worth < fitted + 1)
 		worth = fitted + 1;
 	*effective = worth;
-	return sqrt(power / (n - fitted) / worth) * widen(worth - fitted);
+	return sqrt(power / (n - fitted) / worth) * widen_calibrate_depth(worth - fitted);
 }
 
 /* No camera over a cut is outside; calibration.conf takes more for depth_mm_px. */
@@ -100,8 +100,9 @@ static double repeats_u(const double *residual, int n, int fitted, int *effectiv
 #define MEDIANS_MAX 2000 /* pairs in the repeated median; its time is their square */
 #define ROUNDS 20
 
-static void add_part(struct incise_depth_fit *fit, const char *source, char type,
-		     double u, const char *unit, double sensitivity)
+static void add_calibrate_depth_part(struct incise_depth_fit *fit, const char *source,
+				     char type, double u, const char *unit,
+				     double sensitivity)
 {
 	fit->budget.part[fit->budget.n++] = (struct incise_calibration_part){
 		source, type, u, unit, sensitivity, u * sensitivity};
@@ -214,10 +215,12 @@ int incise_calibrate_depth_points(const struct incise_depth_points *points, bool
 		fit->largest_mm = fmax(fit->largest_mm, fabs(copy[i]) * fit->mm_px);
 	}
 	fit->sd_mm = k > 1 ? sqrt(fit->sd_mm / (k - 1)) * fit->mm_px : NAN;
-	add_part(fit, "known length", 'B', points->u_length_mm, "mm", 1 / mean);
-	add_part(fit, "ends of the length, in all repeats", 'B', points->u_px, "px",
-		 -fit->mm_px / mean);
-	add_part(fit, "repeatability", 'A', u_mean, "px", -fit->mm_px / mean);
+	add_calibrate_depth_part(fit, "known length", 'B', points->u_length_mm, "mm",
+				 1 / mean);
+	add_calibrate_depth_part(fit, "ends of the length, in all repeats", 'B',
+				 points->u_px, "px", -fit->mm_px / mean);
+	add_calibrate_depth_part(fit, "repeatability", 'A', u_mean, "px",
+				 -fit->mm_px / mean);
 	fit->u_mm_px = sum_parts(&fit->budget);
 	fit->u_full_px = hypot(points->u_px, u_mean);
 	fit->covariance = -fit->mm_px / mean * fit->u_full_px * fit->u_full_px;
@@ -277,8 +280,8 @@ out:
 }
 
 /* Least squares of the near pairs. */
-static void fit_line(const struct incise_depth_lengths *p, const bool *near,
-		     struct line *line)
+static void fit_calibrate_depth_line(const struct incise_depth_lengths *p,
+				     const bool *near, struct line *line)
 {
 	double sxy = 0;
 	int k = 0;
@@ -302,8 +305,9 @@ static void fit_line(const struct incise_depth_lengths *p, const bool *near,
 }
 
 /* Returns the number of near pairs; *changed: they are another set than before. */
-static int choose(const struct incise_depth_lengths *p, const struct line *line,
-		  double *residual, bool *near, bool *changed)
+static int choose_calibrate_depth(const struct incise_depth_lengths *p,
+				  const struct line *line, double *residual, bool *near,
+				  bool *changed)
 {
 	double spread;
 	int k = 0;
@@ -411,12 +415,12 @@ static int fit_pairs(const struct incise_depth_lengths *p, bool *near, double *r
 	if (rc)
 		return rc;
 	for (int round = 0; round < ROUNDS && changed; round++) {
-		k = choose(p, &line, residual, near, &changed);
+		k = choose_calibrate_depth(p, &line, residual, near, &changed);
 		fit->inliers = k;
 		rc = check_outliers(p->n, k, err);
 		if (rc)
 			return rc;
-		fit_line(p, near, &line);
+		fit_calibrate_depth_line(p, near, &line);
 	}
 	fit->low_px = HUGE_VAL;
 	fit->high_px = -HUGE_VAL;
@@ -445,8 +449,9 @@ static int fit_pairs(const struct incise_depth_lengths *p, bool *near, double *r
 	fit->mm_px = -line.slope;
 	mean_px = line.middle_px;
 	fit->full_px = mean_px + line.middle_mm / fit->mm_px;
-	add_part(fit, "scatter about the line", 'A', u_slope, "mm/px", 1);
-	add_part(fit, "scale of the gauge", 'B', p->u_scale, "1", fit->mm_px);
+	add_calibrate_depth_part(fit, "scatter about the line", 'A', u_slope, "mm/px", 1);
+	add_calibrate_depth_part(fit, "scale of the gauge", 'B', p->u_scale, "1",
+				 fit->mm_px);
 	fit->u_mm_px = sum_parts(&fit->budget);
 	/* full = middle + depth there / slope; a gauge's scale cancels but for the depth of
 	 * the middle, where its zero is. */

@@ -159,8 +159,9 @@ static void weigh_loads(struct work *w, double slope, double code_u_mV,
 	}
 }
 
-static void add_part(struct incise_calibrate_force *result, const char *source, char type,
-		     double u, const char *unit, double u_mV_N)
+static void add_calibrate_force_part(struct incise_calibrate_force *result,
+				     const char *source, char type, double u,
+				     const char *unit, double u_mV_N)
 {
 	result->budget.part[result->budget.n++] = (struct incise_calibration_part){
 		source, type, u, unit, u > 0 ? u_mV_N / u : 0, u_mV_N};
@@ -174,16 +175,18 @@ static void add_common(const struct work *w, struct incise_calibrate_force *resu
 
 	if (!w->masses)
 		return;
-	add_part(result, "gravity", 'B', s->gravity_u_m_s2, "m/s2",
-		 S * s->gravity_u_m_s2 / s->gravity_m_s2);
-	add_part(result, "density of air", 'B', s->air_u_kg_m3, "kg/m3",
-		 S * s->air_u_kg_m3 / s->weight_kg_m3);
-	add_part(result, "density of the weights", 'B', s->weight_u_kg_m3, "kg/m3",
-		 S * s->air_kg_m3 * s->weight_u_kg_m3 /
-			 (s->weight_kg_m3 * s->weight_kg_m3));
+	add_calibrate_force_part(result, "gravity", 'B', s->gravity_u_m_s2, "m/s2",
+				 S * s->gravity_u_m_s2 / s->gravity_m_s2);
+	add_calibrate_force_part(result, "density of air", 'B', s->air_u_kg_m3, "kg/m3",
+				 S * s->air_u_kg_m3 / s->weight_kg_m3);
+	add_calibrate_force_part(result, "density of the weights", 'B', s->weight_u_kg_m3,
+				 "kg/m3",
+				 S * s->air_kg_m3 * s->weight_u_kg_m3 /
+					 (s->weight_kg_m3 * s->weight_kg_m3));
 }
 
-static void fit_line(struct work *w, struct incise_calibrate_force *result)
+static void fit_calibrate_force_line(struct work *w,
+				     struct incise_calibrate_force *result)
 {
 	double slope = w->robust_slope, zero = 0, code_u_mV = 0, t;
 	double sw = 0, mx = 0, my = 0, sxx = 0, chi2 = 0;
@@ -238,12 +241,13 @@ static void fit_line(struct work *w, struct incise_calibrate_force *result)
 		result->misfit = sqrt(chi2 / (w->n_loads - 2));
 	scatter2 *= turn * turn * result->misfit * result->misfit;
 	scale2 = fmax(scale2, 0) * result->misfit * result->misfit;
-	add_part(result, "scatter of readings", 'A', result->scatter_sd_mV, "mV",
-		 sqrt(scatter2));
-	add_part(result, "resolution of the scale", 'B', w->load_u_N, "N", sqrt(scale2));
+	add_calibrate_force_part(result, "scatter of readings", 'A',
+				 result->scatter_sd_mV, "mV", sqrt(scatter2));
+	add_calibrate_force_part(result, "resolution of the scale", 'B', w->load_u_N, "N",
+				 sqrt(scale2));
 	if (code_u_mV > 0)
-		add_part(result, "resolution of the converter", 'B', code_u_mV, "mV",
-			 sqrt(code2));
+		add_calibrate_force_part(result, "resolution of the converter", 'B',
+					 code_u_mV, "mV", sqrt(code2));
 	add_common(w, result);
 	for (int i = 0; i < result->budget.n; i++)
 		u2 += result->budget.part[i].contribution *
@@ -279,7 +283,7 @@ struct way {
 	int n;
 };
 
-static void take(struct way *way, double reading)
+static void take_calibrate_force(struct way *way, double reading)
 {
 	if (!way->n || reading < way->least)
 		way->least = reading;
@@ -290,12 +294,13 @@ static void take(struct way *way, double reading)
 }
 
 /* Readings of a load by both ways. */
-static void gather(const struct work *w, int load, struct way *up, struct way *down)
+static void gather_calibrate_force(const struct work *w, int load, struct way *up,
+				   struct way *down)
 {
 	*up = *down = (struct way){0};
 	for (int i = 0; i < w->n; i++)
 		if (w->load_of[i] == load)
-			take(w->pairs[i].descending ? down : up, w->y[i]);
+			take_calibrate_force(w->pairs[i].descending ? down : up, w->y[i]);
 }
 
 static bool is_first_of_series(const struct work *w, int i)
@@ -340,7 +345,7 @@ static void measure_metrics(const struct work *w, struct incise_calibrate_force 
 		result->linearity = fmax(
 			result->linearity,
 			percent * fabs(load->mean_mV - result->zero_mV - S * load->F_N));
-		gather(w, k, &up, &down);
+		gather_calibrate_force(w, k, &up, &down);
 		if (up.n && down.n)
 			result->hysteresis =
 				fmax(result->hysteresis,
@@ -432,8 +437,8 @@ static bool positive(double value)
 	return value > 0 && isfinite(value);
 }
 
-static int check_setup(const struct incise_calibrate_force_setup *s,
-		       struct incise_error *err)
+static int check_calibrate_force_setup(const struct incise_calibrate_force_setup *s,
+				       struct incise_error *err)
 {
 	const double not_below_0[] = {s->gravity_u_m_s2, s->air_kg_m3, s->air_u_kg_m3,
 				      s->weight_u_kg_m3, s->scale_g,   s->step_mV};
@@ -658,7 +663,7 @@ static int fit(struct work *w, struct incise_calibrate_force *result,
 		rc = check_loads(w, err);
 	if (rc)
 		return rc;
-	fit_line(w, result);
+	fit_calibrate_force_line(w, result);
 	if (result->residual_sd_mV >
 	    SCATTER_MAX * result->sensitivity_mV_N * w->loads[w->n_loads - 1].F_N)
 		return incise_error_set(
@@ -680,7 +685,7 @@ int incise_calibrate_force(const struct incise_calibrate_force_pair *pairs, int 
 			   struct incise_error *err)
 {
 	struct work w = {.pairs = pairs, .n = n, .setup = setup};
-	int rc = check_setup(setup, err);
+	int rc = check_calibrate_force_setup(setup, err);
 
 	if (!rc && n < 1)
 		rc = incise_error_set(err, ENODATA, "no pairs of loads and readings");

@@ -408,7 +408,8 @@ static double apart_mm(const struct work *w, int k)
 }
 
 /* Points behind all turns but the first stroke's, whose turn was not measured. */
-static int gather(const struct work *w, double far_mm, struct moment *moments)
+static int gather_calibrate_stepper(const struct work *w, double far_mm,
+				    struct moment *moments)
 {
 	int m = 0;
 
@@ -513,8 +514,10 @@ static void try_about(const struct work *w, const struct moment *moments, int m,
 		}
 }
 
-static struct model search(const struct work *w, const struct moment *moments, int m,
-			   double D, double least_mm, bool stiction, bool rest)
+static struct model search_calibrate_stepper(const struct work *w,
+					     const struct moment *moments, int m,
+					     double D, double least_mm, bool stiction,
+					     bool rest)
 {
 	const double far_mm = LOOK * w->range_mm;
 	struct model best = {.chi2 = INFINITY};
@@ -552,12 +555,12 @@ static int measure_turn(const struct work *w, struct incise_calibrate_stepper *r
 		u_D2 += 4 * w->sd * w->sd / w->strokes[k].used /
 			((double)w->n_strokes * w->n_strokes);
 	mean_mm = turns[0] && turns[1] ? (D[0] + D[1]) / 2 : D[0] + D[1];
-	m = gather(w, LOOK * w->range_mm, moments);
+	m = gather_calibrate_stepper(w, LOOK * w->range_mm, moments);
 	spacing = m > 1 ? (moments[m - 1].s - moments[0].s) * (w->n_strokes - 1) / m : 0;
 	plain = try_model(w, moments, m, mean_mm, fmax(mean_mm, 0), 0, true);
-	stiction = search(w, moments, m, mean_mm, 0, true, false);
-	rest = search(w, moments, m, mean_mm, 4 * spacing, false, true);
-	both = search(w, moments, m, mean_mm, 4 * spacing, true, true);
+	stiction = search_calibrate_stepper(w, moments, m, mean_mm, 0, true, false);
+	rest = search_calibrate_stepper(w, moments, m, mean_mm, 4 * spacing, false, true);
+	both = search_calibrate_stepper(w, moments, m, mean_mm, 4 * spacing, true, true);
 	/* means of readings are no better than their last digit */
 	worth = WORTH * (w->sd * w->sd + pow(w->setup->resolution_N, 2) / 12);
 	if (stiction.chi2 < best->chi2 - worth)
@@ -777,8 +780,9 @@ static void measure_bends(const struct work *w, struct incise_calibrate_stepper 
 	result->linearity *= 100 / (w->slope * (result->high_mm - result->low_mm));
 }
 
-static void add_part(struct incise_calibrate_stepper *result, const char *source,
-		     char type, double u, const char *unit, double u_N_step)
+static void add_calibrate_stepper_part(struct incise_calibrate_stepper *result,
+				       const char *source, char type, double u,
+				       const char *unit, double u_N_step)
 {
 	result->budget.part[result->budget.n++] = (struct incise_calibration_part){
 		source, type, u, unit, u > 0 ? u_N_step / u : 0, u_N_step};
@@ -815,15 +819,15 @@ static void conclude(const struct work *w, struct incise_calibrate_stepper *resu
 	result->N_mm = w->slope;
 	result->N_step = w->slope * step;
 	line_u = w->sd * result->misfit / root;
-	add_part(result, "scatter of readings", 'A', w->sd * result->misfit, "N",
-		 line_u * step);
+	add_calibrate_stepper_part(result, "scatter of readings", 'A',
+				   w->sd * result->misfit, "N", line_u * step);
 	/* Noise of half a code and more makes means finer than a code. */
 	if (s->resolution_N > 0 && w->sd < s->resolution_N / 2)
-		add_part(result, "resolution of the sensor", 'B',
-			 s->resolution_N / sqrt(12), "N",
-			 s->resolution_N / sqrt(12) / root * step);
-	add_part(result, "sensitivity of the sensor", 'B', 100 * s->sensor_u, "%",
-		 result->N_step * s->sensor_u);
+		add_calibrate_stepper_part(result, "resolution of the sensor", 'B',
+					   s->resolution_N / sqrt(12), "N",
+					   s->resolution_N / sqrt(12) / root * step);
+	add_calibrate_stepper_part(result, "sensitivity of the sensor", 'B',
+				   100 * s->sensor_u, "%", result->N_step * s->sensor_u);
 	result->N_mm_u = result->N_step_u / step;
 	for (int k = 0; k < w->n_strokes; k++) {
 		double *zero = w->strokes[k].way > 0 ? &result->up_N : &result->down_N;

@@ -171,7 +171,7 @@ static double concentrate(struct tip_poses *sample, struct tip_solution *s, int 
 	return sum;
 }
 
-static void search(struct tip_poses *sample, struct tip_solution *best)
+static void search_calibrate_tip(struct tip_poses *sample, struct tip_solution *best)
 {
 	struct tip_solution finalists[FINALISTS], s;
 	double sums[FINALISTS], sum;
@@ -237,7 +237,7 @@ static bool tip_robust(struct tip_poses *poses, struct tip_solution *solution)
 	for (int i = 0; !whole && sample.pose && i < m; i++)
 		sample.pose[i] = poses->pose[(int64_t)i * poses->n / m];
 	if (sample.pose)
-		search(&sample, solution);
+		search_calibrate_tip(&sample, solution);
 	if (!whole)
 		free(sample.pose);
 	for (int step = 0; step < STEPS && changed; step++) {
@@ -590,8 +590,8 @@ static void rotation(double r[9], const double q[4])
 	}
 }
 
-static int take(struct tip_poses *to, const struct incise_tip_pose *from,
-		struct incise_error *err)
+static int take_calibrate_tip(struct tip_poses *to, const struct incise_tip_pose *from,
+			      struct incise_error *err)
 {
 	for (int i = 0; i < to->n; i++) {
 		const double *q = from[i].quaternion;
@@ -708,7 +708,7 @@ int incise_calibrate_tip(const struct incise_tip_pose *poses, int n, bool *inlie
 	own.list = malloc((size_t)n * sizeof(*own.list));
 	own.sorted = malloc((size_t)n * sizeof(*own.sorted));
 	rc = own.pose && own.list && own.sorted
-		     ? take(&own, poses, err)
+		     ? take_calibrate_tip(&own, poses, err)
 		     : incise_error_set(err, ENOMEM, "out of memory");
 	if (!rc)
 		rc = fit_poses(&own, poses, fit, err);

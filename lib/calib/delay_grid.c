@@ -118,8 +118,9 @@ static void put_cubics(double *to, int n, int64_t start_ns,
 	}
 }
 
-static void put(double *to, int n, int64_t start_ns,
-		const struct incise_delay_point *points, int n_points, double period_ns)
+static void put_delay_grid(double *to, int n, int64_t start_ns,
+			   const struct incise_delay_point *points, int n_points,
+			   double period_ns)
 {
 	if (period_ns < NS_PER_STEP / 4.0)
 		put_means(to, n, start_ns, points, n_points);
@@ -278,8 +279,9 @@ int delay_grid_make(struct delay_grid *grid, const struct incise_delay_point *mo
 	}
 	for (int k = 0; k <= 2 * grid->reach; k++)
 		grid->weight[k] /= sum;
-	put(grid->motion, grid->n, grid->start_ns, motion, n_motion, periods[0]);
-	put(grid->other, grid->n, grid->start_ns, other, n_other, periods[1]);
+	put_delay_grid(grid->motion, grid->n, grid->start_ns, motion, n_motion,
+		       periods[0]);
+	put_delay_grid(grid->other, grid->n, grid->start_ns, other, n_other, periods[1]);
 	mark_good(grid);
 	delay_grid_filter(grid, grid->other, grid->target);
 	make_speed(grid);

@@ -129,7 +129,7 @@ static void find_places(struct work *w, const struct robust_line *line,
 	r->place_u_mm = hypot(least_u, most_u);
 }
 
-static void compare(struct work *w, struct incise_redundancy *r)
+static void compare_redundancy(struct work *w, struct incise_redundancy *r)
 {
 	struct robust_line line = {0};
 	double mean = 0, squares = 0, distance;
@@ -215,7 +215,7 @@ int incise_redundancy(const struct incise_depth_pair *pairs, int n,
 		}
 		seconds = seconds_of(&w);
 		if (w.n >= PAIRS_MIN && seconds >= SECONDS_MIN)
-			compare(&w, result);
+			compare_redundancy(&w, result);
 		else
 			rc = incise_error_set(
 				err, ENODATA,

@@ -91,7 +91,7 @@ struct shifts {
 };
 
 /* A step of the block lo … hi, of three and more. */
-static void step(double *a, int n, int lo, int hi, struct shifts by)
+static void step_eigenvalues(double *a, int n, int lo, int hi, struct shifts by)
 {
 	double first = AT(lo, lo) - by.middle, second = AT(lo + 1, lo + 1) - by.middle;
 	double v[3] = {
@@ -203,13 +203,13 @@ bool incise_eigenvalues(double *a, int n, double complex eigenvalue[])
 			balance(a, n, lo, hi);
 			by = (struct shifts){0.75 * off, -0.4375 * off * off};
 		}
-		step(a, n, lo, hi, by);
+		step_eigenvalues(a, n, lo, hi, by);
 	}
 	return true;
 }
 
 /* Solve a x = x, with the largest pivot of each column; a pivot of 0 becomes as small as rounding. */
-static void solve(double *a, int n, double x[])
+static void solve_eigenvalues(double *a, int n, double x[])
 {
 	for (int m = 0; m < n; m++) {
 		int pivot = m;
@@ -255,7 +255,7 @@ void incise_eigenvector(const double *matrix, int n, double complex eigenvalue, 
 				for (int k = 0; k < n; k++)
 					AT(i, j) += matrix[i * n + k] * matrix[k * n + j];
 			}
-		solve(a, n, x);
+		solve_eigenvalues(a, n, x);
 		for (int i = 0; i < n; i++)
 			length = hypot(length, x[i]);
 		for (int i = 0; i < n; i++)

@@ -99,7 +99,7 @@ static struct answer respond(const struct piece *p, double t)
 }
 
 /* When the velocity becomes 0, after the begin; infinite when it does not. */
-static double turn(const struct piece *p)
+static double turn_plant(const struct piece *p)
 {
 	if (p->nu > 0) {
 		double across = (p->push - p->half_rate * p->v0) / p->nu;
@@ -161,7 +161,7 @@ static bool touches(const struct incise_plant *plant, double force_N)
 }
 
 /* One piece; returns the time it took, at most @left. */
-static double go(struct incise_plant *plant, double force_N, double left)
+static double go_plant(struct incise_plant *plant, double force_N, double left)
 {
 	bool touching = touches(plant, force_N), turns, meets;
 	double m = plant->mass_kg * N_S2_PER_MM_KG, x = plant->position_mm;
@@ -178,7 +178,7 @@ static double go(struct incise_plant *plant, double force_N, double left)
 	p.v0 = plant->velocity_mm_s;
 	p.push = (drive - copysign(plant->coulomb_N, sliding)) / m;
 	piece_rates(&p);
-	t = turn(&p);
+	t = turn_plant(&p);
 	turns = t < left;
 	end = turns ? t : left;
 	/* Without friction that turns and without a wall to meet it is one piece. */
@@ -220,5 +220,5 @@ void incise_plant_step(struct incise_plant *plant, double force_N, double period
 		return;
 	}
 	for (int i = 0; left > 0 && i < EVENTS_MAX; i++)
-		left -= go(plant, force_N, left);
+		left -= go_plant(plant, force_N, left);
 }

@@ -71,7 +71,8 @@ static int64_t to_ns(double t_s)
 }
 
 /* Each state's place in a run, in mm, mm/s, mm/s², N. */
-static double *place(const struct loop *loop, struct run *run, int state, int axis)
+static double *find_loop_place(const struct loop *loop, struct run *run, int state,
+			       int axis)
 {
 	double *const own[OWN_STATES] = {
 		&run->plant[axis].position_mm,	 &run->plant[axis].velocity_mm_s,
@@ -112,7 +113,7 @@ static void go_to(struct run *run, double t_s)
 	run->t_s = t_s;
 }
 
-static void take_pose(struct run *run, double arrival_s)
+static void take_pose_loop(struct run *run, double arrival_s)
 {
 	struct incise_tracker_sample sample = {
 		.t_ns = to_ns(arrival_s),
@@ -184,10 +185,10 @@ static void run_period(const struct loop *loop, struct run *run)
 		go_to(run, k * loop->tick_s);
 	}
 	for (int i = 1; i <= loop->poses; i++)
-		take_pose(run, i * loop->pose_s - lead_s);
+		take_pose_loop(run, i * loop->pose_s - lead_s);
 }
 
-static int size_of(const struct loop *loop)
+static int size_of_pose_loop(const struct loop *loop)
 {
 	return 3 * loop->states;
 }
@@ -195,7 +196,7 @@ static int size_of(const struct loop *loop)
 /* The effect of a period on each state, column by column. */
 static void measure_period(const struct loop *loop, double *matrix)
 {
-	int n = size_of(loop);
+	int n = size_of_pose_loop(loop);
 
 	for (int column = 0; column < n; column++) {
 		struct run run = {
@@ -204,12 +205,13 @@ static void measure_period(const struct loop *loop, double *matrix)
 			.n = loop->waiting,
 		};
 
-		*place(loop, &run, column / 3, column % 3) =
+		*find_loop_place(loop, &run, column / 3, column % 3) =
 			SIZE_MM * unit(loop, column / 3);
 		run_period(loop, &run);
 		for (int row = 0; row < n; row++)
-			matrix[row * n + column] = *place(loop, &run, row / 3, row % 3) /
-						   (SIZE_MM * unit(loop, row / 3));
+			matrix[row * n + column] =
+				*find_loop_place(loop, &run, row / 3, row % 3) /
+				(SIZE_MM * unit(loop, row / 3));
 	}
 }
 
@@ -303,14 +305,14 @@ struct incise_plant incise_pose_loop_plant(double mass_kg, double damping_N_s_mm
 static void set_along(const struct loop *loop, const double *matrix,
 		      double complex eigenvalue, double *work, double along[3])
 {
-	double *x = malloc((size_t)size_of(loop) * sizeof(*x));
+	double *x = malloc((size_t)size_of_pose_loop(loop) * sizeof(*x));
 
 	v3_copy(along, (double[3]){0});
 	if (!x)
 		return;
-	for (int i = 0; i < size_of(loop); i++)
+	for (int i = 0; i < size_of_pose_loop(loop); i++)
 		x[i] = 1 + i % 7;
-	incise_eigenvector(matrix, size_of(loop), eigenvalue, work, x);
+	incise_eigenvector(matrix, size_of_pose_loop(loop), eigenvalue, work, x);
 	v3_copy(along, v3_length(x) * carg(eigenvalue) > v3_length(x + 3) ? x : x + 3);
 	v3_unit(along, along, 0);
 	free(x);
@@ -339,7 +341,7 @@ double incise_pose_loop_swing(const struct incise_pose_loop *of,
 		loop.plant[i].position_mm = loop.plant[i].velocity_mm_s =
 			loop.plant[i].wall_mm = 0;
 	}
-	n = size_of(&loop);
+	n = size_of_pose_loop(&loop);
 	matrix = calloc(2 * (size_t)n * (size_t)n, sizeof(*matrix));
 	if (!matrix)
 		return INFINITY;

@@ -26,7 +26,7 @@
 /* More noise counts as this. */
 #define FAR_MM 1e4
 
-static double within(double x, double least, double most)
+static double keep_within_predict(double x, double least, double most)
 {
 	return x >= least ? fmin(x, most) : least;
 }
@@ -54,18 +54,19 @@ static void set_gains(struct incise_predict *p, double index)
 void incise_predict_init(struct incise_predict *p,
 			 const struct incise_tracker_info *tracker, double noise_mm)
 {
-	double period_s = 1 / within(tracker->rate_hz, 1, 1e4);
+	double period_s = 1 / keep_within_predict(tracker->rate_hz, 1, 1e4);
 	double change = sqrt(HAND_MM2_S5 * period_s);
 
 	*p = (struct incise_predict){
 		.period_s = period_s,
 		.gap_ns = (int64_t)(GAP_PERIODS * period_s * INCISE_NS_PER_S),
-		.latency_ns =
-			(int64_t)within((double)tracker->latency_ns, 0, INCISE_NS_PER_S),
+		.latency_ns = (int64_t)keep_within_predict((double)tracker->latency_ns, 0,
+							   INCISE_NS_PER_S),
 	};
 	incise_double_predict_init(&p->now);
 	set_gains(p, change * period_s * period_s /
-			     within(noise_mm > 0 ? noise_mm : NOISE_MM, 1e-9, FAR_MM));
+			     keep_within_predict(noise_mm > 0 ? noise_mm : NOISE_MM, 1e-9,
+						 FAR_MM));
 }
 
 void incise_predict_filter(const struct incise_predict *p,

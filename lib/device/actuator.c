@@ -74,8 +74,9 @@ const struct incise_setting incise_actuator_settings[] = {
 };
 
 /* Check values against each other. */
-static int check(const struct incise_actuator *actuator, const config_setting_t *group,
-		 const char *path, struct incise_error *err)
+static int check_actuator(const struct incise_actuator *actuator,
+			  const config_setting_t *group, const char *path,
+			  struct incise_error *err)
 {
 	double step_mm = incise_actuator_step_mm(actuator);
 	double rate = actuator->velocity_mm_s / step_mm, pulse_ns, jerk;
@@ -154,5 +155,5 @@ int incise_actuator_read(struct incise_actuator *actuator, const config_setting_
 	rc = incise_actuator_lines_check(actuator, group, path, err);
 	if (!rc && can)
 		rc = incise_actuator_can_check(actuator, can, path, err);
-	return rc ? rc : check(actuator, group, path, err);
+	return rc ? rc : check_actuator(actuator, group, path, err);
 }

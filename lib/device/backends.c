@@ -20,7 +20,7 @@
 static const struct incise_backend *const built_in[] = {&incise_stepper_kernel};
 
 /* Names become parts of paths. */
-static bool plain(const char *name)
+static bool is_plain_backend(const char *name)
 {
 	size_t length = strspn(name, "abcdefghijklmnopqrstuvwxyz0123456789_");
 
@@ -28,7 +28,7 @@ static bool plain(const char *name)
 }
 
 /* "sim, kernel, gpio": all backends of a kind. */
-static void list(const char *kind, const char *in, char *text, size_t size)
+static void list_backends(const char *kind, const char *in, char *text, size_t size)
 {
 	size_t prefix = strlen(kind), length;
 	DIR *dir = in ? opendir(in) : NULL;
@@ -60,16 +60,16 @@ int incise_backend_names(const char *kind, char names[][32], int capacity)
 	char known[400], in[PATH_MAX], *rest = known, *name;
 	int n = 0;
 
-	list(kind, incise_module_folder(in, sizeof(in)) ? in : NULL, known,
-	     sizeof(known));
+	list_backends(kind, incise_module_folder(in, sizeof(in)) ? in : NULL, known,
+		      sizeof(known));
 	while ((name = strsep(&rest, ", ")) && n < capacity)
 		if (*name && strcmp(name, BUILT_IN_SIM))
 			snprintf(names[n++], sizeof(*names), "%.31s", name);
 	return n;
 }
 
-static int load(struct incise_loaded *loaded, const char *kind, const char *name,
-		const char *path, const char *where, struct incise_error *err)
+static int load_backends(struct incise_loaded *loaded, const char *kind, const char *name,
+			 const char *path, const char *where, struct incise_error *err)
 {
 	const struct incise_backend *backend;
 	struct incise_module module;
@@ -111,12 +111,12 @@ int incise_backend_find(struct incise_loaded *loaded, const char *kind, const ch
 			*loaded = (struct incise_loaded){built_in[i], NULL};
 			return 0;
 		}
-	if (has_folder && plain(name)) {
+	if (has_folder && is_plain_backend(name)) {
 		snprintf(path, sizeof(path), "%s/%s_%s.so", in, kind, name);
 		if (!stat(path, &status) && S_ISREG(status.st_mode))
-			return load(loaded, kind, name, path, where, err);
+			return load_backends(loaded, kind, name, path, where, err);
 	}
-	list(kind, has_folder ? in : NULL, known, sizeof(known));
+	list_backends(kind, has_folder ? in : NULL, known, sizeof(known));
 	return incise_error_set(err, ENODEV,
 				"%s: no such backend \"%.40s\"; there are: %s", where,
 				name, known);

@@ -13,7 +13,7 @@
 
 #define RATE_MOST_HZ 100000
 
-static const struct daq_feed *of(const struct incise_force *force)
+static const struct daq_feed *daq_feed_of(const struct incise_force *force)
 {
 	return (const struct daq_feed *)force;
 }
@@ -86,7 +86,7 @@ enum daq_wait daq_feed_wait(struct daq_feed *feed, int fd, int ms)
 	return n > 0 ? DAQ_READY : DAQ_QUIET;
 }
 
-static void count(_Atomic uint64_t *counter, uint64_t n)
+static void count_daq_feed(_Atomic uint64_t *counter, uint64_t n)
 {
 	atomic_fetch_add_explicit(counter, n, memory_order_relaxed);
 }
@@ -96,14 +96,14 @@ void daq_feed_put(struct daq_feed *feed, int64_t t_ns, int32_t code)
 	struct incise_force_sample sample = {t_ns, feed->seq++, code};
 
 	if (code <= 0 || code >= (int32_t)((UINT32_C(1) << feed->info.bits) - 1))
-		count(&feed->clipped, 1);
+		count_daq_feed(&feed->clipped, 1);
 	if (incise_ring_put(&feed->ring, &sample)) {
 		feed->full = false;
 		return;
 	}
-	count(&feed->lost, 1);
+	count_daq_feed(&feed->lost, 1);
 	if (!feed->full)
-		count(&feed->overflows, 1);
+		count_daq_feed(&feed->overflows, 1);
 	feed->full = true;
 }
 
@@ -112,8 +112,8 @@ void daq_feed_lose(struct daq_feed *feed, uint64_t n)
 	if (!n)
 		return;
 	feed->seq += n;
-	count(&feed->lost, n);
-	count(&feed->overflows, 1);
+	count_daq_feed(&feed->lost, n);
+	count_daq_feed(&feed->overflows, 1);
 }
 
 void daq_feed_end(struct daq_feed *feed, int error, const char *what)
@@ -139,7 +139,7 @@ int daq_feed_read(struct incise_force *force, struct incise_force_sample *sample
 
 void daq_feed_info(const struct incise_force *force, struct incise_force_info *info)
 {
-	const struct daq_feed *feed = of(force);
+	const struct daq_feed *feed = daq_feed_of(force);
 
 	*info = feed->info;
 	info->clipped = atomic_load_explicit(&feed->clipped, memory_order_relaxed);
@@ -148,12 +148,12 @@ void daq_feed_info(const struct incise_force *force, struct incise_force_info *i
 
 uint64_t daq_feed_lost(const struct incise_force *force)
 {
-	return atomic_load_explicit(&of(force)->lost, memory_order_relaxed);
+	return atomic_load_explicit(&daq_feed_of(force)->lost, memory_order_relaxed);
 }
 
 int daq_feed_cause(struct incise_force *force, char *text, size_t size)
 {
-	const struct daq_feed *feed = of(force);
+	const struct daq_feed *feed = daq_feed_of(force);
 	int error = atomic_load_explicit(&feed->error, memory_order_acquire);
 
 	return snprintf(text, size, "%s", error ? feed->cause.text : "");

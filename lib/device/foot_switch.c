@@ -96,46 +96,51 @@ int incise_foot_switch_key(const char *name)
 
 /* --- opening ------------------------------------------------------------------------------ */
 
-static bool has(const unsigned long *bits, unsigned int n)
+static bool has_foot_switch_bit(const unsigned long *bits, unsigned int n)
 {
 	return bits[n / LONG_BITS] >> n % LONG_BITS & 1;
 }
 
-static int refuse(const struct incise_foot_switch_setup *setup, int code,
-		  const char *what, struct incise_error *err)
+static int refuse_foot_switch(const struct incise_foot_switch_setup *setup, int code,
+			      const char *what, struct incise_error *err)
 {
 	return incise_error_set(err, code, "foot_switch.device: %s: %s", setup->device,
 				what);
 }
 
 /* Whether it has the key, unpressed: after a grab no program would see a pressed key released. */
-static int check(const struct incise_foot_switch *foot,
-		 const struct incise_foot_switch_setup *setup, struct incise_error *err)
+static int check_foot_switch(const struct incise_foot_switch *foot,
+			     const struct incise_foot_switch_setup *setup,
+			     struct incise_error *err)
 {
 	unsigned long known[KEY_LONGS] = {0}, pressed[KEY_LONGS] = {0};
 	int rc;
 
 	if (ioctl(foot->fd, EVIOCGBIT(EV_KEY, sizeof(known)), known) < 0) {
 		rc = errno == EINVAL ? ENOTTY : errno;
-		return refuse(setup, rc,
-			      rc == ENOTTY ? "not an input device; see /dev/input/by-id"
-					   : strerror(rc),
-			      err);
+		return refuse_foot_switch(
+			setup, rc,
+			rc == ENOTTY ? "not an input device; see /dev/input/by-id"
+				     : strerror(rc),
+			err);
 	}
-	if (!has(known, foot->key))
-		return refuse(setup, ENXIO,
-			      "has no such key; see foot_switch.key in rig.conf(5)", err);
+	if (!has_foot_switch_bit(known, foot->key))
+		return refuse_foot_switch(
+			setup, ENXIO,
+			"has no such key; see foot_switch.key in rig.conf(5)", err);
 	if (ioctl(foot->fd, EVIOCGKEY(sizeof(pressed)), pressed) < 0)
-		return refuse(setup, errno, strerror(errno), err);
-	if (has(pressed, foot->key))
-		return refuse(setup, EBUSY, "the switch is pressed; release it", err);
+		return refuse_foot_switch(setup, errno, strerror(errno), err);
+	if (has_foot_switch_bit(pressed, foot->key))
+		return refuse_foot_switch(setup, EBUSY,
+					  "the switch is pressed; release it", err);
 	if (ioctl(foot->fd, EVIOCGRAB, 1) < 0) {
 		rc = errno;
-		return refuse(setup, rc,
-			      rc == EBUSY ? "another program has it open exclusively; "
-					    "end it"
-					  : strerror(rc),
-			      err);
+		return refuse_foot_switch(
+			setup, rc,
+			rc == EBUSY ? "another program has it open exclusively; "
+				      "end it"
+				    : strerror(rc),
+			err);
 	}
 	return 0;
 }
@@ -146,16 +151,17 @@ static int open_device(struct incise_foot_switch *foot,
 {
 	foot->fd = open(setup->device, O_RDONLY | O_NONBLOCK | O_CLOEXEC | O_NOCTTY);
 	if (foot->fd >= 0)
-		return check(foot, setup, err);
+		return check_foot_switch(foot, setup, err);
 	if (errno == ENOENT)
-		return refuse(setup, ENOENT, "no such device; plug it in", err);
+		return refuse_foot_switch(setup, ENOENT, "no such device; plug it in",
+					  err);
 	if (errno == EACCES)
-		return refuse(
+		return refuse_foot_switch(
 			setup, EACCES,
 			"this user may not read it; rig.conf(5) has the udev rule for "
 			"it",
 			err);
-	return refuse(setup, errno, strerror(errno), err);
+	return refuse_foot_switch(setup, errno, strerror(errno), err);
 }
 
 struct incise_foot_switch *incise_foot_switch_open(
@@ -195,7 +201,8 @@ void incise_foot_switch_close(struct incise_foot_switch *foot_switch)
 
 /* --- reading ------------------------------------------------------------------------------ */
 
-static int count(struct incise_foot_switch *foot, const struct input_event *event)
+static int count_foot_switch(struct incise_foot_switch *foot,
+			     const struct input_event *event)
 {
 	if (event->type == EV_SYN && event->code == SYN_DROPPED)
 		foot->dropping = true;
@@ -224,7 +231,7 @@ int incise_foot_switch_read(struct incise_foot_switch *foot_switch)
 		if ((size_t)n % sizeof(*events))
 			return -EIO;
 		for (size_t i = 0; i < (size_t)n / sizeof(*events); i++)
-			presses += count(foot_switch, &events[i]);
+			presses += count_foot_switch(foot_switch, &events[i]);
 	}
 	return presses;
 }

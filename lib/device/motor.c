@@ -69,7 +69,7 @@ void incise_actuator_limits(const struct incise_actuator *actuator,
 	};
 }
 
-static struct incise_motor *of(const struct incise_stepper *stepper)
+static struct incise_motor *motor_of(const struct incise_stepper *stepper)
 {
 	return (struct incise_motor *)stepper;
 }
@@ -101,7 +101,7 @@ static int64_t stood_still(struct incise_motor *motor)
  * Read the status. While a writer is interrupted the last one stays valid, but not for
  * more than UNREAD_MAX reads.
  */
-static int look(struct incise_motor *motor)
+static int look_motor(struct incise_motor *motor)
 {
 	int rc = incise_page_get_status(motor->slot, &motor->last);
 
@@ -123,7 +123,7 @@ static int look(struct incise_motor *motor)
 /* 0 if a target would move it. */
 static int drivable(struct incise_motor *motor)
 {
-	int rc = motor->watches ? -EPERM : look(motor);
+	int rc = motor->watches ? -EPERM : look_motor(motor);
 
 	if (rc)
 		return rc;
@@ -137,7 +137,7 @@ static int drivable(struct incise_motor *motor)
 
 static INCISE_REALTIME int motor_set(struct incise_stepper *stepper, double position_mm)
 {
-	struct incise_motor *motor = of(stepper);
+	struct incise_motor *motor = motor_of(stepper);
 	int rc;
 
 	if (!isfinite(position_mm))
@@ -154,7 +154,7 @@ static INCISE_REALTIME int motor_set(struct incise_stepper *stepper, double posi
 
 static int motor_jog(struct incise_stepper *stepper, double velocity_mm_s)
 {
-	struct incise_motor *motor = of(stepper);
+	struct incise_motor *motor = motor_of(stepper);
 	int rc;
 
 	if (!isfinite(velocity_mm_s))
@@ -172,9 +172,9 @@ static int motor_jog(struct incise_stepper *stepper, double velocity_mm_s)
 static INCISE_REALTIME int motor_status(struct incise_stepper *stepper,
 					struct incise_stepper_status *status)
 {
-	struct incise_motor *motor = of(stepper);
+	struct incise_motor *motor = motor_of(stepper);
 	const struct incise_stepper_motor_status *last = &motor->last;
-	int rc = look(motor);
+	int rc = look_motor(motor);
 
 	*status = (struct incise_stepper_status){
 		.t_ns = last->t_ns,
@@ -213,7 +213,7 @@ static int reported(struct incise_motor *motor, int rc, const char *what,
 		return 0;
 	if (said->code)
 		return incise_error_set(err, -rc, "%s", said->text);
-	look(motor);
+	look_motor(motor);
 	if (motor->watches)
 		why = "it was opened only to watch; use the program that drives it";
 	else if (motor->last.faults & INCISE_STEPPER_FAULT_GONE || rc == -ENODEV)
@@ -233,7 +233,7 @@ static int reported(struct incise_motor *motor, int rc, const char *what,
 
 static int motor_enable(struct incise_stepper *stepper, struct incise_error *err)
 {
-	struct incise_motor *motor = of(stepper);
+	struct incise_motor *motor = motor_of(stepper);
 	struct incise_error why = {0};
 	int rc = motor->watches ? -EPERM : motor->ops->enable(motor, &why);
 
@@ -243,7 +243,7 @@ static int motor_enable(struct incise_stepper *stepper, struct incise_error *err
 
 static int motor_clear(struct incise_stepper *stepper, struct incise_error *err)
 {
-	struct incise_motor *motor = of(stepper);
+	struct incise_motor *motor = motor_of(stepper);
 	struct incise_error why = {0};
 	int rc = motor->watches ? -EPERM : motor->ops->clear(motor, &why);
 
@@ -252,7 +252,7 @@ static int motor_clear(struct incise_stepper *stepper, struct incise_error *err)
 
 static int motor_wait(struct incise_stepper *stepper, int64_t ns)
 {
-	struct incise_motor *motor = of(stepper);
+	struct incise_motor *motor = motor_of(stepper);
 	struct timespec wait = {ns / INCISE_NS_PER_S, ns % INCISE_NS_PER_S};
 
 	if (motor->ops->wait)
@@ -264,7 +264,7 @@ static int motor_wait(struct incise_stepper *stepper, int64_t ns)
 
 static int motor_disable(struct incise_stepper *stepper, struct incise_error *err)
 {
-	struct incise_motor *motor = of(stepper);
+	struct incise_motor *motor = motor_of(stepper);
 	int rc = motor->watches ? -EPERM : motor->ops->disable(motor);
 	struct incise_profile_limits limits;
 	int64_t left_ns;
@@ -278,7 +278,7 @@ static int motor_disable(struct incise_stepper *stepper, struct incise_error *er
 		left_ns += (int64_t)(motor->actuator.travel_mm /
 				     motor->actuator.velocity_mm_s * INCISE_NS_PER_S);
 	while (!rc) {
-		rc = look(motor);
+		rc = look_motor(motor);
 		if (rc || motor->last.state == INCISE_STEPPER_STATE_DISABLED ||
 		    motor->last.state == INCISE_STEPPER_STATE_FAULT)
 			break;
@@ -296,7 +296,7 @@ static int motor_disable(struct incise_stepper *stepper, struct incise_error *er
 static void motor_info(const struct incise_stepper *stepper,
 		       struct incise_stepper_info *info)
 {
-	const struct incise_motor *motor = of(stepper);
+	const struct incise_motor *motor = motor_of(stepper);
 	const struct incise_actuator *actuator = &motor->actuator;
 
 	*info = (struct incise_stepper_info){
@@ -322,13 +322,13 @@ static void motor_info(const struct incise_stepper *stepper,
 
 static void motor_close(struct incise_stepper *stepper)
 {
-	of(stepper)->ops->close(of(stepper));
+	motor_of(stepper)->ops->close(motor_of(stepper));
 }
 
 static int motor_homing(struct incise_stepper *stepper,
 			struct incise_stepper_homing *homing)
 {
-	const struct incise_motor *motor = of(stepper);
+	const struct incise_motor *motor = motor_of(stepper);
 
 	homing->speed_mm_s = motor->actuator.home_mm_s;
 	homing->home_mm = motor->actuator.home_mm;
@@ -344,8 +344,8 @@ static int motor_homing(struct incise_stepper *stepper,
 /* Only edges of the home input are stored; the edge of a limit is where it halts. */
 static int motor_edge(struct incise_stepper *stepper, struct incise_stepper_edge *edge)
 {
-	struct incise_motor *motor = of(stepper);
-	int rc = look(motor);
+	struct incise_motor *motor = motor_of(stepper);
+	int rc = look_motor(motor);
 
 	edge->seen = motor->lines & INCISE_STEPPER_LINE_HOME &&
 		     motor->last.flags & INCISE_STEPPER_FLAG_HOME_SEEN;
@@ -355,7 +355,7 @@ static int motor_edge(struct incise_stepper *stepper, struct incise_stepper_edge
 
 static int motor_origin(struct incise_stepper *stepper, double position_mm, bool homed)
 {
-	struct incise_motor *motor = of(stepper);
+	struct incise_motor *motor = motor_of(stepper);
 	int32_t steps = incise_actuator_steps(&motor->actuator, position_mm);
 	int rc = drivable(motor);
 

@@ -20,13 +20,13 @@
 #define KNOWN_FAULTS ((1U << INCISE_STEPPER_FAULTS) - 1 - INCISE_STEPPER_FAULT_TRAVEL)
 #define KNOWN_INPUTS ((1U << INCISE_STEPPER_INPUTS) - 1)
 
-static void begin(uint32_t *words, uint32_t seq)
+static void begin_page(uint32_t *words, uint32_t seq)
 {
 	__atomic_store_n(words, seq, __ATOMIC_RELAXED);
 	__atomic_thread_fence(__ATOMIC_RELEASE);
 }
 
-static void end(uint32_t *words, uint32_t seq)
+static void end_page(uint32_t *words, uint32_t seq)
 {
 	__atomic_store_n(words, seq, __ATOMIC_RELEASE);
 }
@@ -62,9 +62,9 @@ static INCISE_REALTIME void write_whole(uint32_t *words, const void *from, size_
 {
 	uint32_t seq = __atomic_load_n(words, __ATOMIC_RELAXED) & ~1u;
 
-	begin(words, seq + 1);
+	begin_page(words, seq + 1);
 	put(words, from, n);
-	end(words, seq + 2);
+	end_page(words, seq + 2);
 }
 
 void incise_page_put_setpoint(struct incise_stepper_setpoint *slot, unsigned int mode,

@@ -32,7 +32,7 @@ static const struct {
 	{'~', '~', false, "not a pose: no rotation, or not finite"},
 };
 
-static int find(char status)
+static int find_pose_flags(char status)
 {
 	for (int i = 0; i < (int)(sizeof(flags) / sizeof(*flags)); i++)
 		if (status >= flags[i].first && status <= flags[i].last)
@@ -47,14 +47,14 @@ static bool is_flag(char status)
 
 bool incise_pose_usable(char status)
 {
-	int at = is_flag(status) ? find(status) : -1;
+	int at = is_flag(status) ? find_pose_flags(status) : -1;
 
 	return !is_flag(status) || (at >= 0 && flags[at].usable);
 }
 
 const char *incise_pose_flag(char status)
 {
-	int at = find(status);
+	int at = find_pose_flags(status);
 
 	if (!is_flag(status))
 		return "no flag";
@@ -82,8 +82,8 @@ void incise_pose_counts_add(struct incise_pose_counts *counts,
 }
 
 /* Append the flags that are usable, or those that are not, each with its meaning. */
-static int list(const struct incise_pose_counts *counts, bool usable, char *text,
-		size_t size, int n)
+static int list_pose_flags(const struct incise_pose_counts *counts, bool usable,
+			   char *text, size_t size, int n)
 {
 	const char *before = "";
 
@@ -115,7 +115,7 @@ int incise_pose_counts_text(const struct incise_pose_counts *counts, char *text,
 		n = snprintf(text, size, "%llu of %llu poses were not used: ",
 			     (unsigned long long)counts->unusable,
 			     (unsigned long long)counts->poses);
-		n = list(counts, false, text, size, n);
+		n = list_pose_flags(counts, false, text, size, n);
 	}
 	if (!doubtful)
 		return n;
@@ -123,5 +123,5 @@ int incise_pose_counts_text(const struct incise_pose_counts *counts, char *text,
 	n += snprintf(text + at, size - at,
 		      "%s%llu of %llu poses are doubtful: ", n ? "; " : "",
 		      (unsigned long long)doubtful, (unsigned long long)counts->poses);
-	return list(counts, true, text, size, n);
+	return list_pose_flags(counts, true, text, size, n);
 }

@@ -59,7 +59,7 @@ static int64_t write_line(struct incise_pulser *p, enum incise_pulser_output out
 	return now;
 }
 
-static void look(struct incise_pulser *p, int64_t now)
+static void look_pulser(struct incise_pulser *p, int64_t now)
 {
 	bool moves = p->motion.powered && (p->given < p->steps.n || !p->motion.resting);
 	int inputs = p->ops->inputs(p->world);
@@ -138,7 +138,7 @@ static void lead(struct incise_pulser *p, int64_t due, int64_t want)
 	int64_t now = p->ops->now(p->world), lag;
 
 	/* The last check of the inputs before this step. */
-	look(p, now);
+	look_pulser(p, now);
 	if (!p->motion.powered)
 		return;
 	p->given++;
@@ -179,7 +179,7 @@ static void tick(struct incise_pulser *p, int64_t now, int64_t due)
 {
 	struct incise_motion *m = &p->motion;
 
-	look(p, now);
+	look_pulser(p, now);
 	if (m->powered)
 		fault_at(p, incise_motion_listen(m, now), now);
 	if (!m->powered)
@@ -236,7 +236,7 @@ int64_t incise_pulser_run(struct incise_pulser *p)
 		trail(p, now, due);
 		break;
 	case NEXT_LOOK:
-		look(p, now);
+		look_pulser(p, now);
 		p->base_ns = now;
 		incise_motion_publish(&p->motion, now);
 		break;
@@ -257,7 +257,7 @@ int incise_pulser_init(struct incise_pulser *p,
 	p->base_ns = now;
 	/* Long enough ago for all shortest times. */
 	p->lead_ns = p->trail_ns = p->dir_ns = p->lead_want_ns = now - 1000000000;
-	look(p, now);
+	look_pulser(p, now);
 	power_off(p, now);
 	return p->motion.status.faults ? -EIO : 0;
 }
@@ -268,7 +268,7 @@ int incise_pulser_enable(struct incise_pulser *p)
 	int64_t now = p->ops->now(p->world);
 	int rc;
 
-	look(p, now);
+	look_pulser(p, now);
 	rc = incise_motion_power_on(m, now);
 	if (rc <= 0)
 		return rc;
@@ -293,7 +293,7 @@ int incise_pulser_clear(struct incise_pulser *p)
 	int64_t now = p->ops->now(p->world);
 	int rc;
 
-	look(p, now);
+	look_pulser(p, now);
 	rc = incise_motion_clear(&p->motion);
 	incise_motion_publish(&p->motion, now);
 	return rc;

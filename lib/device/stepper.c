@@ -72,7 +72,7 @@ static int sleep_ns(struct incise_stepper *stepper, int64_t ns)
 }
 
 /* Report an error of the backend in one line. */
-static int refused(const struct home *h, int rc)
+static int refused_stepper(const struct home *h, int rc)
 {
 	return rc ? incise_error_set(h->err, -rc,
 				     "homing %s: %s; see `incise stepper "
@@ -105,7 +105,7 @@ static int fault_error(const struct home *h)
 /*
  * Wait for one poll, then read the status. The limit that homing looks for is no fault.
  */
-static int look(struct home *h)
+static int look_stepper(struct home *h)
 {
 	int rc;
 
@@ -124,7 +124,7 @@ static int look(struct home *h)
 	if (!rc || rc == -EINTR)
 		rc = incise_stepper_status(h->stepper, &h->status);
 	if (rc)
-		return refused(h, rc);
+		return refused_stepper(h, rc);
 	if (hit_limit(h))
 		return 0;
 	if (h->status.faults & ~INCISE_STEPPER_FAULT_TRAVEL ||
@@ -145,13 +145,13 @@ static int recover(struct home *h)
 	int rc = 0;
 
 	while (!rc && h->status.state == INCISE_STEPPER_STATE_STOPPING)
-		rc = look(h);
+		rc = look_stepper(h);
 	if (!rc && h->status.state == INCISE_STEPPER_STATE_FAULT)
 		rc = incise_stepper_clear(h->stepper, h->err);
 	if (!rc)
 		rc = incise_stepper_enable(h->stepper, h->err);
 	if (!rc)
-		rc = refused(h, incise_stepper_status(h->stepper, &h->status));
+		rc = refused_stepper(h, incise_stepper_status(h->stepper, &h->status));
 	return rc;
 }
 
@@ -164,9 +164,9 @@ static int rest(struct home *h)
 		if (hit_limit(h))
 			rc = recover(h);
 		else
-			rc = refused(h, incise_stepper_jog(h->stepper, 0));
+			rc = refused_stepper(h, incise_stepper_jog(h->stepper, 0));
 		if (!rc)
-			rc = look(h);
+			rc = look_stepper(h);
 	} while (!rc && (hit_limit(h) || !at_rest(h)));
 	return rc;
 }
@@ -174,7 +174,8 @@ static int rest(struct home *h)
 /* Name the place where it stands. */
 static int name_place(struct home *h, double position_mm, bool homed)
 {
-	int rc = refused(h, h->stepper->ops->origin(h->stepper, position_mm, homed));
+	int rc = refused_stepper(h,
+				 h->stepper->ops->origin(h->stepper, position_mm, homed));
 
 	if (rc)
 		return rc;
@@ -190,9 +191,9 @@ static int go_to(struct home *h, double position_mm)
 	int rc;
 
 	do {
-		rc = refused(h, incise_stepper_set(h->stepper, position_mm));
+		rc = refused_stepper(h, incise_stepper_set(h->stepper, position_mm));
 		if (!rc)
-			rc = look(h);
+			rc = look_stepper(h);
 		if (!rc && hit_limit(h))
 			rc = fault_error(h);
 	} while (!rc &&
@@ -215,13 +216,13 @@ static int seek(struct home *h, double mm_s, double from_mm, bool until, double 
 	int rc = name_place(h, from_mm, false);
 
 	if (!rc)
-		rc = refused(h, h->stepper->ops->edge(h->stepper, &before));
+		rc = refused_stepper(h, h->stepper->ops->edge(h->stepper, &before));
 	while (!rc && !found && !ended) {
-		rc = refused(h, incise_stepper_jog(h->stepper, mm_s));
+		rc = refused_stepper(h, incise_stepper_jog(h->stepper, mm_s));
 		if (!rc)
-			rc = look(h);
+			rc = look_stepper(h);
 		if (!rc)
-			rc = refused(h, h->stepper->ops->edge(h->stepper, &edge));
+			rc = refused_stepper(h, h->stepper->ops->edge(h->stepper, &edge));
 		if (rc)
 			return rc;
 		/* A narrow mark may pass between two polls. */
@@ -276,7 +277,7 @@ static int approach(struct home *h)
 	return rc;
 }
 
-static int find(struct home *h)
+static int find_stepper(struct home *h)
 {
 	double rest_mm = fmax(h->homing.home_mm, 0), edge_mm = 0;
 	int rc = 0;
@@ -329,17 +330,17 @@ static int home_by_edge(struct incise_stepper *stepper, const volatile int *stop
 					"switch at 0 is wired; wire one",
 					h.info.name);
 	if (rc)
-		return refused(&h, rc);
+		return refused_stepper(&h, rc);
 	/* Poll four times within the deadman time. */
 	h.poll_ns = (int64_t)fmax(LEAST_POLL_NS,
 				  fmin(POLL_NS, h.info.deadman_s / 4 * INCISE_NS_PER_S));
 	h.left_ns = (int64_t)(INCISE_NS_PER_S *
 			      (60 + h.info.travel_mm / h.homing.speed_mm_s));
-	rc = look(&h);
+	rc = look_stepper(&h);
 	if (!rc)
 		rc = rest(&h);
 	if (!rc)
-		rc = find(&h);
+		rc = find_stepper(&h);
 	if (rc && rc != -ENODEV)
 		halt(&h);
 	if (!rc && edge)

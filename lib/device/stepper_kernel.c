@@ -35,7 +35,7 @@ struct kernel_stepper {
 	void *setpoints, *status; /* pages; NULL or MAP_FAILED: not mapped */
 };
 
-static struct kernel_stepper *of(struct incise_motor *motor)
+static struct kernel_stepper *stepper_kernel_of(struct incise_motor *motor)
 {
 	return (struct kernel_stepper *)motor;
 }
@@ -48,9 +48,9 @@ static int request(const struct kernel_stepper *k, unsigned long number, void *a
 
 static int on_mask(struct incise_motor *motor, unsigned long number)
 {
-	__u32 mask = 1u << of(motor)->index;
+	__u32 mask = 1u << stepper_kernel_of(motor)->index;
 
-	return request(of(motor), number, &mask);
+	return request(stepper_kernel_of(motor), number, &mask);
 }
 
 static int kernel_enable(struct incise_motor *motor, struct incise_error *err)
@@ -72,10 +72,11 @@ static int kernel_clear(struct incise_motor *motor, struct incise_error *err)
 
 static int kernel_origin(struct incise_motor *motor, int32_t steps, bool homed)
 {
-	struct incise_stepper_origin origin = {
-		.motor = of(motor)->index, .homed = homed, .position = steps};
+	struct incise_stepper_origin origin = {.motor = stepper_kernel_of(motor)->index,
+					       .homed = homed,
+					       .position = steps};
 
-	return request(of(motor), INCISE_STEPPER_SET_POSITION, &origin);
+	return request(stepper_kernel_of(motor), INCISE_STEPPER_SET_POSITION, &origin);
 }
 
 static INCISE_REALTIME int64_t kernel_now(struct incise_motor *motor)
@@ -93,7 +94,7 @@ static void unmap(const struct kernel_stepper *k, void *page)
 /* Disable first: the module would stop the motor by itself, but with a fault latched. */
 static void kernel_close(struct incise_motor *motor)
 {
-	struct kernel_stepper *k = of(motor);
+	struct kernel_stepper *k = stepper_kernel_of(motor);
 
 	if (motor->slot && !motor->watches)
 		motor->stepper.ops->disable(&motor->stepper, NULL);
@@ -317,8 +318,9 @@ static bool is_kernel(const struct incise_stepper *stepper)
 /* --- opening ---------------------------------------------------------------------------- */
 
 /* PATH or PATH:MOTOR. */
-static int parse(struct kernel_stepper *k, const struct incise_backend_request *asked,
-		 struct incise_error *err)
+static int parse_stepper_kernel(struct kernel_stepper *k,
+				const struct incise_backend_request *asked,
+				struct incise_error *err)
 {
 	const char *text = asked->arguments, *colon = strrchr(text, ':');
 	size_t length = colon ? (size_t)(colon - text) : strlen(text);
@@ -538,11 +540,12 @@ static int take_count(struct kernel_stepper *k)
 	return kernel_origin(&k->motor, 0, false);
 }
 
-static int set_up(struct kernel_stepper *k, const struct incise_backend_request *asked,
-		  struct incise_error *err)
+static int set_up_stepper_kernel(struct kernel_stepper *k,
+				 const struct incise_backend_request *asked,
+				 struct incise_error *err)
 {
 	struct incise_stepper_controller info = {0};
-	int rc = parse(k, asked, err);
+	int rc = parse_stepper_kernel(k, asked, err);
 
 	if (!rc)
 		rc = open_device(k, asked, err);
@@ -587,7 +590,7 @@ static void *kernel_open(const struct incise_backend_request *asked,
 	k->ops = *k->motor.stepper.ops;
 	k->ops.plan = &plan_ops;
 	k->motor.stepper.ops = &k->ops;
-	rc = set_up(k, asked, err);
+	rc = set_up_stepper_kernel(k, asked, err);
 	if (!rc)
 		return &k->motor.stepper;
 	kernel_close(&k->motor);

@@ -37,7 +37,7 @@ static uint64_t magnitude(int64_t v)
 }
 
 /* True where n bytes at offset lie within the blob, behind the shortest header, aligned. */
-static int within(uint64_t offset, uint64_t n, uint32_t size, uint32_t align)
+static int check_within_blob(uint64_t offset, uint64_t n, uint32_t size, uint32_t align)
 {
 	return offset >= incise_fx_header_size(INCISE_FX_VERSION) &&
 	       offset % align == 0 && offset <= size && n <= size - offset;
@@ -77,7 +77,7 @@ static int check_mfs(const struct incise_fixed *fx, int i, uint32_t offset)
 	const struct incise_fixed_input *in = &fx->input[i];
 	const struct incise_fx_mf *mf = (const struct incise_fx_mf *)in->values;
 
-	if (!within(offset, (uint64_t)in->n_mfs * sizeof(*mf), fx->size, 4))
+	if (!check_within_blob(offset, (uint64_t)in->n_mfs * sizeof(*mf), fx->size, 4))
 		return BAD;
 	for (int k = 0; k < in->n_mfs; k++) {
 		int32_t slope = incise_fx_int32(mf[k].slope);
@@ -208,24 +208,27 @@ static int check_data(const struct incise_fixed *fx, const struct incise_fx_head
 			if (rc)
 				return rc;
 		}
-		if (!within(data, (uint64_t)fx->n_rules * (n + 1) * 8, fx->size, 8))
+		if (!check_within_blob(data, (uint64_t)fx->n_rules * (n + 1) * 8,
+				       fx->size, 8))
 			return BAD;
 		return check_direct(fx);
 	case INCISE_FIXED_TABLE:
 		if (n == 1)
-			return within(data, a * 4, fx->size, 4) && fx->shift_a >= 17 &&
-					       fx->shift_a <= 30
+			return check_within_blob(data, a * 4, fx->size, 4) &&
+					       fx->shift_a >= 17 && fx->shift_a <= 30
 				       ? 0
 				       : BAD;
-		if (!within(incise_fx_le32(head->input[0].offset),
-			    a * (uint32_t)fx->input[0].n_mfs * 4, fx->size, 4) ||
-		    !within(data, b * (uint32_t)fx->input[0].n_mfs * 8, fx->size, 4))
+		if (!check_within_blob(incise_fx_le32(head->input[0].offset),
+				       a * (uint32_t)fx->input[0].n_mfs * 4, fx->size,
+				       4) ||
+		    !check_within_blob(data, b * (uint32_t)fx->input[0].n_mfs * 8,
+				       fx->size, 4))
 			return BAD;
 		rc = check_weights(fx);
 		return rc ? rc : check_fold(fx);
 	case INCISE_FIXED_FORCE:
-		return within(data, a * b * 4, fx->size, 4) && fx->shift_a >= 17 &&
-				       fx->shift_a <= 30
+		return check_within_blob(data, a * b * 4, fx->size, 4) &&
+				       fx->shift_a >= 17 && fx->shift_a <= 30
 			       ? 0
 			       : BAD;
 	}

@@ -108,7 +108,8 @@ static int32_t rise(const int32_t *h, int32_t i, int32_t knots, int32_t stride)
 }
 
 /* Height and outward normal, in the grid's own frame, at u, v within it. Returns whether there is one. */
-static bool look(const struct incise_fixed_grid *grid, int32_t at[3], int32_t normal[3])
+static bool look_grid(const struct incise_fixed_grid *grid, int32_t at[3],
+		      int32_t normal[3])
 {
 	const struct incise_fixed_grid_frame *frame = &grid->frame;
 	int32_t shift = frame->cell_shift, one = 1 << shift, fu, fv;
@@ -142,8 +143,8 @@ static bool look(const struct incise_fixed_grid *grid, int32_t at[3], int32_t no
 }
 
 /* From the grid's frame: a length along each axis, or a direction. */
-static void turn(const struct incise_fixed_grid_frame *frame, const int32_t local[3],
-		 int32_t to[3])
+static void turn_grid(const struct incise_fixed_grid_frame *frame, const int32_t local[3],
+		      int32_t to[3])
 {
 	for (int i = 0; i < 3; i++) {
 		int64_t sum = 0;
@@ -163,8 +164,8 @@ static bool is_within(const struct incise_fixed_grid_frame *frame, const int32_t
 }
 
 /* A step on. Returns whether it went anywhere. */
-static bool go(const struct incise_fixed_grid_frame *frame, int32_t at[3],
-	       const int32_t tool[3], int32_t depth, const int32_t normal[3])
+static bool go_grid(const struct incise_fixed_grid_frame *frame, int32_t at[3],
+		    const int32_t tool[3], int32_t depth, const int32_t normal[3])
 {
 	int32_t most = frame->reach + frame->reach / 4, next[3];
 
@@ -194,11 +195,12 @@ bool incise_fixed_grid_nearest(const struct incise_fixed_grid *grid, const int32
 		return false;
 	incise_fx_copy(at, tool);
 	for (int k = 0;; k++) {
-		if (!look(grid, at, normal))
+		if (!look_grid(grid, at, normal))
 			return false;
 		incise_fx_sub(off, at, tool);
 		depth = incise_fx_along(off, normal);
-		if (k == INCISE_FIXED_GRID_STEPS || !go(frame, at, tool, depth, normal))
+		if (k == INCISE_FIXED_GRID_STEPS ||
+		    !go_grid(frame, at, tool, depth, normal))
 			break;
 	}
 	/* Beyond the edge there is nothing. */
@@ -207,8 +209,8 @@ bool incise_fixed_grid_nearest(const struct incise_fixed_grid *grid, const int32
 		return false;
 	/* Too deep for the heights: the force does not end there, but does not grow. */
 	spot->depth = depth < frame->reach ? depth : frame->reach;
-	turn(frame, normal, spot->normal);
-	turn(frame, at, spot->point);
+	turn_grid(frame, normal, spot->normal);
+	turn_grid(frame, at, spot->point);
 	for (int i = 0; i < 3; i++)
 		spot->point[i] =
 			incise_fx_hold32((int64_t)spot->point[i] + frame->origin[i]);

@@ -163,7 +163,7 @@ int64_t incise_fixed_plan_fade_ns(const struct incise_fixed_numbers *numbers)
 }
 
 /* True if n bytes at an offset lie in the plan, behind its header, aligned; or if n is 0. */
-static bool within(uint32_t at, uint32_t n, uint32_t size)
+static bool is_within_plan(uint32_t at, uint32_t n, uint32_t size)
 {
 	if (!n)
 		return !at;
@@ -176,8 +176,8 @@ static int open_parts(struct incise_fixed_plan *plan, const uint8_t *bytes,
 {
 	int rc = 0;
 
-	if (!within(head->model_at, head->model_size, head->size) ||
-	    !within(head->heights_at, head->heights_size, head->size) ||
+	if (!is_within_plan(head->model_at, head->model_size, head->size) ||
+	    !is_within_plan(head->heights_at, head->heights_size, head->size) ||
 	    !head->heights_size == (head->numbers.shape.kind == INCISE_FIXED_GRID))
 		return BAD;
 	plan->has_model = head->model_size > 0;

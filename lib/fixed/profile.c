@@ -35,7 +35,7 @@ static uint64_t per_tick(uint64_t x, uint32_t tick_ns)
 	return seconds * tick_ns + div_u64((uint64_t)rest * tick_ns, SECOND_NS);
 }
 
-static int64_t hold(int64_t v, int64_t least, int64_t most)
+static int64_t hold_profile(int64_t v, int64_t least, int64_t most)
 {
 	if (v > most)
 		return most;
@@ -129,13 +129,13 @@ int64_t incise_profile_target(struct incise_profile *profile,
 	uint64_t top;
 
 	if (mode == INCISE_PROFILE_POSITION) {
-		target = hold(target, profile->min / STEP, profile->max / STEP);
+		target = hold_profile(target, profile->min / STEP, profile->max / STEP);
 		set_target(profile, target * STEP, profile->velocity_max);
 		return target;
 	}
 	if (mode != INCISE_PROFILE_VELOCITY)
 		target = 0;
-	target = hold(target, -(int64_t)profile->velocity, profile->velocity);
+	target = hold_profile(target, -(int64_t)profile->velocity, profile->velocity);
 	top = (uint64_t)(target < 0 ? -target : target) << 32;
 	set_target(profile, target < 0 ? profile->min : profile->max,
 		   per_tick(top, profile->tick_ns));
@@ -149,7 +149,7 @@ void incise_profile_stop(struct incise_profile *profile)
 
 void incise_profile_halt(struct incise_profile *profile, int32_t position)
 {
-	int64_t at = hold(position * STEP, profile->min, profile->max);
+	int64_t at = hold_profile(position * STEP, profile->min, profile->max);
 
 	incise_ramp_stand(&profile->ramp, at);
 	profile->ramp.top = profile->velocity_max;
@@ -164,7 +164,7 @@ void incise_profile_halt(struct incise_profile *profile, int32_t position)
 }
 
 /* Take the newest position into the average, and move the output. */
-static void take(struct incise_profile *profile)
+static void take_profile(struct incise_profile *profile)
 {
 	uint32_t n = profile->average, rest;
 	int64_t newest = profile->ramp.position;
@@ -187,7 +187,8 @@ static void take(struct incise_profile *profile)
 }
 
 /* The whole steps that are due on the way to the slot's end. */
-static void count(struct incise_profile *profile, struct incise_profile_slot *slot)
+static void count_profile(struct incise_profile *profile,
+			  struct incise_profile_slot *slot)
 {
 	int32_t whole = profile->whole;
 
@@ -215,13 +216,13 @@ void incise_profile_tick(struct incise_profile *profile, struct incise_profile_s
 		profile->moved = 0;
 	} else {
 		incise_ramp_tick(&profile->ramp);
-		take(profile);
+		take_profile(profile);
 		/* A ramp that stood and stands does so until there is a new target. */
 		profile->still =
 			stood && !profile->ramp.velocity ? profile->still + 1 : 0;
 	}
 	slot->to = profile->output;
-	count(profile, slot);
+	count_profile(profile, slot);
 }
 
 uint32_t incise_profile_step_ns(const struct incise_profile_slot *slot, int32_t k)
@@ -232,7 +233,7 @@ uint32_t incise_profile_step_ns(const struct incise_profile_slot *slot, int32_t 
 
 	if (slot->n <= 0 || !way)
 		return slot->tick_ns;
-	k = (int32_t)hold(k, 0, slot->n - 1);
+	k = (int32_t)hold_profile(k, 0, slot->n - 1);
 	there = slot->first + (uint64_t)k * STEP;
 	return (uint32_t)div64_u64(there * slot->tick_ns + way - 1, way);
 }

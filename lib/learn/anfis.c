@@ -41,7 +41,7 @@ static const double *strengths(const struct state *s, size_t n, const double *x,
 	return w;
 }
 
-static int solve(struct state *s, const struct incise_pairs *pairs, double ridge)
+static int solve_anfis(struct state *s, const struct incise_pairs *pairs, double ridge)
 {
 	struct incise_ridge plain = {ridge, 1, s->n_linear, 1};
 
@@ -146,7 +146,7 @@ static void adapt_step(struct state *s, int epoch)
 static int epoch(struct state *s, struct incise_anfis *anfis, int number)
 {
 	double train, check, score;
-	int rc = solve(s, anfis->train, anfis->ridge);
+	int rc = solve_anfis(s, anfis->train, anfis->ridge);
 
 	if (rc)
 		return rc;

@@ -111,7 +111,8 @@ static void make_settings(struct incise_average *a, bool cuts)
 
 /* --- normal equations --- */
 
-static void add_row(double *matrix, int n, int stride, const double *row, double factor)
+static void add_average_row(double *matrix, int n, int stride, const double *row,
+			    double factor)
 {
 	for (int i = 0; i < n; i++) {
 		double *to = matrix + (size_t)i * stride, by = factor * row[i];
@@ -177,8 +178,8 @@ static void subtract_cuts(const struct incise_average *a, int f, double *matrix)
 {
 	for (int u = 0; u < a->n_units; u++)
 		if (f < 0 || !a->out[(size_t)f * a->n_units + u])
-			add_row(matrix, a->n, a->stride, a->cuts + (size_t)u * a->stride,
-				-1);
+			add_average_row(matrix, a->n, a->stride,
+					a->cuts + (size_t)u * a->stride, -1);
 }
 
 /* The equations of a fold's other pairs, f < 0: of all, without penalty. */
@@ -194,8 +195,8 @@ static void equations(const struct incise_average *a, int f, bool cuts, double *
 }
 
 /* Solve equations with a setting's penalty; its factor is left in a->matrix. */
-static bool solve(const struct incise_average *a, const double *equations,
-		  const struct setting *setting, double *consequents)
+static bool solve_average(const struct incise_average *a, const double *equations,
+			  const struct setting *setting, double *consequents)
 {
 	memcpy(a->matrix, equations, triangle(a) * sizeof(*equations));
 	add_penalty(a, setting, a->matrix);
@@ -237,7 +238,7 @@ static void sum_up(struct incise_average *a, const struct incise_basis *basis,
 
 		for (size_t i = 0; i < held->n; i++) {
 			make_row(basis, held->rows + i * (held->n_inputs + 1), row);
-			add_row(to, a->n, a->stride, row, 1);
+			add_average_row(to, a->n, a->stride, row, 1);
 			a->out[(size_t)f * a->n_units + folds->unit[f][i]] = true;
 		}
 		for (size_t i = 0; seen < n_pairs && i < triangle(a); i++)
@@ -297,8 +298,8 @@ static int predict(struct incise_average *a, const struct incise_basis *basis,
 
 		equations(a, f, cuts, whole);
 		for (int s = from; s < to; s++)
-			if (!solve(a, whole, &a->setting[s],
-				   a->consequents + (size_t)s * a->n))
+			if (!solve_average(a, whole, &a->setting[s],
+					   a->consequents + (size_t)s * a->n))
 				a->setting[s].total = HUGE_VAL;
 		for (size_t i = 0; i < held->n; i++, predicted += SETTINGS_MAX) {
 			make_row(basis, held->rows + i * (held->n_inputs + 1), row);
@@ -368,7 +369,7 @@ static int average(const struct incise_average *a, const double *plain,
 
 		if (!(setting->weight > 0))
 			continue;
-		if (!solve(a, setting->cuts ? cuts : plain, setting, one))
+		if (!solve_average(a, setting->cuts ? cuts : plain, setting, one))
 			return -EDOM;
 		for (int k = 0; k < a->n; k++)
 			consequents[k] += setting->weight * one[k];
@@ -394,8 +395,8 @@ static void sum_errors(const struct incise_average *a, const struct incise_folds
 }
 
 /* The settings with random factors follow when the others have predicted the force. */
-static int find(struct incise_average *a, const struct incise_basis *basis,
-		const struct incise_folds *folds, double *error)
+static int find_average(struct incise_average *a, const struct incise_basis *basis,
+			const struct incise_folds *folds, double *error)
 {
 	double *predicted = malloc(folds->n_held * SETTINGS_MAX * sizeof(*predicted));
 	double *consequents = malloc(a->n * sizeof(*consequents));
@@ -453,7 +454,7 @@ int incise_average_find(struct incise_average **average, const struct incise_bas
 		calloc((size_t)(a->n_settings + 1) * a->stride, sizeof(*a->consequents));
 	a->matrix = calloc(triangle(a), sizeof(*a->matrix));
 	if (a->all && a->held && a->out && a->consequents && a->matrix)
-		rc = find(a, basis, folds, error);
+		rc = find_average(a, basis, folds, error);
 out:
 	if (rc)
 		incise_average_free(a);
@@ -549,7 +550,8 @@ int incise_average_ratios(const struct incise_average *a,
 		if (a->cuts)
 			equations(a, f, true, cuts);
 		rc = average(a, plain, cuts, a->n_settings, consequents);
-		if (!rc && !solve(a, best->cuts ? cuts : plain, best, a->consequents))
+		if (!rc &&
+		    !solve_average(a, best->cuts ? cuts : plain, best, a->consequents))
 			rc = -EDOM;
 		for (size_t i = 0; i < held->n && !rc; i++) {
 			double e;

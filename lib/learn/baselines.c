@@ -100,7 +100,7 @@ static size_t *some_of(size_t n, size_t most, size_t *count)
 }
 
 /* The group of a pair, or itself. */
-static long unit_of(const struct pool *pool, size_t pair)
+static long unit_of_baselines(const struct pool *pool, size_t pair)
 {
 	return pool->groups ? pool->groups[pair] : (long)pair;
 }
@@ -124,7 +124,7 @@ static void knn_predict(const struct pool *pool, const double *x, long excluded,
 		double distance = 0;
 		int i;
 
-		if (excluded >= 0 && excluded == unit_of(pool, pool->pairs[n]))
+		if (excluded >= 0 && excluded == unit_of_baselines(pool, pool->pairs[n]))
 			continue;
 		for (int c = 0; c < train->n_inputs; c++) {
 			double e = (row[c] - x[c]) / columns[c].sd;
@@ -160,7 +160,7 @@ static int choose_k(const struct pool *pool)
 	for (size_t n = 0; n < pool->n && n < CHOOSERS; n++) {
 		const double *x = pool->train->rows + pool->pairs[n] * width;
 
-		knn_predict(pool, x, unit_of(pool, pool->pairs[n]), y);
+		knn_predict(pool, x, unit_of_baselines(pool, pool->pairs[n]), y);
 		for (int i = 0; i < N_KS; i++) {
 			double e = (y[i] - x[width - 1]) / output->sd;
 
@@ -193,8 +193,9 @@ static int knn_rmse(struct pool *pool, const struct incise_pairs *on,
 
 		/* A pair that was fitted on must not be its own neighbour. */
 		knn_predict(pool, x,
-			    on->rows == pool->train->rows ? unit_of(pool, queries[n])
-							  : -1,
+			    on->rows == pool->train->rows
+				    ? unit_of_baselines(pool, queries[n])
+				    : -1,
 			    y);
 		e = (x[d] - y[best]) / output->sd;
 		sum += e * e / n_queries;

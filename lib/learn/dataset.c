@@ -80,7 +80,7 @@ static int split_row(struct reader *in, char *c)
 }
 
 /* Next row that is not empty or a comment: 1, or 0 at the end. */
-static int next_row(struct reader *in)
+static int next_dataset_row(struct reader *in)
 {
 	int rc;
 
@@ -141,7 +141,8 @@ static int find_column(struct reader *in, const char *name)
 		nearest ? nearest : "", nearest ? "'?" : "");
 }
 
-static int number(struct reader *in, int field, const char *column, double *value)
+static int read_dataset_number(struct reader *in, int field, const char *column,
+			       double *value)
 {
 	const char *text = in->field[field];
 	char *end;
@@ -183,7 +184,7 @@ static int find_group(struct incise_dataset *data, const char *name)
 	return data->names[data->n_groups] ? data->n_groups++ : -ENOMEM;
 }
 
-static int grow(struct incise_dataset *data, bool groups)
+static int grow_dataset(struct incise_dataset *data, bool groups)
 {
 	size_t capacity = data->capacity ? 2 * data->capacity : 1024;
 	double *values =
@@ -220,7 +221,7 @@ static int keep_row(void *user, const double *row, const char *group,
 	struct incise_dataset *data = user;
 	int at = 0;
 
-	if (data->rows == data->capacity && grow(data, group))
+	if (data->rows == data->capacity && grow_dataset(data, group))
 		return incise_error_set(err, ENOMEM, "no memory for more than %zu rows",
 					data->rows);
 	if (group) {
@@ -240,7 +241,7 @@ static int read_rows(struct reader *in, struct sink *sink)
 	int at[FIELDS_MAX], group_at = -1, where_at, rc;
 	double row[FIELDS_MAX];
 
-	rc = next_row(in);
+	rc = next_dataset_row(in);
 	if (rc < 0)
 		return rc;
 	if (!rc)
@@ -261,7 +262,7 @@ static int read_rows(struct reader *in, struct sink *sink)
 	if (where_at == -EINVAL)
 		return where_at;
 	rc = in->n_fields;
-	for (int header = rc; (rc = next_row(in)) > 0;) {
+	for (int header = rc; (rc = next_dataset_row(in)) > 0;) {
 		double wanted = 1;
 
 		if (in->n_fields != header)
@@ -274,7 +275,9 @@ static int read_rows(struct reader *in, struct sink *sink)
 					? "add the missing fields, or remove the row"
 					: "end it with its last field, and write decimal "
 					  "points, not commas");
-		rc = where_at >= 0 ? number(in, where_at, sink->where, &wanted) : 0;
+		rc = where_at >= 0
+			     ? read_dataset_number(in, where_at, sink->where, &wanted)
+			     : 0;
 		if (rc)
 			return rc;
 		if (wanted == 0) {
@@ -282,7 +285,7 @@ static int read_rows(struct reader *in, struct sink *sink)
 			continue;
 		}
 		for (int i = 0; i < sink->n; i++) {
-			rc = number(in, at[i], sink->columns[i], &row[i]);
+			rc = read_dataset_number(in, at[i], sink->columns[i], &row[i]);
 			if (rc)
 				return rc;
 		}
@@ -309,7 +312,8 @@ static const struct incise_infile_kind csv = {
 	.advice = "give a CSV file with a header row",
 };
 
-static int read_file(const char *path, struct sink *sink, struct incise_error *err)
+static int read_dataset_file(const char *path, struct sink *sink,
+			     struct incise_error *err)
 {
 	struct reader in;
 	int rc = incise_lines_open(&in.lines, path, &csv, err);
@@ -329,10 +333,10 @@ bool incise_dataset_has(const char *path, const char *column, bool *stated)
 
 	if (incise_lines_open(&in.lines, path, &csv, NULL))
 		return false;
-	if (next_row(&in) > 0)
+	if (next_dataset_row(&in) > 0)
 		at = look_for_column(&in, column);
-	if (at >= 0 && stated && next_row(&in) > 0 &&
-	    (at >= in.n_fields || number(&in, at, column, &value)))
+	if (at >= 0 && stated && next_dataset_row(&in) > 0 &&
+	    (at >= in.n_fields || read_dataset_number(&in, at, column, &value)))
 		*stated = false;
 	incise_lines_close(&in.lines);
 	return at >= 0;
@@ -346,7 +350,7 @@ int incise_dataset_each(const char *path, const char *const *columns, int n,
 	int rc = n < 1 || n > FIELDS_MAX
 			 ? incise_error_set(err, EINVAL, "%s: cannot read %d columns",
 					    path, n)
-			 : read_file(path, &sink, err);
+			 : read_dataset_file(path, &sink, err);
 
 	if (left_out)
 		*left_out = sink.left_out;
@@ -381,7 +385,7 @@ struct incise_dataset *incise_dataset_read_where(const char *path,
 
 	if (!data)
 		return NULL;
-	rc = read_file(path, &sink, err);
+	rc = read_dataset_file(path, &sink, err);
 	*left_out = (size_t)sink.left_out;
 	if (rc) {
 		incise_dataset_free(data);

@@ -685,7 +685,7 @@ struct decoder {
 	struct incise_error *err;
 };
 
-static int damaged(const struct decoder *in, const char *what)
+static int damaged_factor(const struct decoder *in, const char *what)
 {
 	return incise_error_set(in->err, EINVAL,
 				"%s:%d: %s; the file is damaged or no factor of incise "
@@ -694,7 +694,7 @@ static int damaged(const struct decoder *in, const char *what)
 }
 
 /* The rest of the next line behind "KEY ", or NULL. */
-static char *next_line(struct decoder *in, const char *key)
+static char *next_factor_line(struct decoder *in, const char *key)
 {
 	size_t n = strlen(key);
 	char *line = in->at, *end = memchr(line, '\n', (size_t)(in->end - line));
@@ -708,7 +708,7 @@ static char *next_line(struct decoder *in, const char *key)
 	return line + n + 1;
 }
 
-static bool number(char **text, double *value)
+static bool read_factor_number(char **text, double *value)
 {
 	char *end;
 
@@ -748,8 +748,8 @@ static int decode_input(struct decoder *in, char *line, struct incise_variable *
 	char *end;
 	long n;
 
-	if (!number(&line, &v->min) || !number(&line, &v->max))
-		return damaged(in, "a range is no pair of numbers");
+	if (!read_factor_number(&line, &v->min) || !read_factor_number(&line, &v->max))
+		return damaged_factor(in, "a range is no pair of numbers");
 	for (int k = 0; k < 2 && !known; k++) {
 		const char *name = incise_mf_type_name(kinds[k]);
 
@@ -757,21 +757,24 @@ static int decode_input(struct decoder *in, char *line, struct incise_variable *
 		*type = kinds[k];
 	}
 	if (!known)
-		return damaged(in, "a kind of function is neither gaussmf nor gbellmf");
+		return damaged_factor(
+			in, "a kind of function is neither gaussmf nor gbellmf");
 	line += strlen(incise_mf_type_name(*type)) + 1;
 	n = strtol(line, &end, 10);
 	if (n < 1 || n > INCISE_MODEL_MFS_MAX || *end != ' ' ||
 	    strlen(end + 1) >= sizeof(v->name))
-		return damaged(in, "an input has no such number of functions and name");
+		return damaged_factor(
+			in, "an input has no such number of functions and name");
 	*n_mfs = (int)n;
 	strcpy(v->name, end + 1);
 	for (int k = 0; k < n; k++) {
-		line = next_line(in, "mf");
+		line = next_factor_line(in, "mf");
 		for (int i = 0; i < incise_mf_n_params(*type); i++)
-			if (!line || !number(&line, &p[k][i]))
-				return damaged(in, "a function has no such parameters");
+			if (!line || !read_factor_number(&line, &p[k][i]))
+				return damaged_factor(
+					in, "a function has no such parameters");
 		if (*line)
-			return damaged(in, "a function has too many parameters");
+			return damaged_factor(in, "a function has too many parameters");
 	}
 	return 0;
 }
@@ -788,21 +791,22 @@ static struct incise_factor *decode_premises(struct decoder *in)
 	struct incise_model *model;
 	char *line;
 
-	while (n < INCISE_MODEL_INPUTS_MAX && (line = next_line(in, "input"))) {
+	while (n < INCISE_MODEL_INPUTS_MAX && (line = next_factor_line(in, "input"))) {
 		if (decode_input(in, line, &inputs[n], &n_mfs[n], &type, p[n]))
 			return NULL;
 		if (n && type != first) {
-			damaged(in, "inputs have functions of several kinds");
+			damaged_factor(in, "inputs have functions of several kinds");
 			return NULL;
 		}
 		first = type;
 		n++;
 	}
 	in->line -= n < INCISE_MODEL_INPUTS_MAX;
-	line = next_line(in, "output");
-	if (!n || !line || !number(&line, &output.min) || !number(&line, &output.max) ||
+	line = next_factor_line(in, "output");
+	if (!n || !line || !read_factor_number(&line, &output.min) ||
+	    !read_factor_number(&line, &output.max) ||
 	    strlen(line) >= sizeof(output.name)) {
-		damaged(in, "expected inputs and an output with its range");
+		damaged_factor(in, "expected inputs and an output with its range");
 		return NULL;
 	}
 	strcpy(output.name, line);
@@ -816,34 +820,34 @@ static struct incise_factor *decode_premises(struct decoder *in)
 	factor = model ? incise_factor_new(model, &why) : NULL;
 	incise_model_free(model);
 	if (!factor)
-		damaged(in, grid);
+		damaged_factor(in, grid);
 	return factor;
 }
 
 static int decode_sources(struct decoder *in, struct incise_factor *factor,
 			  uint64_t *rows)
 {
-	char *line = next_line(in, "options");
+	char *line = next_factor_line(in, "options");
 	uint64_t n;
 
 	if (!line)
-		return damaged(in, "expected the options");
+		return damaged_factor(in, "expected the options");
 	incise_factor_set_options(factor, line);
-	line = next_line(in, "sources");
+	line = next_factor_line(in, "sources");
 	if (!line || !whole(&line, SOURCES_MAX, &n) || *line)
-		return damaged(in, "expected a number of sources");
+		return damaged_factor(in, "expected a number of sources");
 	for (uint64_t i = 0; i < n; i++) {
 		struct incise_factor_source source = {0};
 		char *end;
 
-		line = next_line(in, "source");
+		line = next_factor_line(in, "source");
 		if (!line || !is_hash(line) || line[64] != ' ' ||
 		    (i && strncmp(factor->sources[i - 1].hash, line, 64) >= 0))
-			return damaged(in, "expected the next source by its hash");
+			return damaged_factor(in, "expected the next source by its hash");
 		memcpy(source.hash, line, 64);
 		source.rows = strtoull(line + 65, &end, 10);
 		if (end == line + 65 || *end != ' ' || source.rows > GRAM_ROWS_MAX)
-			return damaged(in, "expected a number of pairs");
+			return damaged_factor(in, "expected a number of pairs");
 		put_line(source.text, sizeof(source.text), end + 1);
 		*rows += source.rows;
 		if (insert_source(factor, &source) < 0)
@@ -861,29 +865,31 @@ static int decode_statistics(struct decoder *in, struct incise_factor *factor,
 	int next;
 
 	for (int i = 0; i <= factor->design.basis.n_inputs; i++) {
-		line = next_line(in, "range");
-		if (!line || !number(&line, &factor->min[i]) ||
-		    !number(&line, &factor->max[i]) || *line ||
+		line = next_factor_line(in, "range");
+		if (!line || !read_factor_number(&line, &factor->min[i]) ||
+		    !read_factor_number(&line, &factor->max[i]) || *line ||
 		    factor->min[i] > factor->max[i])
-			return damaged(in, "expected the range of a column");
+			return damaged_factor(in, "expected the range of a column");
 	}
 	for (int r = 0; r < factor->design.basis.n_rules; r++) {
 		double *largest = &factor->design.largest[r];
 
-		line = next_line(in, "fired");
-		if (!line || !number(&line, largest) || *line || *largest < 0 ||
-		    *largest > 1)
-			return damaged(in, "expected the firing of a rule, 0 to 1");
+		line = next_factor_line(in, "fired");
+		if (!line || !read_factor_number(&line, largest) || *line ||
+		    *largest < 0 || *largest > 1)
+			return damaged_factor(in,
+					      "expected the firing of a rule, 0 to 1");
 	}
 	for (int f = 0; f < FOLDS; f = next) {
 		uint64_t folds, different, groups;
 
-		line = next_line(in, "part");
+		line = next_factor_line(in, "part");
 		if (!line || !whole(&line, FOLDS - f, &folds) || !folds ||
 		    !whole(&line, GRAM_ROWS_MAX - 1, &count) ||
 		    !whole(&line, GRAM_ROWS_MAX, &different) ||
 		    !whole(&line, GRAM_ROWS_MAX, &groups) || *line)
-			return damaged(in, "expected folds, pairs and groups of a part");
+			return damaged_factor(
+				in, "expected folds, pairs and groups of a part");
 		incise_factor_count(factor, (uint64_t)f, groups, different);
 		incise_gram_set_rows(factor->fold[f], count);
 		sum += count;
@@ -892,11 +898,12 @@ static int decode_statistics(struct decoder *in, struct incise_factor *factor,
 		next = f + (int)folds;
 	}
 	if (sum != rows || sum > GRAM_ROWS_MAX)
-		return damaged(in, "sources and folds have different numbers of pairs");
-	line = next_line(in, "sums");
+		return damaged_factor(
+			in, "sources and folds have different numbers of pairs");
+	line = next_factor_line(in, "sums");
 	if (!line || !whole(&line, SIZE_MAX, &count) || *line ||
 	    count != incise_gram_count(factor->design.gram))
-		return damaged(in, "expected another number of sums");
+		return damaged_factor(in, "expected another number of sums");
 	return 0;
 }
 
@@ -909,7 +916,7 @@ static int decode_sums(struct decoder *in, struct incise_factor *factor)
 	for (int f = 0; f < FOLDS; f++)
 		parts += !factor->joined[f];
 	if ((size_t)(in->end - in->at) != parts * count * 2 * sizeof(uint64_t))
-		return damaged(in, "the sums are not as long as expected");
+		return damaged_factor(in, "the sums are not as long as expected");
 	for (int f = 0; f < FOLDS; f++) {
 		incise_gram_sum *sum = incise_gram_sums(factor->fold[f]);
 		incise_gram_sum rows = incise_gram_rows(factor->fold[f]);
@@ -924,15 +931,16 @@ static int decode_sums(struct decoder *in, struct incise_factor *factor)
 							   << 64 |
 						   le64toh(word[0]));
 			if (sum[i] > rows << 94 || sum[i] < -(rows << 94))
-				return damaged(in, "a sum is too large for its pairs");
+				return damaged_factor(in,
+						      "a sum is too large for its pairs");
 		}
 		if (sum[count - 3] != rows << 92)
-			return damaged(in, "the sums do not count their pairs");
+			return damaged_factor(in, "the sums do not count their pairs");
 	}
 	return 0;
 }
 
-static struct incise_factor *decode(struct decoder *in, size_t size)
+static struct incise_factor *decode_factor(struct decoder *in, size_t size)
 {
 	struct incise_factor *factor = NULL;
 	char *line, hash[65];
@@ -941,9 +949,9 @@ static struct incise_factor *decode(struct decoder *in, size_t size)
 
 	/* First, so that no line reaches into it. */
 	in->end -= sizeof(crc);
-	line = next_line(in, "incise factor");
+	line = next_factor_line(in, "incise factor");
 	if (!line || !whole(&line, UINT32_MAX, &form) || *line) {
-		damaged(in, "expected 'incise factor'");
+		damaged_factor(in, "expected 'incise factor'");
 		return NULL;
 	}
 	if (form == 1) {
@@ -966,12 +974,12 @@ static struct incise_factor *decode(struct decoder *in, size_t size)
 	*line = '\n';
 	if (le32toh(crc) !=
 	    incise_crc32c(0, in->end - (size - sizeof(crc)), size - sizeof(crc))) {
-		damaged(in, "the checksum does not fit");
+		damaged_factor(in, "the checksum does not fit");
 		return NULL;
 	}
-	line = next_line(in, "version");
+	line = next_factor_line(in, "version");
 	if (!line || strlen(line) >= sizeof(factor->version)) {
-		damaged(in, "expected a version");
+		damaged_factor(in, "expected a version");
 		return NULL;
 	}
 	if (strcmp(line, incise_version())) {
@@ -981,9 +989,9 @@ static struct incise_factor *decode(struct decoder *in, size_t size)
 				 in->name, line, incise_version());
 		return NULL;
 	}
-	line = next_line(in, "premises");
+	line = next_factor_line(in, "premises");
 	if (!line || !is_hash(line) || line[64]) {
-		damaged(in, "expected the premises' hash");
+		damaged_factor(in, "expected the premises' hash");
 		return NULL;
 	}
 	memcpy(hash, line, sizeof(hash));
@@ -991,7 +999,7 @@ static struct incise_factor *decode(struct decoder *in, size_t size)
 	if (!factor)
 		return NULL;
 	if ((strcmp(hash, factor->hash) &&
-	     damaged(in, "the premises are not those of their hash")) ||
+	     damaged_factor(in, "the premises are not those of their hash")) ||
 	    decode_sources(in, factor, &rows) || decode_statistics(in, factor, rows) ||
 	    decode_sums(in, factor)) {
 		incise_factor_free(factor);
@@ -1013,13 +1021,13 @@ struct incise_factor *incise_factor_decode(const void *bytes, size_t size,
 		incise_error_set(in.err, ENOMEM, "%s: no memory to read it", name);
 	} else if (size < 64) {
 		in.line = 1;
-		damaged(&in, "the file is too short");
+		damaged_factor(&in, "the file is too short");
 	} else {
 		memcpy(copy, bytes, size);
 		copy[size] = 0;
 		in.at = copy;
 		in.end = copy + size;
-		factor = decode(&in, size);
+		factor = decode_factor(&in, size);
 	}
 	free(copy);
 	incise_c_locale_end(locale);
@@ -1192,9 +1200,9 @@ struct incise_design *incise_factor_design(struct incise_factor *factor)
 	return &factor->design;
 }
 
-static int solve(struct solver *s, const struct incise_factor_ridge *wanted,
-		 struct incise_train_report *report, struct incise_model *model,
-		 struct incise_uncertainty **uncertainty)
+static int solve_factor(struct solver *s, const struct incise_factor_ridge *wanted,
+			struct incise_train_report *report, struct incise_model *model,
+			struct incise_uncertainty **uncertainty)
 {
 	struct incise_factor *factor = s->factor;
 	struct incise_ridge ridge;
@@ -1243,7 +1251,7 @@ struct incise_model *incise_factor_solve(struct incise_factor *factor,
 	if (!model || !s.lsq || !s.x)
 		rc = -ENOMEM;
 	else if (rows >= (uint64_t)s.n)
-		rc = solve(&s, ridge, report, model, uncertainty);
+		rc = solve_factor(&s, ridge, report, model, uncertainty);
 	if (!rc && watch && watch->stopped)
 		rc = -ECANCELED;
 	incise_lsq_free(s.lsq);

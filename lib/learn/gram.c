@@ -324,7 +324,7 @@ void incise_gram_subtract(struct incise_gram *gram, struct incise_gram *other)
 	gram->rows -= other->rows;
 }
 
-static size_t place(const struct incise_gram *gram, int i, int j)
+static size_t find_gram_place(const struct incise_gram *gram, int i, int j)
 {
 	return (size_t)i * gram->n - (size_t)i * (i + 1) / 2 + j;
 }
@@ -528,12 +528,12 @@ int incise_gram_factor(struct incise_gram *gram, double mean, double scale,
 		struct pair p;
 
 		for (int j = i; j < n; j++) {
-			p = pair_of_sum(sum[place(gram, i, j)]);
+			p = pair_of_sum(sum[find_gram_place(gram, i, j)]);
 			h[j] = p.high;
 			l[j] = p.low;
 		}
-		p = i < n ? with_target(sum[place(gram, i, n + 1)],
-					sum[place(gram, i, n)], mean, scale)
+		p = i < n ? with_target(sum[find_gram_place(gram, i, n + 1)],
+					sum[find_gram_place(gram, i, n)], mean, scale)
 			  : square_of_target(gram, mean, scale);
 		h[n] = p.high;
 		l[n] = p.low;
@@ -559,16 +559,20 @@ double incise_gram_error(struct incise_gram *gram, double mean, double scale,
 	struct pair total = square_of_target(gram, mean, scale);
 
 	for (int i = 0; i < n; i++) {
-		struct pair with = with_target(sum[place(gram, i, n + 1)],
-					       sum[place(gram, i, n)], mean, scale);
+		struct pair with =
+			with_target(sum[find_gram_place(gram, i, n + 1)],
+				    sum[find_gram_place(gram, i, n)], mean, scale);
 		struct pair line = pair_product(pair_of(-2), with);
 
-		line = pair_sum(line, pair_product(pair_of_sum(sum[place(gram, i, i)]),
-						   pair_of(x[i])));
+		line = pair_sum(
+			line, pair_product(pair_of_sum(sum[find_gram_place(gram, i, i)]),
+					   pair_of(x[i])));
 		for (int j = i + 1; j < n; j++)
-			line = pair_sum(line,
-					pair_product(pair_of_sum(sum[place(gram, i, j)]),
-						     pair_of(2 * x[j])));
+			line = pair_sum(
+				line,
+				pair_product(
+					pair_of_sum(sum[find_gram_place(gram, i, j)]),
+					pair_of(2 * x[j])));
 		total = pair_sum(total, pair_product(line, pair_of(x[i])));
 	}
 	return fmax(total.high, 0);

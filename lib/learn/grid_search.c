@@ -112,7 +112,7 @@ static int visit(struct race *race, const int *n_mfs)
 }
 
 /* Grow the input that gains most, until growth has not paid for some rounds. */
-static int grow(struct race *race, int *at, size_t n_pairs)
+static int grow_grid_search(struct race *race, int *at, size_t n_pairs)
 {
 	double least = HUGE_VAL;
 	int rc = 0;
@@ -166,8 +166,8 @@ static const struct grid *winner(const struct race *race)
 	return chosen;
 }
 
-static int run(struct race *race, const struct incise_pairs *pairs,
-	       const struct incise_train_options *options, int *n_mfs)
+static int run_grid_search(struct race *race, const struct incise_pairs *pairs,
+			   const struct incise_train_options *options, int *n_mfs)
 {
 	int at[INCISE_MODEL_INPUTS_MAX] = {0}, rc;
 
@@ -190,7 +190,7 @@ static int run(struct race *race, const struct incise_pairs *pairs,
 		return -ENODATA;
 	rc = visit(race, at);
 	if (!rc)
-		rc = grow(race, at, race->sample.pairs.n);
+		rc = grow_grid_search(race, at, race->sample.pairs.n);
 	if (!rc)
 		memcpy(n_mfs, winner(race)->n_mfs, race->n_inputs * sizeof(*n_mfs));
 	return rc;
@@ -220,7 +220,7 @@ int incise_choose_grid(const struct incise_pairs *pairs,
 	race->type = type;
 	race->watch = incise_watch_of(options);
 	if (!incise_watch_ask(&race->watch))
-		rc = run(race, pairs, options, n_mfs);
+		rc = run_grid_search(race, pairs, options, n_mfs);
 	if (race->watch.stopped)
 		rc = -ECANCELED;
 	for (int i = 0; i < race->n; i++)

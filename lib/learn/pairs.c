@@ -146,7 +146,7 @@ int incise_pairs_check_inputs(const struct incise_pairs *pairs,
 }
 
 /* Mark `most` of n by chance; NULL with errno ENOMEM. */
-static bool *choose(size_t n, size_t most, uint64_t seed)
+static bool *choose_pairs(size_t n, size_t most, uint64_t seed)
 {
 	size_t *order = malloc(n * sizeof(*order));
 	bool *chosen = calloc(n, sizeof(*chosen));
@@ -168,7 +168,7 @@ int incise_sample_take(struct incise_sample *sample, const struct incise_scaling
 		       uint64_t seed)
 {
 	size_t n = pairs->n, width = pairs->n_inputs + 1, taken = 0;
-	bool *chosen = n > most ? choose(n, most, seed) : NULL;
+	bool *chosen = n > most ? choose_pairs(n, most, seed) : NULL;
 
 	if (n > most && !chosen)
 		return -ENOMEM;

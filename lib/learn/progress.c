@@ -77,7 +77,7 @@ static void take_parts(struct incise_progress *progress, const char *bytes, size
 }
 
 /* False: a file of another kind, which is not ours to replace or to remove. */
-static bool read_file(struct incise_progress *progress)
+static bool read_progress_file(struct incise_progress *progress)
 {
 	static const struct incise_infile_kind kind = {
 		.name = "progress of a training",
@@ -108,7 +108,7 @@ struct incise_progress *incise_progress_open(const char *path, const char *optio
 	progress->path = strdup(path);
 	progress->last = -1e9;
 	if (progress->path && make_key(progress, options, sources, n) &&
-	    read_file(progress))
+	    read_progress_file(progress))
 		return progress;
 	free(progress->path);
 	free(progress);

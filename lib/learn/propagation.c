@@ -113,7 +113,7 @@ void incise_propagation_free(struct incise_propagation *p)
 	free(p);
 }
 
-static int no_memory(struct incise_error *err)
+static int no_propagation_memory(struct incise_error *err)
 {
 	return incise_error_set(err, ENOMEM, "no memory for uncertainties");
 }
@@ -134,7 +134,7 @@ int incise_propagation_start(struct incise_propagation *p,
 		p->phi = calloc((size_t)n, sizeof(*p->phi));
 		p->with_row = calloc((size_t)n, sizeof(*p->with_row));
 		if (!p->phi || !p->with_row)
-			return no_memory(err);
+			return no_propagation_memory(err);
 		p->n = n;
 	}
 	p->model = model;
@@ -203,11 +203,11 @@ int incise_propagation_origin(struct incise_propagation *p, const char *recordin
 			      const char *calibration, struct incise_error *err)
 {
 	if (find_unit(&p->units[0], recording) || find_unit(&p->units[1], calibration))
-		return no_memory(err);
+		return no_propagation_memory(err);
 	for (int s = 0; s < INCISE_UNCERTAINTY_SOURCES; s++) {
 		p->of_source[s] = -1;
 		if (p->has_source[s] && (p->of_source[s] = find_origin(p, s)) < 0)
-			return no_memory(err);
+			return no_propagation_memory(err);
 	}
 	return 0;
 }
@@ -290,8 +290,9 @@ double incise_propagation_add(struct incise_propagation *p, const double *row)
 }
 
 /* b of one origin. Returns 0 or -EDOM. */
-static int solve(const struct incise_propagation *p,
-		 const struct incise_uncertainty *uncertainty, struct origin *o)
+static int solve_propagation(const struct incise_propagation *p,
+			     const struct incise_uncertainty *uncertainty,
+			     struct origin *o)
 {
 	double mean = o->sum / p->weights;
 
@@ -359,12 +360,12 @@ int incise_propagation_end(struct incise_propagation *p, const struct incise_mod
 
 		if (!o->b)
 			o->b = malloc((size_t)p->n * sizeof(*o->b));
-		rc = o->b ? solve(p, uncertainty, o) : -ENOMEM;
+		rc = o->b ? solve_propagation(p, uncertainty, o) : -ENOMEM;
 	}
 	if (!rc)
 		rc = join(p);
 	if (rc == -ENOMEM)
-		return no_memory(err);
+		return no_propagation_memory(err);
 	if (rc)
 		return incise_error_set(err, EDOM,
 					"the uncertainties have no finite effect on the "
@@ -415,7 +416,7 @@ int incise_propagation_finish(const struct incise_propagation *p,
 			    noise * noise * SCATTER_LEAST * SCATTER_LEAST));
 	rig = sum_of_sources(p, &n_rig);
 	if (!rig)
-		return no_memory(err);
+		return no_propagation_memory(err);
 	rc = incise_uncertainty_set_calibration(uncertainty, scatter, p->common,
 						p->n_common, rig, n_rig, err);
 	free(rig);

@@ -309,7 +309,7 @@ static int find_uncertainty(struct learner *l, const struct incise_tuning *tunin
 	return rc;
 }
 
-static int learn(struct learner *l)
+static int learn_train(struct learner *l)
 {
 	struct incise_train_report *report = l->report;
 	bool classic = l->options->classic;
@@ -370,7 +370,7 @@ static int learn(struct learner *l)
 	return l->options->uncertainty ? find_uncertainty(l, tuning) : 0;
 }
 
-static int fail(struct incise_error *err, int rc)
+static int fail_train(struct incise_error *err, int rc)
 {
 	return incise_error_set(
 		err, -rc,
@@ -407,7 +407,7 @@ int incise_train_sample(struct incise_model *model, const struct incise_pairs *t
 		return rc;
 	l = calloc(1, sizeof(*l));
 	if (!l)
-		return fail(err, -ENOMEM);
+		return fail_train(err, -ENOMEM);
 	l->train = train;
 	l->check = check;
 	l->options = options;
@@ -419,7 +419,7 @@ int incise_train_sample(struct incise_model *model, const struct incise_pairs *t
 	l->model = incise_model_copy(model);
 	rc = l->model ? 0 : -ENOMEM;
 	if (!rc && !incise_watch_ask(&l->watch))
-		rc = learn(l);
+		rc = learn_train(l);
 	if (l->watch.stopped)
 		rc = -ECANCELED;
 	if (!rc)
@@ -433,7 +433,7 @@ int incise_train_sample(struct incise_model *model, const struct incise_pairs *t
 	incise_sample_free(&l->tuned);
 	failed = l->failed;
 	free(l);
-	return rc && !failed ? fail(err, rc) : rc;
+	return rc && !failed ? fail_train(err, rc) : rc;
 }
 
 int incise_train(struct incise_model *model, const struct incise_pairs *train,

@@ -40,7 +40,7 @@ struct training {
 	bool named; /* the error of a search names what it is of */
 };
 
-static int no_memory(struct training *t)
+static int no_train_sources_memory(struct training *t)
 {
 	return incise_error_set(&t->err, ENOMEM, "no memory to train");
 }
@@ -131,7 +131,7 @@ static int agree_on_error(struct training *t, int rc)
 	if (!t->ranks)
 		return rc;
 	if (t->ranks->gather(rc ? &t->err : &none, sizeof(none), &bytes, &sizes))
-		return no_memory(t);
+		return no_train_sources_memory(t);
 	all = bytes;
 	for (int r = 0; r < t->ranks->size && !t->trained->shared; r++)
 		if (all[r].code) {
@@ -154,7 +154,7 @@ static int share_surveys(struct training *t)
 
 	free(mine);
 	if (rc)
-		return no_memory(t);
+		return no_train_sources_memory(t);
 	for (size_t r = 0, at = 0; r < (size_t)t->ranks->size && !rc; at += sizes[r], r++)
 		if (r != (size_t)t->ranks->rank)
 			rc = incise_corpus_add(corpus, (char *)all + at, sizes[r],
@@ -174,7 +174,7 @@ static int share_premises(struct training *t, struct incise_factor **factor)
 
 	free(mine);
 	if (rc)
-		return no_memory(t);
+		return no_train_sources_memory(t);
 	if (!*factor)
 		*factor = incise_factor_decode(all, sizes[0], "rank 0", &t->err);
 	free(all);
@@ -205,7 +205,7 @@ static int add_ranks(struct training *t, struct incise_factor *factor)
 		if (ranks->rank % (2 * step)) {
 			bytes = incise_factor_encode(factor, &n);
 			if (!bytes)
-				return no_memory(t);
+				return no_train_sources_memory(t);
 			ranks->send(ranks->rank - step, bytes, n);
 			free(bytes);
 			return 0;
@@ -216,7 +216,7 @@ static int add_ranks(struct training *t, struct incise_factor *factor)
 		rc = bytes ? add_sums(factor,
 				      incise_factor_decode(bytes, n, name, &t->err), name,
 				      &t->err)
-			   : no_memory(t);
+			   : no_train_sources_memory(t);
 		free(bytes);
 	}
 	return rc;
@@ -356,7 +356,7 @@ static int survey_sources(struct training *t)
 		options->n_inputs, t->reading.group, options->train.seed,
 		sample > INCISE_CORPUS_SAMPLE ? sample : INCISE_CORPUS_SAMPLE);
 	if (!trained->corpus)
-		return no_memory(t);
+		return no_train_sources_memory(t);
 	first = resume_surveys(t);
 	if (first < 0)
 		return first;
@@ -509,7 +509,7 @@ static int fold_passes(struct training *t, const struct incise_model *premises)
 	if (!t->propagation)
 		return fold_sources(t, premises);
 	model = incise_model_copy(premises);
-	rc = model ? 0 : no_memory(t);
+	rc = model ? 0 : no_train_sources_memory(t);
 	scatter = find_scatter(
 		premises, &incise_corpus_side(t->trained->corpus, false)->sample.pairs);
 	for (int pass = 0; pass < PASSES && !rc; pass++)
@@ -558,7 +558,7 @@ static int search_premises(struct training *t)
 		return name_error(t, -errno);
 	trained->initial = incise_model_copy(trained->model);
 	if (!trained->initial)
-		return no_memory(t);
+		return no_train_sources_memory(t);
 	rc = incise_train_sample(trained->model, &fit->sample.pairs,
 				 check->sample.pairs.n ? &check->sample.pairs : NULL,
 				 &options, options.classic ? NULL : &sums,
@@ -672,7 +672,7 @@ static int judge_model(struct training *t)
 			     &t->err))
 		return name_error(t, -t->err.code);
 	trained->notes = make_notes(t);
-	return trained->notes ? 0 : no_memory(t);
+	return trained->notes ? 0 : no_train_sources_memory(t);
 }
 
 /* --- all of it ----------------------------------------------------------------------- */
@@ -724,7 +724,7 @@ int incise_train_sources(struct incise_train_source *sources, int n,
 	*trained = (struct incise_trained){0};
 	t.sources = incise_readers_new(sources, n, options->group, &t.reading);
 	t.how = describe_options(&t);
-	rc = t.sources && t.how ? 0 : no_memory(&t);
+	rc = t.sources && t.how ? 0 : no_train_sources_memory(&t);
 	trained->group = t.reading.group;
 	if (!rc)
 		t.progress = open_progress(&t);

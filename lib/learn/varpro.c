@@ -45,8 +45,8 @@ struct state {
 };
 
 /* The best consequents for some premises; *error is the penalised squared error. */
-static int solve(struct state *s, const struct incise_basis *basis, double *consequents,
-		 double *error)
+static int solve_varpro(struct state *s, const struct incise_basis *basis,
+			double *consequents, double *error)
 {
 	const double *factor;
 	int stride;
@@ -144,7 +144,7 @@ static bool improve(struct state *s, struct incise_basis *basis, double *consequ
 		if (find_step(s, *mu * norm * norm))
 			continue;
 		incise_premises_step(&trial, s->step);
-		if (solve(s, &trial, trial_consequents, &trial_error) ||
+		if (solve_varpro(s, &trial, trial_consequents, &trial_error) ||
 		    !(trial_error < *error * (1 - TOLERANCE)))
 			continue;
 		*basis = trial;
@@ -182,7 +182,7 @@ int incise_varpro_run(struct incise_basis *basis, double *consequents,
 	s.scale = malloc(q * sizeof(double));
 	if (!trial || !s.linear || !s.all || !s.damped || !s.kept || !s.step || !s.scale)
 		goto out;
-	rc = solve(&s, basis, consequents, &error);
+	rc = solve_varpro(&s, basis, consequents, &error);
 	if (rc)
 		goto out;
 	for (varpro->run = 1;; varpro->run++) {

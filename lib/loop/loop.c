@@ -33,7 +33,7 @@ struct run {
 	int64_t stale_ns;      /* time of the first tick without a fresh pose */
 };
 
-static void count(uint64_t *histogram, int64_t value)
+static void count_loop(uint64_t *histogram, int64_t value)
 {
 	if (value < 0)
 		value = 0;
@@ -110,7 +110,7 @@ static INCISE_REALTIME int run_tick(struct run *run, struct incise_tick *tick,
 
 	if (cost_ns > run->stats->tick_max_ns)
 		run->stats->tick_max_ns = cost_ns;
-	count(run->stats->tick_100ns, cost_ns / 100);
+	count_loop(run->stats->tick_100ns, cost_ns / 100);
 	count_tick(run->stats, tick);
 	report_changes(run, tick);
 	incise_state_tick(options->state, tick, run->lag_ns, cost_ns, run->skipped);
@@ -199,7 +199,7 @@ static INCISE_REALTIME void count_lateness(struct run *run, int64_t now_ns)
 	run->lag_ns = lag_ns;
 	if (lag_ns > run->stats->lateness_max_ns)
 		run->stats->lateness_max_ns = lag_ns;
-	count(run->stats->lateness_us, lag_ns / 1000);
+	count_loop(run->stats->lateness_us, lag_ns / 1000);
 }
 
 /* Returns 0 or a device's errno; *ended is the result of options->ticked(). */

@@ -9,7 +9,7 @@
 #include <unistd.h>
 #include "proc_file.h"
 
-static bool is_digit(char c)
+static bool is_proc_file_digit(char c)
 {
 	return c >= '0' && c <= '9';
 }
@@ -67,7 +67,7 @@ bool proc_file_integer(const char *text, long long *value)
 	const char *digits = text + (*text == '-');
 	char *end;
 
-	if (!is_digit(*digits))
+	if (!is_proc_file_digit(*digits))
 		return false;
 	errno = 0;
 	*value = strtoll(text, &end, 10);
@@ -75,14 +75,14 @@ bool proc_file_integer(const char *text, long long *value)
 }
 
 /* A number of at most nine digits; returns the text behind it, or NULL. */
-static const char *number(const char *text, int *value)
+static const char *read_proc_number(const char *text, int *value)
 {
 	int length = 0;
 
 	*value = 0;
-	while (is_digit(text[length]) && length < 9)
+	while (is_proc_file_digit(text[length]) && length < 9)
 		*value = *value * 10 + (text[length++] - '0');
-	return length && !is_digit(text[length]) ? text + length : NULL;
+	return length && !is_proc_file_digit(text[length]) ? text + length : NULL;
 }
 
 bool proc_file_lists(const char *list, int cpu)
@@ -92,10 +92,10 @@ bool proc_file_lists(const char *list, int cpu)
 	while (list && *list) {
 		int first, last;
 
-		list = number(list, &first);
+		list = read_proc_number(list, &first);
 		last = first;
 		if (list && *list == '-')
-			list = number(list + 1, &last);
+			list = read_proc_number(list + 1, &last);
 		if (!list || (*list && *list != ','))
 			return false;
 		has |= cpu >= first && cpu <= last;

@@ -63,8 +63,8 @@ struct attributes {
 /* More than a haptic loop ever has: some sanitizers map terabytes. */
 #define LOCK_BYTES_MAX (64ULL << 30)
 
-static int check_setup(const struct incise_realtime_setup *setup,
-		       struct incise_error *err)
+static int check_realtime_setup(const struct incise_realtime_setup *setup,
+				struct incise_error *err)
 {
 	bool deadline = setup->policy == INCISE_REALTIME_DEADLINE;
 
@@ -273,7 +273,7 @@ int incise_realtime_checks(const struct incise_realtime_setup *setup,
 			   struct incise_realtime_check *checks, int n)
 {
 	struct realtime_answers answers;
-	int rc = check_setup(setup, NULL);
+	int rc = check_realtime_setup(setup, NULL);
 
 	if (!rc)
 		rc = realtime_try(setup, &answers);
@@ -285,7 +285,7 @@ static int require(const struct incise_realtime_setup *setup, struct incise_erro
 {
 	struct incise_realtime_check checks[INCISE_REALTIME_CHECKS];
 	struct realtime_answers answers;
-	int rc = check_setup(setup, err), n;
+	int rc = check_realtime_setup(setup, err), n;
 
 	if (rc)
 		return rc;
@@ -408,7 +408,7 @@ void incise_realtime_free(struct incise_realtime *realtime)
 }
 
 /* Returns the text behind the number, or NULL. */
-static const char *number(const char *text, uint64_t *value)
+static const char *read_realtime_number(const char *text, uint64_t *value)
 {
 	char *end;
 
@@ -437,17 +437,17 @@ static int read_faults(const char *text, struct incise_realtime_counts *counts)
 		at += strspn(at, " ");
 		at += strcspn(at, " ");
 	}
-	at = number(at, &counts->minor_faults);
-	at = at ? number(at, &children) : NULL;
-	at = at ? number(at, &counts->major_faults) : NULL;
+	at = read_realtime_number(at, &counts->minor_faults);
+	at = at ? read_realtime_number(at, &children) : NULL;
+	at = at ? read_realtime_number(at, &counts->major_faults) : NULL;
 	return at ? 0 : -EIO;
 }
 
-static int read_line(const char *text, const char *key, uint64_t *value)
+static int read_realtime_line(const char *text, const char *key, uint64_t *value)
 {
 	const char *at = strstr(text, key);
 
-	return at && number(at + strlen(key), value) ? 0 : -EIO;
+	return at && read_realtime_number(at + strlen(key), value) ? 0 : -EIO;
 }
 
 int realtime_count_below(const char *folder, int tid,
@@ -466,9 +466,11 @@ int realtime_count_below(const char *folder, int tid,
 	if (!rc)
 		rc = proc_file_read(folder, path, text, sizeof(text));
 	if (rc >= 0)
-		rc = read_line(text, "\nvoluntary_ctxt_switches:", &read.voluntary);
+		rc = read_realtime_line(text,
+					"\nvoluntary_ctxt_switches:", &read.voluntary);
 	if (!rc)
-		rc = read_line(text, "\nnonvoluntary_ctxt_switches:", &read.involuntary);
+		rc = read_realtime_line(
+			text, "\nnonvoluntary_ctxt_switches:", &read.involuntary);
 	if (rc)
 		return rc == -ENOENT || rc == -ESRCH ? -ESRCH : -EIO;
 	*counts = read;

@@ -56,8 +56,8 @@ static void set_keep(struct incise_realtime_check *check, const char *command)
 }
 
 /* The first line of a file below the root; false and "" without one. */
-static bool read_line(const struct judgement *j, const char *path, char *text,
-		      size_t size)
+static bool read_realtime_checks_line(const struct judgement *j, const char *path,
+				      char *text, size_t size)
 {
 	int length = proc_file_read(j->root, path, text, size);
 
@@ -144,7 +144,7 @@ static void check_deadline(const struct judgement *j, struct incise_realtime_che
 			  "SCHED_DEADLINE is denied: this program may not run on all "
 			  "CPUs, or a sandbox denies it");
 		/* Only a list of numbers goes into a command, whatever the file says. */
-		if (read_line(j, CPUS "online", cpus, sizeof(cpus)) &&
+		if (read_realtime_checks_line(j, CPUS "online", cpus, sizeof(cpus)) &&
 		    !cpus[strspn(cpus, "0123456789,-")])
 			set_fix(check, "taskset -pc %s $$", cpus);
 	} else if (error == EBUSY) {
@@ -200,7 +200,7 @@ static void check_cpu(const struct judgement *j, struct incise_realtime_check *c
 		set_found(check, "CPU %d", cpu);
 	else if (error != EINVAL)
 		set_found(check, "CPU %d is not available: %s", cpu, strerror(error));
-	else if (!read_line(j, CPUS "online", cpus, sizeof(cpus)) ||
+	else if (!read_realtime_checks_line(j, CPUS "online", cpus, sizeof(cpus)) ||
 		 proc_file_lists(cpus, cpu))
 		set_found(check,
 			  "CPU %d is not available: it is not in the cpuset of this "
@@ -214,7 +214,8 @@ static void check_kernel(const struct judgement *j, struct incise_realtime_check
 {
 	char text[16];
 
-	check->ok = read_line(j, "/sys/kernel/realtime", text, sizeof(text)) &&
+	check->ok = read_realtime_checks_line(j, "/sys/kernel/realtime", text,
+					      sizeof(text)) &&
 		    !strcmp(text, "1");
 	if (check->ok) {
 		set_found(check, "PREEMPT_RT");
@@ -236,13 +237,15 @@ static void check_throttling(const struct judgement *j,
 	long long runtime_us, period_us;
 
 	check->ok = true;
-	if (!read_line(j, "/proc/sys/kernel/sched_rt_runtime_us", text, sizeof(text))) {
+	if (!read_realtime_checks_line(j, "/proc/sys/kernel/sched_rt_runtime_us", text,
+				       sizeof(text))) {
 		set_found(check, "the kernel has none");
 		return;
 	}
 	if (!proc_file_integer(text, &runtime_us) || runtime_us < -1)
 		runtime_us = 0;
-	if (!read_line(j, "/proc/sys/kernel/sched_rt_period_us", text, sizeof(text)) ||
+	if (!read_realtime_checks_line(j, "/proc/sys/kernel/sched_rt_period_us", text,
+				       sizeof(text)) ||
 	    !proc_file_integer(text, &period_us) || period_us < 1)
 		period_us = 1000000;
 	if (runtime_us == -1) {
@@ -267,14 +270,14 @@ static void check_governor(const struct judgement *j, struct incise_realtime_che
 	char online[256], path[128], text[32], other[32] = "";
 	int seen = 0, slow = 0, of = -1;
 
-	if (!read_line(j, CPUS "online", online, sizeof(online)))
+	if (!read_realtime_checks_line(j, CPUS "online", online, sizeof(online)))
 		snprintf(online, sizeof(online), "0");
 	for (int cpu = 0; cpu < 1024; cpu++) {
 		if (j->setup->cpu >= 0 ? cpu != j->setup->cpu
 				       : !proc_file_lists(online, cpu))
 			continue;
 		snprintf(path, sizeof(path), CPUS "cpu%d/cpufreq/scaling_governor", cpu);
-		if (!read_line(j, path, text, sizeof(text)))
+		if (!read_realtime_checks_line(j, path, text, sizeof(text)))
 			continue;
 		seen++;
 		if (!strcmp(text, "performance"))
@@ -308,7 +311,8 @@ static void check_idle(const struct judgement *j, struct incise_realtime_check *
 	char driver[32];
 
 	check->ok = true;
-	if (!read_line(j, CPUS "cpuidle/current_driver", driver, sizeof(driver)) ||
+	if (!read_realtime_checks_line(j, CPUS "cpuidle/current_driver", driver,
+				       sizeof(driver)) ||
 	    !strcmp(driver, "none")) {
 		set_found(check, "the kernel has no deep idle states here");
 	} else if (!error) {
@@ -346,7 +350,8 @@ static void check_clock(const struct judgement *j, struct incise_realtime_check 
 			  (double)resolution_ns * 1e-6);
 		return;
 	}
-	if (!read_line(j, CLOCKSOURCE "current_clocksource", source, sizeof(source)))
+	if (!read_realtime_checks_line(j, CLOCKSOURCE "current_clocksource", source,
+				       sizeof(source)))
 		snprintf(source, sizeof(source), "unknown");
 	for (size_t i = 0; i < sizeof(slow) / sizeof(*slow); i++)
 		check->ok &= !!strcmp(source, slow[i]);
@@ -366,7 +371,7 @@ static void check_isolated(const struct judgement *j, struct incise_realtime_che
 	int cpu = j->setup->cpu;
 	char cpus[256];
 
-	check->ok = read_line(j, CPUS "isolated", cpus, sizeof(cpus)) &&
+	check->ok = read_realtime_checks_line(j, CPUS "isolated", cpus, sizeof(cpus)) &&
 		    proc_file_lists(cpus, cpu);
 	if (check->ok) {
 		set_found(check, "CPU %d is isolated", cpu);

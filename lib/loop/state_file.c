@@ -38,7 +38,7 @@ static int busy(const char *path, int fd, struct incise_error *err)
 }
 
 /* 0: there is nothing, or a page that may be replaced. */
-static int look(const char *path, struct incise_error *err)
+static int look_state_file(const char *path, struct incise_error *err)
 {
 	char magic[sizeof(STATE_MAGIC) - 1];
 	struct stat st;
@@ -115,7 +115,7 @@ static int create(struct incise_state_file *file)
 	return 0;
 }
 
-static int fill(struct incise_state_file *file, size_t size)
+static int fill_state_file(struct incise_state_file *file, size_t size)
 {
 	struct flock lock = {.l_type = F_WRLCK, .l_whence = SEEK_SET};
 	int rc;
@@ -134,13 +134,13 @@ int incise_state_file_new(struct incise_state_file *file, const char *path, size
 	int rc;
 
 	*file = (struct incise_state_file){.fd = -1};
-	rc = look(path, err);
+	rc = look_state_file(path, err);
 	if (rc)
 		return rc;
 	file->path = strdup(path);
 	rc = file->path ? create(file) : -ENOMEM;
 	if (!rc)
-		rc = fill(file, size);
+		rc = fill_state_file(file, size);
 	if (rc) {
 		incise_state_file_close(file);
 		return incise_error_set(
@@ -179,7 +179,7 @@ static int name_hidden(struct incise_state_file *file)
  */
 static int swapped(struct incise_state_file *file, struct incise_error *err)
 {
-	int rc = look(file->hidden, NULL);
+	int rc = look_state_file(file->hidden, NULL);
 
 	if (!rc)
 		return 0;

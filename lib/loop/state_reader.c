@@ -219,7 +219,8 @@ static int read_part(struct incise_state *state, uint64_t offset, void *to, size
 }
 
 /* A terminated, printable string. */
-static void take_text(char *to, size_t size, const char *from, size_t capacity)
+static void take_state_reader_text(char *to, size_t size, const char *from,
+				   size_t capacity)
 {
 	size_t n = strnlen(from, capacity < size ? capacity : size - 1);
 
@@ -234,8 +235,9 @@ static void take_head(struct incise_state_now *now, const struct state_head *hea
 	now->start_ns = head->start_ns;
 	now->start_realtime_ns = head->start_realtime_ns;
 	now->rate_hz = head->rate_hz;
-	take_text(now->rig, sizeof(now->rig), head->rig, sizeof(head->rig));
-	take_text(now->policy, sizeof(now->policy), head->policy, sizeof(head->policy));
+	take_state_reader_text(now->rig, sizeof(now->rig), head->rig, sizeof(head->rig));
+	take_state_reader_text(now->policy, sizeof(now->policy), head->policy,
+			       sizeof(head->policy));
 }
 
 static int take_run(struct incise_state_now *now, const struct state_run *run)
@@ -244,12 +246,14 @@ static int take_run(struct incise_state_now *now, const struct state_run *run)
 		return -EIO;
 	now->run = (enum incise_run)run->run;
 	now->since_ns = run->since_ns;
-	take_text(now->reason, sizeof(now->reason), run->reason, sizeof(run->reason));
-	take_text(now->scene, sizeof(now->scene), run->scene, sizeof(run->scene));
+	take_state_reader_text(now->reason, sizeof(now->reason), run->reason,
+			       sizeof(run->reason));
+	take_state_reader_text(now->scene, sizeof(now->scene), run->scene,
+			       sizeof(run->scene));
 	now->n_stages = (int)run->n_stages;
 	for (int i = 0; i < now->n_stages; i++)
-		take_text(now->stage[i], sizeof(now->stage[i]), run->stage[i],
-			  sizeof(run->stage[i]));
+		take_state_reader_text(now->stage[i], sizeof(now->stage[i]),
+				       run->stage[i], sizeof(run->stage[i]));
 	now->left_out =
 		(int)(run->left_out < COUNT_MAX ? run->left_out : (uint64_t)COUNT_MAX);
 	now->reloads = run->reloads;
@@ -340,7 +344,7 @@ static int take_slots(struct incise_state *state, uint64_t first, uint64_t n,
 	return good;
 }
 
-static uint64_t least(uint64_t a, uint64_t b)
+static uint64_t least_state_reader(uint64_t a, uint64_t b)
 {
 	return a < b ? a : b;
 }
@@ -365,8 +369,9 @@ int incise_state_ticks(struct incise_state *state, uint64_t *cursor,
 		first += gone;
 	}
 	while (got < n && first < written) {
-		uint64_t part = least(least(written - first, (uint64_t)(n - got)),
-				      least(CHUNK, ring->count - first % ring->count));
+		uint64_t part = least_state_reader(
+			least_state_reader(written - first, (uint64_t)(n - got)),
+			least_state_reader(CHUNK, ring->count - first % ring->count));
 
 		good = take_slots(state, first, part, ticks + got);
 		if (good < 0)

@@ -63,7 +63,7 @@ struct sum {
 	double value, error;
 };
 
-static void add(struct sum *sum, double value)
+static void add_state_writer(struct sum *sum, double value)
 {
 	double more = value - sum->error;
 	double next = sum->value + more;
@@ -100,9 +100,9 @@ static void add_work(struct work *work, const struct incise_tick *tick)
 		v3_sub(way_mm, tick->tool_mm, work->tool_mm);
 		work_mJ = -v3_dot(work->force_N, way_mm);
 		if (work_mJ > 0 && work_mJ < WORK_MAX_mJ)
-			add(&work->absorbed, work_mJ);
+			add_state_writer(&work->absorbed, work_mJ);
 		else if (work_mJ < 0 && work_mJ > -WORK_MAX_mJ)
-			add(&work->returned, -work_mJ);
+			add_state_writer(&work->returned, -work_mJ);
 	}
 	v3_copy(work->tool_mm, tick->tool_mm);
 	v3_copy(work->force_N, tick->command_N);
@@ -134,7 +134,7 @@ struct incise_state_writer {
 };
 
 /* Printable, and cut between characters. */
-static void put_text(char *to, size_t size, const char *text)
+static void put_state_writer_text(char *to, size_t size, const char *text)
 {
 	size_t n = text ? strlen(text) : 0;
 
@@ -157,11 +157,11 @@ static void put_path(char *to, size_t size, const char *path)
 		path += n - (size - 4);
 		while (((unsigned char)*path & 0xc0) == 0x80)
 			path++;
-		put_text(to, size - 3, path);
+		put_state_writer_text(to, size - 3, path);
 		memmove(to + 3, to, size - 3);
 		memcpy(to, "...", 3);
 	} else {
-		put_text(to, size, path);
+		put_state_writer_text(to, size, path);
 	}
 }
 
@@ -192,8 +192,8 @@ static void put_head(struct state_head *head, const struct incise_state_setup *s
 			  INCISE_STATE_TICKS);
 	head->pid = getpid();
 	head->rate_hz = setup->rate_hz;
-	put_text(head->rig, sizeof(head->rig), setup->rig);
-	put_text(head->policy, sizeof(head->policy), setup->policy);
+	put_state_writer_text(head->rig, sizeof(head->rig), setup->rig);
+	put_state_writer_text(head->policy, sizeof(head->policy), setup->policy);
 	memcpy(head->magic, STATE_MAGIC, sizeof(head->magic));
 }
 
@@ -524,7 +524,7 @@ void incise_state_run(struct incise_state_writer *w, enum incise_run run,
 	else if (run == INCISE_RUN_RUNNING)
 		w->running_ns = w->run.since_ns;
 	w->run.run = (uint32_t)run;
-	put_text(w->run.reason, 300, reason);
+	put_state_writer_text(w->run.reason, 300, reason);
 	publish_run(w);
 }
 
@@ -539,7 +539,7 @@ void incise_state_scene(struct incise_state_writer *w, const char *path,
 	put_path(w->run.scene, sizeof(w->run.scene), path);
 	memset(w->run.stage, 0, sizeof(w->run.stage));
 	while (plan && n < STATE_STAGES && (name = incise_plan_stage(plan, n))) {
-		put_text(w->run.stage[n], sizeof(w->run.stage[n]), name);
+		put_state_writer_text(w->run.stage[n], sizeof(w->run.stage[n]), name);
 		n++;
 	}
 	w->run.n_stages = n;
@@ -556,7 +556,7 @@ void incise_state_refused(struct incise_state_writer *w, const char *reason)
 	if (!w)
 		return;
 	w->run.refused++;
-	put_text(w->run.reason, 300, reason);
+	put_state_writer_text(w->run.reason, 300, reason);
 	publish_run(w);
 }
 

@@ -230,7 +230,7 @@ static void put_consequents(FILE *out, const struct incise_fixed *fx)
 }
 
 /* A name within a comment: nothing that could end it or warn. */
-static void put_name(FILE *out, const char *name)
+static void put_c_source_name(FILE *out, const char *name)
 {
 	for (; *name; name++)
 		fputc(isascii(*name) && (isalnum(*name) || strchr(" ._-+(),", *name))
@@ -244,7 +244,7 @@ static void put_comment(FILE *out, const struct incise_fixed *fx, const char *sy
 	fputs("/* SPDX-License-Identifier: LGPL-2.1-or-later OR GPL-2.0-only */\n"
 	      "/*\n * ",
 	      out);
-	put_name(out, fx->name);
+	put_c_source_name(out, fx->name);
 	fprintf(out,
 		": a fuzzy model of %" PRId32 " rules in fixed point, %s.\n"
 		" * Written by incise %s from its compiled form; compile the model again "
@@ -254,13 +254,13 @@ static void put_comment(FILE *out, const struct incise_fixed *fx, const char *sy
 		incise_version(), symbol);
 	for (int i = 0; i < fx->n_inputs; i++) {
 		fprintf(out, " * x[%d]     ", i);
-		put_name(out, fx->input[i].name);
+		put_c_source_name(out, fx->input[i].name);
 		fprintf(out, ", Q16.16; %.10g to %.10g, clamped\n",
 			fx->input[i].min / (double)INCISE_FIXED_ONE,
 			fx->input[i].max / (double)INCISE_FIXED_ONE);
 	}
 	fputs(" * returns  ", out);
-	put_name(out, fx->output);
+	put_c_source_name(out, fx->output);
 	fprintf(out,
 		", Q16.16; within %.3g of the model in real numbers for every\n *      "
 		"    input: a certified bound\n *\n * Q16.16: 65536 stands for 1 of "

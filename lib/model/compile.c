@@ -71,7 +71,7 @@ static int32_t q16(double x)
 }
 
 /* A name cut to fit, and zero-padded: the header was zeroed. */
-static void put_name(char *to, size_t size, const char *name)
+static void put_compile_name(char *to, size_t size, const char *name)
 {
 	memcpy(to, name, strnlen(name, size - 1));
 	for (char *c = to; *c; c++)
@@ -94,16 +94,17 @@ static void image_start(struct image *image, const struct source *source,
 	image->head.arithmetic = arithmetic;
 	image->head.n_inputs = (uint32_t)info->n_inputs;
 	image->head.n_rules = (uint32_t)info->n_rules;
-	put_name(image->head.name, sizeof(image->head.name), info->name);
-	put_name(image->head.output, sizeof(image->head.output), info->output.name);
+	put_compile_name(image->head.name, sizeof(image->head.name), info->name);
+	put_compile_name(image->head.output, sizeof(image->head.output),
+			 info->output.name);
 	for (int i = 0; i < info->n_inputs; i++) {
 		const struct incise_axis *axis = &source->axis[i];
 
 		image->head.input[i].min = q16(axis->min);
 		image->head.input[i].max = q16(axis->max);
 		image->head.input[i].n_mfs = axis->n;
-		put_name(image->head.input[i].name, sizeof(image->head.input[i].name),
-			 info->input[i].name);
+		put_compile_name(image->head.input[i].name,
+				 sizeof(image->head.input[i].name), info->input[i].name);
 	}
 }
 
@@ -525,8 +526,9 @@ static int build(struct image *image, const struct source *source, int arithmeti
 }
 
 /* The cheapest candidate within the budget; else *best has the least bound. */
-static int choose(struct image *best, const struct incise_grid *grid,
-		  const struct incise_fixed_options *o, const struct incise_model *model)
+static int choose_compile(struct image *best, const struct incise_grid *grid,
+			  const struct incise_fixed_options *o,
+			  const struct incise_model *model)
 {
 	static const int order[] = {INCISE_FIXED_FORCE, INCISE_FIXED_TABLE,
 				    INCISE_FIXED_DIRECT};
@@ -617,7 +619,7 @@ struct incise_fixed *incise_fixed_compile(const struct incise_model *model,
 	}
 	if (!many && incise_grid_init(grid, model, err))
 		goto out;
-	rc = choose(&best, many ? NULL : grid, &o, model);
+	rc = choose_compile(&best, many ? NULL : grid, &o, model);
 	if (rc == -ENOMEM)
 		incise_error_set(err, ENOMEM, "no memory to compile a model");
 	else if (rc == -E2BIG)

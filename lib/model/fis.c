@@ -54,7 +54,7 @@ struct reader {
 #define BLANKS " \t\r\n"
 
 /* End a text at its comment, which begins outside quotes, and at the white space before it. */
-static void cut(char *text)
+static void cut_fis_text(char *text)
 {
 	bool quoted = false;
 	char *end = text;
@@ -68,13 +68,13 @@ static void cut(char *text)
 }
 
 /* Next line that is not empty or a comment: 1, or 0 at the end of the file. */
-static int next_line(struct reader *in)
+static int next_fis_line(struct reader *in)
 {
 	int rc;
 
 	while ((rc = incise_lines_next(&in->lines, BLANKS)) > 0) {
 		in->text = in->lines.text + strspn(in->lines.text, BLANKS);
-		cut(in->text);
+		cut_fis_text(in->text);
 		if (*in->text)
 			break;
 	}
@@ -456,12 +456,12 @@ static int read_rule(struct reader *in)
 
 /* --- the whole file --- */
 
-static int read_file(struct reader *in)
+static int read_fis_file(struct reader *in)
 {
 	enum { NONE, SYSTEM, INPUT, OUTPUT, RULES } section = NONE;
 	int input = 0, rc;
 
-	while ((rc = next_line(in)) > 0) {
+	while ((rc = next_fis_line(in)) > 0) {
 		char *equals, *value;
 		int end = 0;
 
@@ -507,7 +507,7 @@ static int read_file(struct reader *in)
 				".fis file",
 				in->text);
 		*equals = 0;
-		cut(in->text);
+		cut_fis_text(in->text);
 		value = equals + 1 + strspn(equals + 1, BLANKS);
 		rc = section == SYSTEM	? system_key(in, in->text, value)
 		     : section == INPUT ? input_key(in, input, in->text, value)
@@ -553,7 +553,7 @@ struct incise_model *incise_model_load(const char *path, struct incise_error *er
 	rc = incise_lines_open(&in->lines, path, &fis, err);
 	if (rc)
 		goto out;
-	rc = read_file(in);
+	rc = read_fis_file(in);
 	incise_lines_close(&in->lines);
 out:
 	free(in);

@@ -74,7 +74,7 @@ static void blocks_over(const struct incise_grid *grid, struct incise_block bloc
  * its middle plus second derivatives times the way from there, which is tighter for small boxes.
  * The slopes in the middle are met.
  */
-static void look(struct branches *b, struct box *box)
+static void look_slope(struct branches *b, struct box *box)
 {
 	struct incise_block block[2];
 	struct incise_patch patch;
@@ -120,7 +120,7 @@ static bool is_done(const struct branches *b, const struct box *box, double tole
 }
 
 /* Cut in two along each input that has a width. @return number of parts */
-static int cut(const struct box *box, struct box *part)
+static int cut_slope_box(const struct box *box, struct box *part)
 {
 	int n = 1;
 
@@ -149,7 +149,7 @@ static int narrow(struct branches *b, struct box *box, int n, struct box *next, 
 	int n_next = 0, open;
 
 	for (int k = 0; k < n; k++)
-		look(b, &box[k]);
+		look_slope(b, &box[k]);
 	do {
 		open = 0;
 		for (int k = 0; k < n; k++)
@@ -159,7 +159,7 @@ static int narrow(struct branches *b, struct box *box, int n, struct box *next, 
 	last |= 4 * open > BOXES_MAX;
 	for (int k = 0; k < n; k++) {
 		if (!last && !is_done(b, &box[k], tolerance / 2)) {
-			n_next += cut(&box[k], next + n_next);
+			n_next += cut_slope_box(&box[k], next + n_next);
 			continue;
 		}
 		for (int i = 0; i < 2; i++) {
@@ -294,7 +294,7 @@ static double climb(const struct incise_secant *s, int input, double sign,
 }
 
 /* Keep the best, the steepest first. */
-static void keep(struct place *best, const struct place *place)
+static void keep_slope(struct place *best, const struct place *place)
 {
 	int k = STARTS;
 
@@ -306,7 +306,8 @@ static void keep(struct place *best, const struct place *place)
 	best[k] = *place;
 }
 
-static void search(const struct incise_secant *s, int input, struct incise_slope *slope)
+static void search_slope(const struct incise_secant *s, int input,
+			 struct incise_slope *slope)
 {
 	struct place best[2][STARTS];
 	double step[INCISE_MODEL_INPUTS_MAX];
@@ -326,9 +327,9 @@ static void search(const struct incise_secant *s, int input, struct incise_slope
 			place.x[i] = s->min[i] * (1 - u) + s->max[i] * u;
 		}
 		place.slope = s->slope(s->of, place.x, input);
-		keep(best[1], &place);
+		keep_slope(best[1], &place);
 		place.slope = -place.slope;
-		keep(best[0], &place);
+		keep_slope(best[0], &place);
 	}
 	*slope = (struct incise_slope){INFINITY, -INFINITY, false};
 	for (int k = 0; k < STARTS; k++) {
@@ -341,7 +342,7 @@ static void search(const struct incise_secant *s, int input, struct incise_slope
 void incise_secant_search(const struct incise_secant *secant, struct incise_slope *slopes)
 {
 	for (int i = 0; i < secant->n_inputs; i++)
-		search(secant, i, &slopes[i]);
+		search_slope(secant, i, &slopes[i]);
 }
 
 static double model_slope(const void *of, const double *x, int i)

@@ -332,7 +332,7 @@ double incise_uncertainty_sd(const struct incise_uncertainty *uncertainty,
 #define fail incise_lines_error
 
 /* Next line that is not empty or a comment: 1, or 0 at the end. */
-static int next_line(struct incise_lines *in)
+static int next_uncertainty_line(struct incise_lines *in)
 {
 	int rc;
 
@@ -346,7 +346,7 @@ static int next_line(struct incise_lines *in)
 static char *value_of(struct incise_lines *in, const char *key)
 {
 	size_t length = strlen(key);
-	int rc = next_line(in);
+	int rc = next_uncertainty_line(in);
 
 	if (rc < 0)
 		return NULL;
@@ -372,7 +372,7 @@ static int integer_of(struct incise_lines *in, const char *key, long *value)
 }
 
 /* A finite number at *at, behind one space for all but the first. */
-static int number(struct incise_lines *in, char **at, double *value)
+static int read_uncertainty_number(struct incise_lines *in, char **at, double *value)
 {
 	char *end;
 
@@ -391,14 +391,14 @@ static int numbers(struct incise_lines *in, char **at, double *to, int n)
 	int rc = 0;
 
 	for (int k = 0; k < n && !rc; k++)
-		rc = number(in, at, to + k);
+		rc = read_uncertainty_number(in, at, to + k);
 	return rc;
 }
 
 /* The n numbers of a line of calibrations. */
 static int read_calibration(struct incise_lines *in, double *to, int n)
 {
-	int rc = next_line(in);
+	int rc = next_uncertainty_line(in);
 	char *at = in->text;
 
 	if (rc < 0)
@@ -415,7 +415,7 @@ static int read_calibration(struct incise_lines *in, double *to, int n)
 
 static int read_row(struct incise_lines *in, double *to, int n, int row)
 {
-	int rc = next_line(in);
+	int rc = next_uncertainty_line(in);
 	char *at = in->text;
 
 	if (rc < 0)
@@ -437,7 +437,7 @@ static int read_row(struct incise_lines *in, double *to, int n, int row)
 	return 0;
 }
 
-static int read_file(struct incise_lines *in, struct incise_uncertainty *u)
+static int read_uncertainty_file(struct incise_lines *in, struct incise_uncertainty *u)
 {
 	double *to = u->factor;
 	char *text, *end;
@@ -470,7 +470,7 @@ static int read_file(struct incise_lines *in, struct incise_uncertainty *u)
 	text = value_of(in, "noise");
 	if (!text)
 		return -errno;
-	rc = number(in, &text, &u->noise);
+	rc = read_uncertainty_number(in, &text, &u->noise);
 	if (rc)
 		return rc;
 	if (*text || u->noise < 0)
@@ -496,7 +496,7 @@ static int read_file(struct incise_lines *in, struct incise_uncertainty *u)
 				      u->n);
 	if (rc)
 		return rc;
-	rc = next_line(in);
+	rc = next_uncertainty_line(in);
 	if (rc > 0)
 		return fail(in, EINVAL, "'%.20s' after the last row", in->text);
 	return rc;
@@ -522,7 +522,7 @@ struct incise_uncertainty *incise_uncertainty_load(const char *path,
 	}
 	rc = incise_lines_open(&in, path, &sd, err);
 	if (!rc) {
-		rc = read_file(&in, u);
+		rc = read_uncertainty_file(&in, u);
 		incise_lines_close(&in);
 	}
 	if (rc) {

@@ -12,7 +12,7 @@
 
 #define TIME_MAX (INT64_MAX / 4) /* 73 years; sums and differences do not overflow */
 
-static size_t size_of(char type)
+static size_t size_of_batch(char type)
 {
 	switch (type) {
 	case 'c':
@@ -36,7 +36,7 @@ bool incise_batch_reserve(struct incise_batch *batch, size_t n)
 		capacity *= 2;
 	for (int i = 0; batch->form->types[i]; i++) {
 		void *more = reallocarray(batch->column[i].any, capacity,
-					  size_of(batch->form->types[i]));
+					  size_of_batch(batch->form->types[i]));
 
 		if (!more)
 			return false;
@@ -93,7 +93,7 @@ static void line_next(struct line *line)
 	}
 }
 
-static int width_of(uint64_t range)
+static int width_of_batch(uint64_t range)
 {
 	return !range		     ? 0
 	       : range <= UINT8_MAX  ? 1
@@ -103,7 +103,8 @@ static int width_of(uint64_t range)
 }
 
 /* The range of the differences from a line, modulo 2^64. */
-static uint64_t range_of(const int64_t *values, size_t n, uint64_t span, int64_t *least)
+static uint64_t range_of_batch(const int64_t *values, size_t n, uint64_t span,
+			       int64_t *least)
 {
 	struct line line = line_to(span, n);
 	int64_t low = values[0], high = values[0];
@@ -123,7 +124,7 @@ static uint64_t range_of(const int64_t *values, size_t n, uint64_t span, int64_t
 static uint8_t *put_integers(uint8_t *to, const int64_t *values, size_t n)
 {
 	int64_t base, base_of_line;
-	uint64_t range = range_of(values, n, 0, &base), range_of_line, span = 0;
+	uint64_t range = range_of_batch(values, n, 0, &base), range_of_line, span = 0;
 	struct line line;
 	int width;
 
@@ -131,14 +132,14 @@ static uint8_t *put_integers(uint8_t *to, const int64_t *values, size_t n)
 	if (values[n - 1] > values[0]) {
 		uint64_t rise = (uint64_t)values[n - 1] - (uint64_t)values[0];
 
-		range_of_line = range_of(values, n, rise, &base_of_line);
-		if (width_of(range_of_line) < width_of(range)) {
+		range_of_line = range_of_batch(values, n, rise, &base_of_line);
+		if (width_of_batch(range_of_line) < width_of_batch(range)) {
 			range = range_of_line;
 			base = base_of_line;
 			span = rise;
 		}
 	}
-	width = width_of(range);
+	width = width_of_batch(range);
 	*to = width;
 	put_word(to + 1, base, 8);
 	put_word(to + 9, span, 8);
@@ -198,7 +199,7 @@ size_t incise_batch_bound(const struct incise_batch *batch)
 	size_t bound = 0;
 
 	for (const char *type = batch->form->types; *type; type++)
-		bound += INTEGER_HEAD + batch->n * size_of(*type);
+		bound += INTEGER_HEAD + batch->n * size_of_batch(*type);
 	return bound;
 }
 
@@ -215,7 +216,7 @@ size_t incise_batch_encode(const struct incise_batch *batch, uint8_t *data)
 		else if (type == 'r' || type == 'n')
 			to = put_reals(to, column->r, batch->n);
 		else
-			to = put_bytes(to, column->any, batch->n, size_of(type));
+			to = put_bytes(to, column->any, batch->n, size_of_batch(type));
 	}
 	return to - data;
 }
@@ -333,8 +334,8 @@ const char *incise_batch_decode(struct incise_batch *batch,
 		if (!(type == 'i'   ? get_integers(&input, column->i, n)
 		      : type == 'r' ? get_reals(&input, column->r, n, false)
 		      : type == 'n' ? get_reals(&input, column->r, n, true)
-				    : get_bytes(&input, column->any, n, size_of(type),
-						type == 's')))
+				    : get_bytes(&input, column->any, n,
+						size_of_batch(type), type == 's')))
 			return "a column is impossible, or not as long as its count";
 	}
 	if (input.left)

@@ -11,7 +11,7 @@
 
 #define FILE_NAME "frames_mkv.so"
 
-static const struct incise_frames_module *load(struct incise_error *err)
+static const struct incise_frames_module *load_frames(struct incise_error *err)
 {
 	const struct incise_frames_module *frames;
 	struct incise_module module;
@@ -30,7 +30,7 @@ struct incise_frames_writer *incise_frames_writer_new(
 	const char *path, const struct incise_frames_shape *shape,
 	const struct incise_frames_options *options, struct incise_error *err)
 {
-	const struct incise_frames_module *module = load(err);
+	const struct incise_frames_module *module = load_frames(err);
 
 	return module ? module->create(path, shape, options, err) : NULL;
 }
@@ -51,7 +51,7 @@ int incise_frames_writer_close(struct incise_frames_writer *writer,
 struct incise_frames_reader *incise_frames_reader_new(const char *path,
 						      struct incise_error *err)
 {
-	const struct incise_frames_module *module = load(err);
+	const struct incise_frames_module *module = load_frames(err);
 	struct stat st;
 
 	/* libavformat would wait for a pipe. */

@@ -28,7 +28,7 @@ const struct incise_ledger_form incise_ledger_forms[INCISE_LEDGER_FORMS] = {
 				"iiinrriissss"},
 };
 
-static uint8_t *put(uint8_t *to, uint64_t value)
+static uint8_t *put_ledger(uint8_t *to, uint64_t value)
 {
 	for (int i = 0; i < 8; i++)
 		to[i] = value >> 8 * i;
@@ -160,13 +160,13 @@ static void seal_block(struct incise_ledger_block *block)
 {
 	uint8_t bytes[7 * 8], *to = bytes;
 
-	to = put(to, block->block);
-	to = put(to, block->first_seq);
-	to = put(to, block->last_seq);
-	to = put(to, block->first_ns);
-	to = put(to, block->last_ns);
-	to = put(to, block->count);
-	put(to, block->lost);
+	to = put_ledger(to, block->block);
+	to = put_ledger(to, block->first_seq);
+	to = put_ledger(to, block->last_seq);
+	to = put_ledger(to, block->first_ns);
+	to = put_ledger(to, block->last_ns);
+	to = put_ledger(to, block->count);
+	put_ledger(to, block->lost);
 	block->crc = incise_crc32c(block->crc, bytes, sizeof(bytes));
 }
 
@@ -245,7 +245,7 @@ static void add_number(incise_ledger_sink sink, void *user, char type, uint64_t 
 {
 	uint8_t bytes[9] = {type};
 
-	put(bytes + 1, value);
+	put_ledger(bytes + 1, value);
 	sink(user, bytes, sizeof(bytes));
 }
 

@@ -32,8 +32,8 @@ void incise_axes_take(struct incise_axes *axes, struct incise_rig *rig)
 }
 
 /* An actuator that does not move any more: keep why. Returns @rc. */
-static int refused(struct incise_axes *axes, int i,
-		   const struct incise_stepper_status *status, int rc)
+static int refused_actuate(struct incise_axes *axes, int i,
+			   const struct incise_stepper_status *status, int rc)
 {
 	axes->failed = &axes->axis[i];
 	axes->faults = status->faults & ~(unsigned int)INCISE_STEPPER_FAULT_TRAVEL;
@@ -76,7 +76,7 @@ static double rendered(const struct incise_axis *axis,
 }
 
 /* The nut goes where the spring would push with that force on the handle of the last tick. */
-static int set(struct incise_axis *axis, double along_N, struct incise_tick *tick)
+static int set_actuate(struct incise_axis *axis, double along_N, struct incise_tick *tick)
 {
 	double target_mm = axis->handle_mm + along_N / axis->info.spring_N_mm;
 	double held_mm = fmax(0, fmin(axis->info.travel_mm, target_mm));
@@ -108,7 +108,7 @@ int incise_axes_watch(struct incise_axes *axes, struct incise_tick *tick)
 			    status.state == INCISE_STEPPER_STATE_DISABLED))
 			rc = -EIO;
 		if (rc)
-			return refused(axes, i, &status, rc);
+			return refused_actuate(axes, i, &status, rc);
 		find_handle(&axes->axis[i], tick, &status);
 		tick->rendered_N[i] = rendered(&axes->axis[i], &status);
 	}
@@ -124,7 +124,7 @@ int incise_axes_render(struct incise_axes *axes, const double force_N[3],
 	for (int i = 0; i < axes->n; i++) {
 		rc = incise_stepper_status(axes->axis[i].stepper, &status[i]);
 		if (rc)
-			return refused(axes, i, &status[i], rc);
+			return refused_actuate(axes, i, &status[i], rc);
 	}
 	for (int i = 0; i < axes->n && !rc; i++) {
 		struct incise_axis *axis = &axes->axis[i];
@@ -132,10 +132,10 @@ int incise_axes_render(struct incise_axes *axes, const double force_N[3],
 		tick->actuated_N[i] = v3_dot(force_N, axis->dual);
 		find_handle(axis, tick, &status[i]);
 		tick->rendered_N[i] = rendered(axis, &status[i]);
-		rc = set(axis, tick->actuated_N[i], tick);
+		rc = set_actuate(axis, tick->actuated_N[i], tick);
 		if (rc) {
 			incise_stepper_status(axis->stepper, &status[i]);
-			refused(axes, i, &status[i], rc);
+			refused_actuate(axes, i, &status[i], rc);
 		}
 	}
 	incise_axes_rest(axes, force_N, tick);
@@ -157,7 +157,7 @@ int incise_axes_release(struct incise_axes *axes, bool keep)
 		if (keep)
 			continue;
 		incise_stepper_status(axis->stepper, &status);
-		refused(axes, i, &status, rc);
+		refused_actuate(axes, i, &status, rc);
 	}
 	return first;
 }

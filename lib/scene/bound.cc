@@ -319,7 +319,7 @@ static void set_numbers(struct T(plan) *plan)
 /* --- poses: the state of a filter ---------------------------------------------------------- */
 
 /* A state of the filter, or its errors, from one pose to the next: A = (I - K C) F. */
-static struct errors step(const struct incise_predict *p, const struct errors &from)
+static struct errors step_bound(const struct incise_predict *p, const struct errors &from)
 {
 	double T = p->period_s, x = from.x + from.v * T + from.a * T * T / 2;
 
@@ -366,9 +366,9 @@ static struct errors settle_filter(const struct incise_predict *p, const struct 
 		sum = sum_of(sum, 1, last);
 		if (ends(sum, last))
 			return sum_of({}, REST, sum);
-		x = step(p, x);
-		v = step(p, v);
-		a = step(p, a);
+		x = step_bound(p, x);
+		v = step_bound(p, v);
+		a = step_bound(p, a);
 	}
 	return {INFINITY, INFINITY, INFINITY};
 }
@@ -412,7 +412,7 @@ static struct errors respond(const struct incise_predict *p, double ahead_s)
 		if (ends(sum, most))
 			return sum_of({}, REST, sum);
 		before = now;
-		now = step(p, now);
+		now = step_bound(p, now);
 	}
 	return {INFINITY, INFINITY, INFINITY};
 }

@@ -47,8 +47,8 @@ static int input_of(const struct incise_plan *plan, enum incise_cutting_phase ph
 }
 
 /* The range of an input over the models that have it. Returns whether any has. */
-static bool range_of(const struct incise_plan *plan, enum incise_model_input kind,
-		     double ends[2])
+static bool range_of_check(const struct incise_plan *plan, enum incise_model_input kind,
+			   double ends[2])
 {
 	bool any = false;
 
@@ -410,8 +410,9 @@ static const enum incise_model_input unmoved[] = {INCISE_INPUT_TILT, INCISE_INPU
  * Search as the inputs are, then with those unmoved ones held at either end of their supports, in all
  * combinations, until one swings. Returns 0 or -ENOMEM.
  */
-static int search(struct incise_plan *plan, const struct incise_tracker_info *tracker,
-		  const struct incise_rest_trial *as_is, struct incise_rest *rest)
+static int search_check(struct incise_plan *plan,
+			const struct incise_tracker_info *tracker,
+			const struct incise_rest_trial *as_is, struct incise_rest *rest)
 {
 	struct incise_rest_trial own = *as_is, *const trial = &own;
 	enum incise_model_input inputs[UNMOVED];
@@ -421,7 +422,7 @@ static int search(struct incise_plan *plan, const struct incise_tracker_info *tr
 	for (int i = 0; i < plan->stability.n_axes; i++)
 		trial->gain = fmax(trial->gain, as_is->gain * pushed(plan, i));
 	for (int i = 0; i < UNMOVED; i++)
-		if (range_of(plan, unmoved[i], ends[n]))
+		if (range_of_check(plan, unmoved[i], ends[n]))
 			inputs[n++] = unmoved[i];
 	rc = incise_plan_rest(plan, tracker, trial, rest);
 	for (int corner = 0; n && corner < 1 << n && !rc && rest->rests; corner++) {
@@ -469,7 +470,7 @@ static bool helps(struct incise_plan *plan, const struct incise_tracker_info *tr
 	};
 	struct incise_rest rest = {.way = -1};
 
-	if (!search(plan, tracker, &trial, &rest) && rest.rests)
+	if (!search_check(plan, tracker, &trial, &rest) && rest.rests)
 		return true;
 	if (*way < 0)
 		*way = rest.way;
@@ -596,7 +597,7 @@ int incise_plan_check_rest(struct incise_plan *plan,
 
 	if (plan->scene->unchecked)
 		return 0;
-	if (search(plan, tracker, &as_is, rest))
+	if (search_check(plan, tracker, &as_is, rest))
 		return incise_error_set(err, ENOMEM, "no memory for a plan");
 	s->runs = rest->runs;
 	s->ticks = rest->ticks;

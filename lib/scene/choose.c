@@ -74,13 +74,13 @@ static const struct {
 _Static_assert(sizeof(all) / sizeof(*all) + 2 == INCISE_PLAN_OTHER_STAGES,
 	       "with pose and actuate these are INCISE_PLAN_OTHER_STAGES");
 
-static void leave_out(struct incise_plan *plan, const char *name, const char *why)
+static void leave_choose_out(struct incise_plan *plan, const char *name, const char *why)
 {
 	plan->left_out[plan->n_left_out].name = name;
 	plan->left_out[plan->n_left_out++].why = why;
 }
 
-static void keep(struct incise_plan *plan, struct incise_stage stage)
+static void keep_choose(struct incise_plan *plan, struct incise_stage stage)
 {
 	plan->stage[plan->n_stages++] = stage;
 }
@@ -92,10 +92,10 @@ static void choose_forces(struct incise_plan *plan)
 		const char *why = no_force(plan, own);
 
 		if (why && !plan->scene->full)
-			leave_out(plan, own->force->name, why);
+			leave_choose_out(plan, own->force->name, why);
 		else
-			keep(plan, (struct incise_stage){own->force->name, NULL,
-							 own->force->stage});
+			keep_choose(plan, (struct incise_stage){own->force->name, NULL,
+								own->force->stage});
 	}
 }
 
@@ -103,30 +103,32 @@ void incise_plan_choose(struct incise_plan *plan)
 {
 	const char *drawn = "incise view draws it, not the loop";
 
-	keep(plan, (struct incise_stage){.name = "pose",
-					 .run = plan->poses.tracker ? incise_stage_pose
-								    : incise_stage_fed});
+	keep_choose(plan,
+		    (struct incise_stage){.name = "pose",
+					  .run = plan->poses.tracker ? incise_stage_pose
+								     : incise_stage_fed});
 	for (size_t i = 0; i < sizeof(all) / sizeof(*all); i++) {
 		const char *why = all[i].why_not ? all[i].why_not(plan) : NULL;
 
 		if (all[i].forces)
 			choose_forces(plan);
 		if (why && !plan->scene->full)
-			leave_out(plan, all[i].name, why);
+			leave_choose_out(plan, all[i].name, why);
 		else
-			keep(plan,
-			     (struct incise_stage){all[i].name, NULL, all[i].numbers});
+			keep_choose(plan, (struct incise_stage){all[i].name, NULL,
+								all[i].numbers});
 	}
 	/* A device that is not there cannot be kept. */
 	if (plan->axes.n)
-		keep(plan, (struct incise_stage){.name = "actuate",
-						 .run = incise_stage_actuate});
+		keep_choose(plan, (struct incise_stage){.name = "actuate",
+							.run = incise_stage_actuate});
 	else
-		leave_out(plan, "actuate",
-			  plan->poses.tracker ? "the rig has no stepper"
-					      : "no rig, and so no stepper");
-	leave_out(plan, "wound",
-		  plan->scene->picture.wound ? drawn : "picture.wound is false");
-	leave_out(plan, "bleeding",
-		  plan->scene->picture.bleeding ? drawn : "picture.bleeding is false");
+		leave_choose_out(plan, "actuate",
+				 plan->poses.tracker ? "the rig has no stepper"
+						     : "no rig, and so no stepper");
+	leave_choose_out(plan, "wound",
+			 plan->scene->picture.wound ? drawn : "picture.wound is false");
+	leave_choose_out(plan, "bleeding",
+			 plan->scene->picture.bleeding ? drawn
+						       : "picture.bleeding is false");
 }

@@ -24,7 +24,7 @@ struct state {
 	struct incise_proxy proxy;
 };
 
-static void keep(struct state *to, const struct incise_plan *plan)
+static void keep_force_map(struct state *to, const struct incise_plan *plan)
 {
 	to->state = plan->doubles.state;
 	to->proxy = plan->proxy;
@@ -140,7 +140,7 @@ void incise_plan_force_map(struct incise_plan *plan, int64_t t_ns,
 
 	for (int i = 0; i < n_stages; i++)
 		kept[i] = all[i];
-	keep(&from, plan);
+	keep_force_map(&from, plan);
 	drop_limits(plan);
 	*map = (struct incise_force_map){.mean_ticks = n};
 	for (int j = 0; j < 3; j++) {

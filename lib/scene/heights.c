@@ -183,7 +183,7 @@ static int begin_mesh(struct heights *h)
 	return 0;
 }
 
-static int begin(struct heights *h, const double up[3])
+static int begin_heights(struct heights *h, const double up[3])
 {
 	const struct incise_surface *surface = h->surface;
 	const struct capsule *capsule = &surface->capsule;
@@ -227,8 +227,8 @@ struct polygon {
 };
 
 /* The part of a convex polygon where sign × at[axis] ≤ sign × bound. */
-static void cut(const struct polygon *from, struct polygon *to, int axis, double sign,
-		double bound)
+static void cut_heights_polygon(const struct polygon *from, struct polygon *to, int axis,
+				double sign, double bound)
 {
 	to->n = 0;
 	for (int i = 0; i < from->n; i++) {
@@ -254,8 +254,8 @@ static void band(const struct polygon *from, struct polygon *to, int axis, doubl
 {
 	struct polygon half;
 
-	cut(from, &half, axis, -1, least);
-	cut(&half, to, axis, 1, most);
+	cut_heights_polygon(from, &half, axis, -1, least);
+	cut_heights_polygon(&half, to, axis, 1, most);
 }
 
 /* The cells that a polygon touches along an axis. */
@@ -385,7 +385,7 @@ static bool is_inner(const struct heights *h, int i, int j)
 }
 
 /* Only cells that the mesh covers in full have heights at all their knots. */
-static int leave_out(struct heights *h)
+static int leave_heights_out(struct heights *h)
 {
 	for (int j = 0; j < h->frame.rows; j++)
 		for (int i = 0; i < h->frame.columns; i++)
@@ -425,14 +425,14 @@ static int fill_mesh(struct heights *h)
 			each_cell(h, face, &edge, NEARLY, mark);
 		}
 	}
-	return leave_out(h);
+	return leave_heights_out(h);
 }
 
 /* --- plane and capsule ------------------------------------------------------------------ */
 
 /* Height and slope of a smooth surface. */
-static bool look(const struct heights *h, const double at[2], double *height,
-		 double slope[2])
+static bool look_heights(const struct heights *h, const double at[2], double *height,
+			 double slope[2])
 {
 	double far = h->high[2] - h->low[2] + 4 * PLANE_MM;
 	double p[3] = {h->from[0] + at[0], h->from[1] + at[1], h->high[2] + far};
@@ -458,7 +458,7 @@ static int fill_smooth(struct heights *h)
 		for (int i = 0; i < h->frame.columns; i++) {
 			double at[3] = {i * h->cell, j * h->cell, 0}, height, slope[2];
 
-			if (!look(h, at, &height, slope)) {
+			if (!look_heights(h, at, &height, slope)) {
 				v3_add(at, at, 1, h->from);
 				return overhang(h, at);
 			}
@@ -535,7 +535,7 @@ static void normal_of(const double slope[2], double n[3])
 	n[2] = 1 / w;
 }
 
-static double between(const double a[2], const double b[2])
+static double between_heights(const double a[2], const double b[2])
 {
 	double n[3], m[3];
 
@@ -650,7 +650,7 @@ static void add_face(struct heights *h, uint32_t face, int i, int j,
 		       own[2];
 
 		slope_in(&c, at[0], at[1], own);
-		delta = fmax(delta, between(own, slope));
+		delta = fmax(delta, between_heights(own, slope));
 		epsilon = fmax(epsilon, fabs(height_on(h, face, p->at[k]) -
 					     height_in(&c, at[0], at[1])));
 		for (int axis = 0; axis < 2; axis++) {
@@ -681,12 +681,12 @@ static int add_smooth(struct heights *h, int i, int j)
 		double at[3] = {(i + u) * h->cell, (j + v) * h->cell, 0};
 		double slope[2], own[2];
 
-		if (!look(h, at, &height, slope)) {
+		if (!look_heights(h, at, &height, slope)) {
 			v3_add(at, at, 1, h->from);
 			return overhang(h, at);
 		}
 		slope_in(&c, u, v, own);
-		delta = fmax(delta, between(own, slope));
+		delta = fmax(delta, between_heights(own, slope));
 		epsilon = fmax(epsilon, fabs(height - height_in(&c, u, v)));
 		steepest = fmax(steepest, hypot(slope[0], slope[1]));
 		apart = fmax(apart, hypot(own[0] - slope[0], own[1] - slope[1]));
@@ -910,7 +910,7 @@ static bool place_cells(struct heights *h, int shift)
 	return true;
 }
 
-static int fill(struct heights *h)
+static int fill_heights(struct heights *h)
 {
 	int rc = new_cells(h);
 
@@ -919,7 +919,7 @@ static int fill(struct heights *h)
 	return rc ? rc : add_shares(h);
 }
 
-static void keep(struct heights *h, struct incise_heights *heights, double reach)
+static void keep_heights(struct heights *h, struct incise_heights *heights, double reach)
 {
 	struct bounds bounds = bound(&h->shares, reach);
 
@@ -936,7 +936,7 @@ static void keep(struct heights *h, struct incise_heights *heights, double reach
 }
 
 /* From large cells to small ones, until the wanted bound is reached. */
-static int choose(struct heights *h, struct incise_heights *heights)
+static int choose_heights(struct heights *h, struct incise_heights *heights)
 {
 	double best = -1, least = fmax(h->leave_mm, fmin(1, h->reach_mm));
 	double whole = fmax(h->reach_mm, h->leave_mm);
@@ -947,7 +947,7 @@ static int choose(struct heights *h, struct incise_heights *heights)
 
 		if (!place_cells(h, shift))
 			continue;
-		rc = fill(h);
+		rc = fill_heights(h);
 		if (rc)
 			return rc;
 		reach = find_reach(&h->shares, least, whole, h->wanted_mm);
@@ -959,10 +959,10 @@ static int choose(struct heights *h, struct incise_heights *heights)
 		    bound(&h->shares, least).depth_mm < HUGE_VAL &&
 		    (!heights->height ||
 		     bound(&h->shares, least).depth_mm < heights->depth_bound_mm))
-			keep(h, heights, least);
+			keep_heights(h, heights, least);
 		if (reach > best) {
 			best = reach;
-			keep(h, heights, reach);
+			keep_heights(h, heights, reach);
 		}
 	}
 	if (heights->height)
@@ -988,9 +988,9 @@ int incise_heights_make(const struct incise_surface *surface, const double up[3]
 	int rc;
 
 	*heights = (struct incise_heights){0};
-	rc = begin(&h, up);
+	rc = begin_heights(&h, up);
 	if (!rc)
-		rc = choose(&h, heights);
+		rc = choose_heights(&h, heights);
 	if (rc)
 		incise_heights_free(heights);
 	free_cells(&h);

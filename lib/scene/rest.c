@@ -376,7 +376,7 @@ static void go_to(const struct search *s, struct run *run, double t_s)
 	run->t_s = t_s;
 }
 
-static void feed(struct search *s, const struct run *run, unsigned int pose)
+static void feed_rest(struct search *s, const struct run *run, unsigned int pose)
 {
 	struct incise_tracker_sample sample = {
 		.t_ns = to_ns(run->pose[pose % POSES_MOST].arrival_s),
@@ -400,7 +400,7 @@ static void tick(struct search *s, struct run *run)
 	for (; run->first != run->last &&
 	       run->pose[run->first % POSES_MOST].arrival_s <= run->t_s;
 	     run->first++)
-		feed(s, run, run->first);
+		feed_rest(s, run, run->first);
 	incise_plan_tick(&s->plan, to_ns(run->t_s), &out);
 	s->ticks++;
 	for (int i = 0; i < 3; i++) {
@@ -429,7 +429,7 @@ static void tick(struct search *s, struct run *run)
 }
 
 /* Where it starts; a guided one goes along the skin meanwhile. */
-static void hold(const struct search *s, struct run *run)
+static void hold_rest(const struct search *s, struct run *run)
 {
 	for (int i = 0; i < (s->way.guided ? 1 : 3); i++) {
 		run->device[i].position_mm =
@@ -439,7 +439,7 @@ static void hold(const struct search *s, struct run *run)
 }
 
 /* In the air, until the force may start. */
-static void start(struct search *s, struct run *run)
+static void start_rest(struct search *s, struct run *run)
 {
 	double air_s = AIR_S + s->plan.scene->limits.ramp_ms * 1e-3;
 	int ticks = (int)(air_s / s->device.period_s);
@@ -447,7 +447,7 @@ static void start(struct search *s, struct run *run)
 	*run = (struct run){.lean_N = 0};
 	for (int i = 0; i < 3; i++)
 		run->device[i] = plant(s, i);
-	hold(s, run);
+	hold_rest(s, run);
 	for (int i = 0; i < 3; i++)
 		run->device[i].wall_mm = run->device[i].position_mm;
 	for (int i = 0; i < 3; i++)
@@ -456,9 +456,9 @@ static void start(struct search *s, struct run *run)
 	s->parts = s->rested_parts;
 	for (int k = 1; k <= ticks; k++) {
 		tick(s, run);
-		hold(s, run);
+		hold_rest(s, run);
 		go_to(s, run, k * s->device.period_s);
-		hold(s, run);
+		hold_rest(s, run);
 	}
 }
 
@@ -642,8 +642,9 @@ static double lean(struct search *s, struct run *run, struct window *last)
 }
 
 /* Notes the run when it is the worst so far. */
-static void note(const struct search *s, const struct run *run, const struct window *last,
-		 double settle_s, int way, struct incise_rest *rest)
+static void note_rest(const struct search *s, const struct run *run,
+		      const struct window *last, double settle_s, int way,
+		      struct incise_rest *rest)
 {
 	const double *at_mm = s->way.at->point_mm;
 	double depth_mm = depth_of(s, last), lean_N[3];
@@ -753,7 +754,7 @@ static bool judge_linear(struct search *s, const struct run *run, double depth_m
 							     1, NULL) >= 1);
 			settle_s = here.paid ? settle_s : 0;
 			rest->runs++;
-			note(s, &kicked, &last, settle_s, way, rest);
+			note_rest(s, &kicked, &last, settle_s, way, rest);
 		}
 		here.margin = here.paid ? INCISE_PLAN_MARGIN_MOST
 					: here.margin * (1 + s->way.reserve);
@@ -784,7 +785,7 @@ static bool try(struct search *s, struct run *run, int lean_of, int way,
 	double settle_s = lean(s, run, &last), depth_mm = depth_of(s, &last);
 
 	rest->runs++;
-	note(s, run, &last, settle_s, way, rest);
+	note_rest(s, run, &last, settle_s, way, rest);
 	s->decides |= depth_mm >= 0;
 	if (!(settle_s > 0))
 		return false;
@@ -805,7 +806,7 @@ static bool lean_all(struct search *s, const struct incise_plan *plan,
 		return true;
 	set_way(s, plan->scene, way);
 	set_plan(s, plan, trial);
-	start(s, &air);
+	start_rest(s, &air);
 	s->air = s->plan;
 	s->air_parts = s->parts;
 	s->decides = false;
@@ -826,8 +827,8 @@ static bool lean_all(struct search *s, const struct incise_plan *plan,
 	return true;
 }
 
-static void search(struct search *s, const struct incise_plan *plan,
-		   const struct incise_rest_trial *trial, struct incise_rest *rest)
+static void search_rest(struct search *s, const struct incise_plan *plan,
+			const struct incise_rest_trial *trial, struct incise_rest *rest)
 {
 	bool model = plan->model || plan->fixed;
 	int n_tools = plan->inserts ? 2 : 1, number = 0;
@@ -888,7 +889,7 @@ static void shake(struct search *s, const struct incise_plan *plan,
 
 	set_way(s, plan->scene, &way);
 	set_plan(s, plan, trial);
-	start(s, &run);
+	start_rest(s, &run);
 	run.lean_N = plan->scene->limits.force_N / 2;
 	run.noise_mm = INCISE_REST_NOISE_MM;
 	run.random = incise_random_key(1, INCISE_RANDOM_TRACKER);
@@ -1072,7 +1073,7 @@ int incise_plan_rest(const struct incise_plan *plan,
 				fmax(s->device.latency_s / (POSES_MOST - 2),
 				     s->device.period_s / (INCISE_PLAN_POSES - 1)));
 	s->device.damping_N_s_mm = trial->damping_N_s_mm;
-	search(s, plan, trial, rest);
+	search_rest(s, plan, trial, rest);
 	if (rest->rests)
 		shake(s, plan, trial, rest);
 	rest->ticks = s->ticks;

@@ -38,8 +38,8 @@ static bool is_usable(struct incise_plan *plan,
 	return usable;
 }
 
-static void take(struct incise_plan *plan, struct incise_tracker_sample *samples, int n,
-		 struct incise_tick *tick)
+static void take_stages(struct incise_plan *plan, struct incise_tracker_sample *samples,
+			int n, struct incise_tick *tick)
 {
 	int64_t now_ns = tick->t_ns;
 
@@ -64,7 +64,7 @@ int incise_stage_pose(struct incise_plan *plan, struct incise_tick *tick)
 	struct incise_tracker_sample samples[INCISE_PLAN_POSES];
 	int n = incise_tracker_read(plan->poses.tracker, samples, INCISE_PLAN_POSES);
 
-	take(plan, samples, n, tick);
+	take_stages(plan, samples, n, tick);
 	plan->poses.blind = n > 0 && plan->poses.none_usable &&
 			    tick->t_ns - plan->poses.unusable_ns >= INCISE_PLAN_BLIND_NS;
 	if (plan->poses.blind)
@@ -74,7 +74,7 @@ int incise_stage_pose(struct incise_plan *plan, struct incise_tick *tick)
 
 int incise_stage_fed(struct incise_plan *plan, struct incise_tick *tick)
 {
-	take(plan, plan->poses.fed, plan->poses.n_fed, tick);
+	take_stages(plan, plan->poses.fed, plan->poses.n_fed, tick);
 	plan->poses.n_fed = 0;
 	return 0;
 }

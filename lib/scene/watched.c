@@ -93,8 +93,9 @@ static void find_tip(const struct incise_plan *plan, struct incise_tick *tick)
 	v3_add(tick->position_mm, tick->tool_mm, -plan->scene->tool.handle_mm, axis);
 }
 
-static void take(struct incise_plan *plan, const struct incise_stepper_rendered *from,
-		 struct incise_tick *tick)
+static void take_watched(struct incise_plan *plan,
+			 const struct incise_stepper_rendered *from,
+			 struct incise_tick *tick)
 {
 	tick->flags |= from->flags;
 	tick->phase = from->phase;
@@ -126,7 +127,7 @@ static int find_rendered(struct incise_plan *plan, struct incise_tick *tick)
 	if (rc)
 		return rc;
 	plan->kernel.seen = true;
-	take(plan, &plan->kernel.last_seen, tick);
+	take_watched(plan, &plan->kernel.last_seen, tick);
 	v3_copy(plan->last_N, tick->command_N);
 	for (int i = 0; i < plan->axes.n; i++)
 		tick->actuated_N[i] = plan->kernel.last_seen.along_N[i];
@@ -152,8 +153,8 @@ static int watch_tick(struct incise_plan *plan, int64_t t_ns, struct incise_tick
 	return 0;
 }
 
-static void take_pose(struct incise_plan *plan, bool tube,
-		      const struct incise_tracker_sample *sample, int64_t now_ns)
+static void take_watched_pose(struct incise_plan *plan, bool tube,
+			      const struct incise_tracker_sample *sample, int64_t now_ns)
 {
 	give_pose(plan, tube, sample, now_ns);
 }
@@ -168,7 +169,7 @@ static void keep_stages(struct incise_plan *plan, bool feeds)
 	plan->stage[plan->n_stages++] =
 		(struct incise_stage){.name = "kernel", .run = find_rendered};
 	plan->ops.tick = watch_tick;
-	plan->ops.take_pose = take_pose;
+	plan->ops.take_pose = take_watched_pose;
 	plan->ops.faded = has_faded;
 	plan->kernel.runs = true;
 	plan->kernel.feeds = feeds;

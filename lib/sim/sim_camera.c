@@ -141,7 +141,8 @@ static void draw_scalpel(uint8_t *row, int y, double low, double high, double ha
 	}
 }
 
-static void draw(struct sim_camera *c, uint64_t n, const struct incise_blade *blade)
+static void draw_sim_camera(struct sim_camera *c, uint64_t n,
+			    const struct incise_blade *blade)
 {
 	double mm_px = c->sim->config.camera_mm_px;
 	double height = fmax(0, blade->position_mm[2]);
@@ -208,7 +209,7 @@ static int sim_camera_read(struct incise_camera *camera,
 	c->next = n + 1;
 	/* The surgeon is a function of time: the world need not stop for a frame. */
 	incise_surgeon_blade(&c->sim->surgeon, incise_sim_time(n, hz), &blade);
-	draw(c, n, &blade);
+	draw_sim_camera(c, n, &blade);
 	*frame = (struct incise_camera_frame){
 		.t_ns = c->sim->start_ns + incise_sim_time(n, hz),
 		.seq = n - c->first,

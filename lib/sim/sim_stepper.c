@@ -144,7 +144,7 @@ void incise_bench_follow(struct incise_bench *bench,
 		bench->force_N = spring_N - way * friction_N;
 }
 
-static void advance(struct sim_stepper *s, int64_t now)
+static void advance_sim_stepper(struct sim_stepper *s, int64_t now)
 {
 	while (s->t_ns + INCISE_SIM_TICK_NS <= now) {
 		double before = nut_held(s);
@@ -168,7 +168,7 @@ static INCISE_REALTIME double press_N(struct incise_stepper *stepper, int64_t t_
 {
 	struct sim_stepper *s = of_stepper(stepper);
 
-	advance(s, t_ns);
+	advance_sim_stepper(s, t_ns);
 	return s->bench.force_N;
 }
 
@@ -187,7 +187,7 @@ static INCISE_REALTIME int sim_stepper_set(struct incise_stepper *stepper,
 	double most = s->steps_max * s->step_mm;
 	int64_t now = script_now(s);
 
-	advance(s, now);
+	advance_sim_stepper(s, now);
 	/* Neither a target nor a heartbeat. */
 	if (!isfinite(position_mm))
 		return -EDOM;
@@ -214,7 +214,7 @@ static int sim_stepper_jog(struct incise_stepper *stepper, double velocity_mm_s)
 		return -EOPNOTSUPP;
 	if (!isfinite(velocity_mm_s))
 		return -EDOM;
-	advance(s, script_now(s));
+	advance_sim_stepper(s, script_now(s));
 	stop_mm = s->nut_mm +
 		  copysign(s->nut_mm_s * s->nut_mm_s / (2 * config->screw_mm_s2),
 			   s->nut_mm_s);
@@ -251,7 +251,7 @@ static int sim_stepper_clear(struct incise_stepper *stepper, struct incise_error
 	struct sim_stepper *s = of_stepper(stepper);
 
 	(void)err;
-	advance(s, script_now(s));
+	advance_sim_stepper(s, script_now(s));
 	s->faults = 0;
 	return 0;
 }
@@ -272,7 +272,7 @@ static INCISE_REALTIME int sim_stepper_status(struct incise_stepper *stepper,
 	struct sim_stepper *s = of_stepper(stepper);
 	double nut;
 
-	advance(s, script_now(s));
+	advance_sim_stepper(s, script_now(s));
 	nut = nut_held(s);
 	/* On the bench no hand holds it, and only the force channel measures its force. */
 	if (s->sim->config.bench && !s->axis)

@@ -221,7 +221,7 @@ void mesh_top(const struct mesh *mesh, struct incise_touch *touch)
 }
 
 /* Widen a box by a point. */
-static void widen(double lo[3], double hi[3], const double p[3])
+static void widen_mesh(double lo[3], double hi[3], const double p[3])
 {
 	for (int i = 0; i < 3; i++) {
 		lo[i] = fmin(lo[i], p[i]);
@@ -272,12 +272,13 @@ void mesh_size(const struct mesh *mesh, struct incise_surface_size *size)
 
 		corners(mesh, face, corner);
 		for (int i = 0; i < 3; i++) {
-			widen(size->lo_mm, size->hi_mm, corner[i]);
+			widen_mesh(size->lo_mm, size->hi_mm, corner[i]);
 			if (mesh->neighbour[face][i] != MESH_NONE)
 				continue;
 			size->open_edges++;
-			widen(size->open_lo_mm, size->open_hi_mm, corner[i]);
-			widen(size->open_lo_mm, size->open_hi_mm, corner[(i + 1) % 3]);
+			widen_mesh(size->open_lo_mm, size->open_hi_mm, corner[i]);
+			widen_mesh(size->open_lo_mm, size->open_hi_mm,
+				   corner[(i + 1) % 3]);
 		}
 	}
 	for (int i = 0; i < 3; i++)
@@ -647,7 +648,8 @@ static bool around_corner(const struct mesh *mesh, const double p[3],
 }
 
 /* The point on the way from a to b at which the distance to @start becomes @reach. */
-static void cut(const double start[3], double reach, double a[3], const double b[3])
+static void cut_mesh_way(const double start[3], double reach, double a[3],
+			 const double b[3])
 {
 	double sa[3], ab[3], half, whole, rest, root, t;
 
@@ -727,8 +729,8 @@ static bool straight_on(const struct mesh *mesh, const double p[3],
 }
 
 /* Go straight to @to; false where the reach ends before. */
-static bool go(const double start[3], double reach, struct mesh_spot *spot,
-	       const struct mesh_spot *to)
+static bool go_mesh(const double start[3], double reach, struct mesh_spot *spot,
+		    const struct mesh_spot *to)
 {
 	if (v3_distance2(to->point, start) <= reach * reach) {
 		*spot = *to;
@@ -736,7 +738,7 @@ static bool go(const double start[3], double reach, struct mesh_spot *spot,
 	}
 	spot->face = to->face;
 	spot->part = TRIANGLE_FACE;
-	cut(start, reach, spot->point, to->point);
+	cut_mesh_way(start, reach, spot->point, to->point);
 	return false;
 }
 
@@ -756,7 +758,7 @@ bool mesh_glide(const struct mesh *mesh, const double p[3], double reach,
 
 		if (next.part != TRIANGLE_FACE &&
 		    straight_on(mesh, p, spot, next.face, &edge, &after)) {
-			if (!go(start, reach, spot, &edge))
+			if (!go_mesh(start, reach, spot, &edge))
 				return false;
 			next = after;
 			*tired = ++faces >= FACES_MAX;
@@ -764,7 +766,7 @@ bool mesh_glide(const struct mesh *mesh, const double p[3], double reach,
 				return false;
 			continue;
 		}
-		if (!go(start, reach, spot, &next))
+		if (!go_mesh(start, reach, spot, &next))
 			return false;
 		if (spot->part == TRIANGLE_FACE)
 			return true;

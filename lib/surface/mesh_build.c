@@ -20,7 +20,7 @@ struct mesh_builder {
 	struct incise_error *err;
 };
 
-static int no_memory(const struct mesh_builder *b)
+static int no_mesh_build_memory(const struct mesh_builder *b)
 {
 	return incise_error_set(b->err, ENOMEM, "%s: no memory for its %u triangles",
 				b->draft->path, b->n);
@@ -87,7 +87,7 @@ static int weld(const struct mesh_builder *b, bool borders, double tolerance,
 	if (!sorted || !to) {
 		free(sorted);
 		free(to);
-		return no_memory(b);
+		return no_mesh_build_memory(b);
 	}
 	n = sort_points(b, borders, sorted, to);
 	for (size_t k = 0; k < n; k++) {
@@ -201,7 +201,7 @@ static int find_neighbours(struct mesh_builder *b)
 	if (!end || !side) {
 		free(end);
 		free(side);
-		return no_memory(b);
+		return no_mesh_build_memory(b);
 	}
 	memset(b->neighbour, 0xff, b->n * sizeof(*b->neighbour)); /* MESH_NONE */
 	/* Number of sides of each point, where they begin, and at last where they end. */
@@ -271,7 +271,8 @@ static int weld_seams(struct mesh_builder *b)
 
 	welded.err = &unused;
 	welded.corner = malloc(b->n * sizeof(*welded.corner));
-	rc = welded.corner ? weld(b, true, seam_mm(b), welded.corner) : no_memory(b);
+	rc = welded.corner ? weld(b, true, seam_mm(b), welded.corner)
+			   : no_mesh_build_memory(b);
 	if (!rc && memcmp(b->corner, welded.corner, b->n * sizeof(*b->corner)) &&
 	    !check_areas(&welded)) {
 		rc = find_neighbours(&welded);
@@ -331,7 +332,7 @@ static int check_volumes(const struct mesh_builder *b)
 {
 	bool *seen = calloc(b->n, sizeof(*seen));
 	uint32_t *stack = malloc(b->n * sizeof(*stack));
-	int rc = seen && stack ? 0 : no_memory(b);
+	int rc = seen && stack ? 0 : no_mesh_build_memory(b);
 
 	for (uint32_t face = 0; !rc && face < b->n; face++)
 		if (!seen[face])
@@ -387,7 +388,7 @@ static int order_triangles(struct mesh_builder *b)
 no_memory:
 	free(box);
 	free(place);
-	return no_memory(b);
+	return no_mesh_build_memory(b);
 }
 
 /* The angle of a triangle at its corner a, and the normal of its face. */
@@ -438,7 +439,7 @@ static int number_vertices(struct mesh_builder *b)
 	mesh->normal = malloc(n_corners * sizeof(*mesh->normal));
 	if (!vertex_of || !mesh->vertex || !mesh->normal) {
 		free(vertex_of);
-		return no_memory(b);
+		return no_mesh_build_memory(b);
 	}
 	memset(vertex_of, 0xff, n_corners * sizeof(*vertex_of));
 	for (size_t k = 0; k < n_corners; k++)
@@ -501,7 +502,7 @@ struct mesh *mesh_new(const struct mesh_draft *draft, struct incise_error *err)
 	}
 	if (!mesh || !b.corner || !b.neighbour || !mesh->corner || !mesh->neighbour ||
 	    !mesh->number || (draft->uv && !mesh->uv))
-		rc = no_memory(&b);
+		rc = no_mesh_build_memory(&b);
 	else
 		memcpy(b.corner, draft->corner, n * sizeof(*b.corner));
 	if (!rc)
@@ -556,7 +557,7 @@ float bvh_outwards(double x, int up)
 	return (float)(up ? x + away : x - away);
 }
 
-static void widen(float box[2][3], const float by[2][3])
+static void widen_mesh_build(float box[2][3], const float by[2][3])
 {
 	for (int i = 0; i < 3; i++) {
 		box[0][i] = fminf(box[0][i], by[0][i]);
@@ -583,7 +584,7 @@ static int widest(const struct item *item, uint32_t n)
 
 		memcpy(point[0], item[k].middle, sizeof(point[0]));
 		memcpy(point[1], item[k].middle, sizeof(point[1]));
-		widen(box, (const float(*)[3])point);
+		widen_mesh_build(box, (const float(*)[3])point);
 	}
 	for (int i = 1; i < 3; i++)
 		if (box[1][i] - box[0][i] > box[1][axis] - box[0][axis])
@@ -633,7 +634,7 @@ static uint32_t build(struct builder *b, uint32_t first, uint32_t n, float box[2
 	nothing(box);
 	if (n <= LEAF_MAX) {
 		for (uint32_t k = 0; k < n; k++)
-			widen(box, b->box[item[k].box]);
+			widen_mesh_build(box, b->box[item[k].box]);
 		return BVH_LEAF | n << 28 | first;
 	}
 	halve(b, item, n, half, widest(item, n));
@@ -645,7 +646,7 @@ static uint32_t build(struct builder *b, uint32_t first, uint32_t n, float box[2
 		node->child[side] = build(b, begin[side], count[side], half_box);
 		memcpy(node->lo[side], half_box[0], sizeof(half_box[0]));
 		memcpy(node->hi[side], half_box[1], sizeof(half_box[1]));
-		widen(box, (const float(*)[3])half_box);
+		widen_mesh_build(box, (const float(*)[3])half_box);
 	}
 	return index;
 }

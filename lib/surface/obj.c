@@ -47,7 +47,7 @@ struct obj {
 };
 
 /* Room for one more of @each bytes. */
-static int grow(struct obj *obj, void *array, size_t n, size_t *capacity, size_t each)
+static int grow_obj(struct obj *obj, void *array, size_t n, size_t *capacity, size_t each)
 {
 	void **old = array;
 	void *more;
@@ -99,8 +99,8 @@ static int add_point(struct obj *obj, const char *what, const double value[3])
 	if (draft->n_points == POINTS_MAX)
 		rc = too_many(obj, "points", POINTS_MAX);
 	if (!rc)
-		rc = grow(obj, &draft->point, draft->n_points, &obj->capacity_v,
-			  sizeof(*draft->point));
+		rc = grow_obj(obj, &draft->point, draft->n_points, &obj->capacity_v,
+			      sizeof(*draft->point));
 	if (rc)
 		return rc;
 	for (int i = 0; i < 3; i++) {
@@ -134,7 +134,8 @@ static int read_uv(struct obj *obj)
 	if (!rc && obj->n_vt == POINTS_MAX)
 		rc = too_many(obj, "texture coordinates", POINTS_MAX);
 	if (!rc)
-		rc = grow(obj, &obj->vt, obj->n_vt, &obj->capacity_vt, sizeof(*obj->vt));
+		rc = grow_obj(obj, &obj->vt, obj->n_vt, &obj->capacity_vt,
+			      sizeof(*obj->vt));
 	if (rc)
 		return rc;
 	for (int i = 0; i < 2; i++) {
@@ -203,13 +204,14 @@ static int add_triangle(struct obj *obj, const struct index corner[3])
 	if (n == INCISE_SURFACE_TRIANGLES_MAX)
 		rc = too_many(obj, "triangles", n);
 	if (!rc)
-		rc = grow(obj, &draft->corner, n, &obj->capacity_corner,
-			  sizeof(*draft->corner));
+		rc = grow_obj(obj, &draft->corner, n, &obj->capacity_corner,
+			      sizeof(*draft->corner));
 	if (!rc)
-		rc = grow(obj, &obj->index, n, &obj->capacity_index, sizeof(*obj->index));
+		rc = grow_obj(obj, &obj->index, n, &obj->capacity_index,
+			      sizeof(*obj->index));
 	if (!rc)
-		rc = grow(obj, &draft->line, n, &obj->capacity_line,
-			  sizeof(*draft->line));
+		rc = grow_obj(obj, &draft->line, n, &obj->capacity_line,
+			      sizeof(*draft->line));
 	if (rc)
 		return rc;
 	for (int i = 0; i < 3; i++) {
@@ -260,7 +262,7 @@ static void skip_line(struct obj *obj)
 		;
 }
 
-static int read_line(struct obj *obj)
+static int read_obj_line(struct obj *obj)
 {
 	/* Names, materials, display, lines and points. */
 	static const char *const others[] = {
@@ -396,7 +398,7 @@ static int read_any(struct obj *obj)
 				"%s: this is %s; convert it to STL or OBJ", text->path,
 				others[i][1]);
 	do {
-		rc = read_line(obj);
+		rc = read_obj_line(obj);
 	} while (!rc && text_next_line(&obj->text));
 	return rc;
 }

@@ -50,7 +50,7 @@ void incise_proxy_init(struct incise_proxy *proxy, const struct incise_surface *
 	proxy->touch.face = -1;
 }
 
-static void begin(struct incise_proxy *proxy, const struct incise_touch *touch)
+static void begin_proxy(struct incise_proxy *proxy, const struct incise_touch *touch)
 {
 	proxy->touching = proxy->began = true;
 	proxy->first = proxy->touch = *touch;
@@ -76,9 +76,9 @@ static void move_on_shape(struct incise_proxy *proxy, const double tool[3])
 		near = !(v3_length(way) < -touch.depth_mm);
 		if (near && proxy->placed &&
 		    incise_surface_enters(surface, last, tool, &first))
-			begin(proxy, &first);
+			begin_proxy(proxy, &first);
 		else if (touch.depth_mm >= 0)
-			begin(proxy, &touch);
+			begin_proxy(proxy, &touch);
 	}
 	proxy->touch = touch;
 	proxy->settled = true;
@@ -102,10 +102,10 @@ static void begin_at(struct incise_proxy *proxy, const struct mesh_spot *spot,
 
 	mesh_touch(proxy->surface->mesh, spot, tool, &touch);
 	proxy->at_face = spot->face;
-	begin(proxy, &touch);
+	begin_proxy(proxy, &touch);
 }
 
-static void end(struct incise_proxy *proxy)
+static void end_proxy(struct incise_proxy *proxy)
 {
 	proxy->touching = proxy->began = false;
 	proxy->clear_mm = 0;
@@ -161,7 +161,7 @@ static bool is_dent(const struct incise_proxy *proxy, const struct mesh_spot *sp
  * Glide at most @reach towards the tool, and end the contact when it has left; where its
  * way from there enters another part of the mesh, the contact restarts on that one.
  */
-static void follow(struct incise_proxy *proxy, const double tool[3], double reach)
+static void follow_proxy(struct incise_proxy *proxy, const double tool[3], double reach)
 {
 	const struct mesh *mesh = proxy->surface->mesh;
 	double leave = fmax(proxy->leave_mm, OFF_MM);
@@ -187,7 +187,7 @@ static void follow(struct incise_proxy *proxy, const double tool[3], double reac
 			if (is_dent(proxy, &spot, tool))
 				proxy->touch.depth_mm = v3_length(way);
 			else if (above > leave)
-				end(proxy);
+				end_proxy(proxy);
 			else
 				proxy->touch.depth_mm = -above;
 			return;
@@ -203,7 +203,7 @@ static void follow(struct incise_proxy *proxy, const double tool[3], double reac
 			return;
 		/* At the nearest place around, it is rounding that enters where it starts. */
 		if (!mesh_enters(mesh, spot.point, tool, ON_MM, 0, &entry)) {
-			end(proxy);
+			end_proxy(proxy);
 			return;
 		}
 		spot = entry;
@@ -214,7 +214,7 @@ static void follow(struct incise_proxy *proxy, const double tool[3], double reac
 }
 
 /* The tool has no contact: is there one now? */
-static void look(struct incise_proxy *proxy, const double tool[3])
+static void look_proxy(struct incise_proxy *proxy, const double tool[3])
 {
 	const struct mesh *mesh = proxy->surface->mesh;
 	struct mesh_spot spot, near;
@@ -242,16 +242,16 @@ static void look(struct incise_proxy *proxy, const double tool[3])
 	     mesh_enters(mesh, proxy->tool_mm, tool, 0, MESH_SEAM_MM, &spot))) {
 		begin_at(proxy, &spot, spot.point);
 		v3_sub(way, tool, spot.point);
-		follow(proxy, tool, BUDGET * v3_length(way));
+		follow_proxy(proxy, tool, BUDGET * v3_length(way));
 	} else if (v3_distance2(near.point, tool) <= ON_MM * ON_MM &&
 		   !mesh_beyond_border(mesh, &near, tool, &spot)) {
 		begin_at(proxy, &near, tool);
-		follow(proxy, tool, 0);
+		follow_proxy(proxy, tool, 0);
 	}
 }
 
 /* The first place of all: inside is in contact, at the nearest point around. */
-static void place(struct incise_proxy *proxy, const double tool[3])
+static void place_proxy(struct incise_proxy *proxy, const double tool[3])
 {
 	const struct mesh *mesh = proxy->surface->mesh;
 	struct incise_touch touch;
@@ -277,13 +277,14 @@ void incise_proxy_move(struct incise_proxy *proxy, const double tool_mm[3])
 	if (!proxy->surface->mesh) {
 		move_on_shape(proxy, tool);
 	} else if (!proxy->placed) {
-		place(proxy, tool);
+		place_proxy(proxy, tool);
 	} else {
 		v3_sub(way, tool, proxy->tool_mm);
 		if (!proxy->touching)
-			look(proxy, tool);
+			look_proxy(proxy, tool);
 		else if (v3_dot(way, way) > 0)
-			follow(proxy, tool, proxy->left_mm + BUDGET * v3_length(way));
+			follow_proxy(proxy, tool,
+				     proxy->left_mm + BUDGET * v3_length(way));
 	}
 	v3_copy(proxy->tool_mm, tool);
 	proxy->placed = true;

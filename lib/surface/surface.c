@@ -28,8 +28,8 @@ static struct incise_surface *surface_new(enum incise_surface_kind kind,
 	return surface;
 }
 
-static struct incise_surface *refuse(struct incise_error *err, const char *what,
-				     const char *expected)
+static struct incise_surface *refuse_surface(struct incise_error *err, const char *what,
+					     const char *expected)
 {
 	incise_error_set(err, EINVAL, "%s: expected %s", what, expected);
 	return NULL;
@@ -45,9 +45,9 @@ struct incise_surface *incise_surface_new_plane(const double point_mm[3],
 	double largest = fmax(fabs(normal[0]), fmax(fabs(normal[1]), fabs(normal[2])));
 
 	if (!within_reach(point_mm))
-		return refuse(err, "the plane's point", coordinates);
+		return refuse_surface(err, "the plane's point", coordinates);
 	if (!v3_finite(normal) || !(largest > 0))
-		return refuse(err, "the plane's normal", "numbers, not all 0");
+		return refuse_surface(err, "the plane's normal", "numbers, not all 0");
 	surface = surface_new(INCISE_SURFACE_PLANE, err);
 	if (!surface)
 		return NULL;
@@ -67,12 +67,13 @@ static struct incise_surface *new_capsule(enum incise_surface_kind kind,
 	bool sphere = kind == INCISE_SURFACE_SPHERE;
 
 	if (!within_reach(a_mm) || !within_reach(b_mm))
-		return refuse(err, sphere ? "the sphere's centre" : "the capsule's ends",
-			      coordinates);
+		return refuse_surface(
+			err, sphere ? "the sphere's centre" : "the capsule's ends",
+			coordinates);
 	if (!(radius_mm >= 1e-6 && radius_mm <= MESH_COORDINATE_MAX_MM))
-		return refuse(err,
-			      sphere ? "the sphere's radius" : "the capsule's radius",
-			      "from 1e-6 to 1e5 mm");
+		return refuse_surface(
+			err, sphere ? "the sphere's radius" : "the capsule's radius",
+			"from 1e-6 to 1e5 mm");
 	surface = surface_new(kind, err);
 	if (!surface)
 		return NULL;
@@ -96,14 +97,14 @@ struct incise_surface *incise_surface_new_capsule(const double a_mm[3],
 	return new_capsule(INCISE_SURFACE_CAPSULE, a_mm, b_mm, radius_mm, err);
 }
 
-static struct incise_surface *load(enum incise_surface_kind kind, const char *path,
-				   const double at_mm[3], bool cavity,
-				   struct incise_error *err)
+static struct incise_surface *load_surface(enum incise_surface_kind kind,
+					   const char *path, const double at_mm[3],
+					   bool cavity, struct incise_error *err)
 {
 	struct incise_surface *surface;
 
 	if (!within_reach(at_mm))
-		return refuse(err, path, "at a position in mm, at most 1e5");
+		return refuse_surface(err, path, "at a position in mm, at most 1e5");
 	surface = surface_new(kind, err);
 	if (!surface)
 		return NULL;
@@ -122,14 +123,14 @@ static struct incise_surface *load(enum incise_surface_kind kind, const char *pa
 struct incise_surface *incise_surface_load_mesh(const char *path, const double at_mm[3],
 						bool cavity, struct incise_error *err)
 {
-	return load(INCISE_SURFACE_MESH, path, at_mm, cavity, err);
+	return load_surface(INCISE_SURFACE_MESH, path, at_mm, cavity, err);
 }
 
 struct incise_surface *incise_surface_load_heights(const char *path,
 						   const double at_mm[3],
 						   struct incise_error *err)
 {
-	return load(INCISE_SURFACE_HEIGHTS, path, at_mm, false, err);
+	return load_surface(INCISE_SURFACE_HEIGHTS, path, at_mm, false, err);
 }
 
 void incise_surface_free(struct incise_surface *surface)

@@ -18,7 +18,7 @@ struct incise_incision {
 	struct incise_double_incision *cuts; /* behind this */
 };
 
-static size_t size_of(const struct incise_double_incision_setup *setup)
+static size_t size_of_incision(const struct incise_double_incision_setup *setup)
 {
 	return sizeof(struct incise_incision) + sizeof(struct incise_double_incision) +
 	       (size_t)setup->cuts_most * sizeof(struct incise_cut);
@@ -28,7 +28,7 @@ struct incise_incision *incise_incision_make(
 	const struct incise_double_incision_setup *setup, const double side[3],
 	struct incise_error *err)
 {
-	struct incise_incision *incision = calloc(1, size_of(setup));
+	struct incise_incision *incision = calloc(1, size_of_incision(setup));
 
 	if (!incision) {
 		incise_error_set(err, ENOMEM, "no memory for an incision of %d cuts",
@@ -48,7 +48,7 @@ void incise_incision_free(struct incise_incision *incision)
 
 size_t incise_incision_memory(const struct incise_incision *incision)
 {
-	return size_of(&incision->setup);
+	return size_of_incision(&incision->setup);
 }
 
 struct incise_double_incision *incise_incision_of(struct incise_incision *incision)

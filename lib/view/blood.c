@@ -406,8 +406,8 @@ static void leave_film(struct drops *drops, struct drop *drop, double radius)
 		film_level(drops->film, drop->px, width, thick, share, drop->units);
 }
 
-static void run(struct drops *drops, struct drop *drop, const struct ground *ground,
-		double radius)
+static void run_blood(struct drops *drops, struct drop *drop, const struct ground *ground,
+		      double radius)
 {
 	double way = drop->speed_mm_s * STEP_S;
 
@@ -445,7 +445,7 @@ static void step_drop(struct drops *drops, struct drop *drop)
 	accelerate(drops, drop, &ground, radius);
 	if (drop->speed_mm_s > 0) {
 		steer(drops, drop, &ground, radius);
-		run(drops, drop, &ground, radius);
+		run_blood(drops, drop, &ground, radius);
 	} else if (drop->source < 0 && (drop->wet > 0.5 || drop->age_s > PINNED_S)) {
 		sink(drops, drop, radius,
 		     (int64_t)((double)drop->units *
@@ -588,7 +588,7 @@ struct blood {
 	struct source source[BLOOD_SOURCES_MAX];
 };
 
-static double draw(struct blood *blood)
+static double draw_blood(struct blood *blood)
 {
 	return incise_random_uniform(blood->key, blood->drawn++);
 }
@@ -655,10 +655,11 @@ static struct source *start_source(struct blood *blood, const struct wound_strok
 	*source = (struct source){
 		.from_px = {stroke->from_px[0], stroke->from_px[1]},
 		.at_px = {stroke->to_px[0], stroke->to_px[1]},
-		.span_mm = SPAN_LEAST_MM + (SPAN_MOST_MM - SPAN_LEAST_MM) * draw(blood),
+		.span_mm = SPAN_LEAST_MM +
+			   (SPAN_MOST_MM - SPAN_LEAST_MM) * draw_blood(blood),
 		.drop = -1,
 	};
-	source->at_mm = source->span_mm * draw(blood);
+	source->at_mm = source->span_mm * draw_blood(blood);
 	blood->last = number;
 	return source;
 }
@@ -706,12 +707,12 @@ void blood_reopen(struct blood *blood, const double px[2], double depth_mm)
 static int64_t wet(struct blood *blood, int number, int64_t units)
 {
 	const struct source *source = &blood->source[number];
-	double t = draw(blood), px[2];
+	double t = draw_blood(blood), px[2];
 
 	for (int i = 0; i < 2; i++)
 		px[i] = source->from_px[i] + t * (source->to_px[i] - source->from_px[i]);
-	return film_level(&blood->film, px, SPOT_MM * (0.7 + 0.6 * draw(blood)), WETS_MM,
-			  0.3, (int64_t)((double)units * WETS_SHARE));
+	return film_level(&blood->film, px, SPOT_MM * (0.7 + 0.6 * draw_blood(blood)),
+			  WETS_MM, 0.3, (int64_t)((double)units * WETS_SHARE));
 }
 
 /* A drop hangs below its source, lower the larger it is. */
@@ -729,7 +730,7 @@ static void hang(struct blood *blood, struct source *source, struct drop *drop)
 		drop->px[i] += lower * ground.down_px[i];
 }
 
-static void feed(struct blood *blood, int number, int64_t units)
+static void feed_blood(struct blood *blood, int number, int64_t units)
 {
 	struct source *source = &blood->source[number];
 	struct drop *drop = hanging(blood, number);
@@ -766,7 +767,7 @@ static void emit(struct blood *blood, int number)
 	left = whole - wet(blood, number, whole);
 	/* It is more when the spot was too thick and got thinner. */
 	if (left > 0)
-		feed(blood, number, left);
+		feed_blood(blood, number, left);
 }
 
 void blood_step(struct blood *blood)

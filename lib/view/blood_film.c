@@ -393,7 +393,7 @@ static void fall_of(struct film *film, int number, struct fall *fall)
 			&fall->y[i / 2][i % 2]);
 }
 
-static float between(const float corner[2][2], float u, float v)
+static float between_blood_film(const float corner[2][2], float u, float v)
 {
 	float top = corner[0][0] + u * (corner[0][1] - corner[0][0]);
 	float bottom = corner[1][0] + u * (corner[1][1] - corner[1][0]);
@@ -442,8 +442,8 @@ static void drain_texel(struct visit *visit, int x, int y, size_t at)
 
 	if (film->dry[at] >= FILM_CLOT)
 		return;
-	down[0] = between(visit->fall.x, u, v);
-	down[1] = between(visit->fall.y, u, v);
+	down[0] = between_blood_film(visit->fall.x, u, v);
+	down[1] = between_blood_film(visit->fall.y, u, v);
 	thick = film->volume[at] * BLOOD_UNIT_UL / visit->tile->area_mm2;
 	clot = 1 - (double)film->dry[at] / FILM_CLOT;
 	speed = film->drain * thick * thick * clot * clot *

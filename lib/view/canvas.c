@@ -301,7 +301,7 @@ static void enclose(struct incise_rect *all, const struct incise_rect *rect)
 }
 
 /* Clean part of a row of tiles if all of it is dirty. Returns whether. */
-static bool take_row(struct incise_canvas *canvas, int x, int y, int w)
+static bool take_canvas_row(struct incise_canvas *canvas, int x, int y, int w)
 {
 	uint8_t *row = canvas->tiles.dirty + (size_t)y * canvas->tiles.side + x;
 
@@ -325,9 +325,9 @@ static struct incise_rect take_rect(struct incise_canvas *canvas, int x, int y,
 
 	while (x + w < canvas->tiles.side && row[x + w])
 		w++;
-	take_row(canvas, x, y, w);
+	take_canvas_row(canvas, x, y, w);
 	while (w * h * CANVAS_TILE * CANVAS_TILE < texels_most &&
-	       y + h < canvas->tiles.side && take_row(canvas, x, y + h, w))
+	       y + h < canvas->tiles.side && take_canvas_row(canvas, x, y + h, w))
 		h++;
 	return (struct incise_rect){x * CANVAS_TILE, y * CANVAS_TILE, w * CANVAS_TILE,
 				    h * CANVAS_TILE};

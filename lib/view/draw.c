@@ -144,7 +144,7 @@ static unsigned make_framebuffer(unsigned colour, unsigned depth)
 	return name;
 }
 
-static int complete(struct target *target)
+static int complete_draw(struct target *target)
 {
 	int good;
 
@@ -179,7 +179,7 @@ static int target_size(struct target *target, int width, int height,
 	target->width = width;
 	target->height = height;
 	target->samples = samples < samples_max ? samples : samples_max;
-	while (!complete(target)) {
+	while (!complete_draw(target)) {
 		samples = target->samples / 2;
 		target_free(target);
 		if (samples < 1) {
@@ -508,7 +508,7 @@ struct incise_draw {
 	bool drawn;
 };
 
-static int failed(struct incise_error *err)
+static int failed_draw(struct incise_error *err)
 {
 	GLenum why = glGetError();
 
@@ -618,7 +618,7 @@ struct incise_draw *incise_draw_new(const struct incise_draw_setup *setup,
 		goto out_free;
 	find_way(draw, setup->map);
 	draw->texture = texture_new(setup, draw->way, fine, err);
-	if (!draw->texture || failed(err))
+	if (!draw->texture || failed_draw(err))
 		goto out_free;
 	return draw;
 
@@ -852,7 +852,7 @@ int incise_draw_frame(struct incise_draw *draw, const struct incise_view_camera 
 	glDrawArrays(GL_TRIANGLES, 0, 3);
 	target_resolve(&draw->target);
 	draw->drawn = true;
-	return failed(err);
+	return failed_draw(err);
 }
 
 int incise_draw_overlay(struct incise_draw *draw, int slot, const uint8_t *bgra, int w,
@@ -883,7 +883,7 @@ int incise_draw_overlay(struct incise_draw *draw, int slot, const uint8_t *bgra,
 		    (float)(1 - 2.0 * (y + h) / height));
 	glBindVertexArray(draw->nothing);
 	glDrawArrays(GL_TRIANGLE_STRIP, 0, 4);
-	return failed(NULL);
+	return failed_draw(NULL);
 }
 
 int incise_draw_read(struct incise_draw *draw, uint8_t *rgb, int width, int height)
@@ -905,7 +905,7 @@ int incise_draw_read(struct incise_draw *draw, uint8_t *rgb, int width, int heig
 			b[i] = keep;
 		}
 	}
-	return failed(NULL);
+	return failed_draw(NULL);
 }
 
 void incise_draw_show(struct incise_draw *draw)

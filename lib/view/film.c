@@ -25,7 +25,7 @@ struct incise_film {
 };
 
 /* The module stays loaded. */
-static const struct incise_film_module *load(struct incise_error *err)
+static const struct incise_film_module *load_film(struct incise_error *err)
 {
 	const struct incise_film_module *film;
 	struct incise_module module;
@@ -87,7 +87,7 @@ struct incise_film *incise_film_new(const char *path, int width, int height, int
 		goto no_memory;
 	if (name_files(film, path))
 		goto no_memory;
-	film->module = load(err);
+	film->module = load_film(err);
 	if (film->module)
 		film->coder = film->module->open(film->part, width, height, rate_hz, err);
 	if (film->coder)

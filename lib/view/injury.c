@@ -29,10 +29,11 @@ static int add_layer(struct incise_injury *injury, int *layer, struct incise_err
 }
 
 /* Add the parts that the scene requests. */
-static int add(struct incise_injury *injury, const struct incise_scene_picture *picture,
-	       const struct incise_scene_scalpel *scalpel,
-	       struct incise_incision *incision, const struct uv_map *map,
-	       struct incise_error *err)
+static int add_injury(struct incise_injury *injury,
+		      const struct incise_scene_picture *picture,
+		      const struct incise_scene_scalpel *scalpel,
+		      struct incise_incision *incision, const struct uv_map *map,
+		      struct incise_error *err)
 {
 	int rc;
 
@@ -71,7 +72,7 @@ struct incise_injury *incise_injury_new(const struct incise_scene_picture *pictu
 		return NULL;
 	}
 	injury->canvas = canvas;
-	if (add(injury, picture, scalpel, incision, map, err)) {
+	if (add_injury(injury, picture, scalpel, incision, map, err)) {
 		incise_injury_free(injury);
 		return NULL;
 	}
@@ -87,7 +88,7 @@ void incise_injury_free(struct incise_injury *injury)
 	free(injury);
 }
 
-static void step(struct incise_injury *injury)
+static void step_injury(struct incise_injury *injury)
 {
 	double px[2], depth_mm;
 
@@ -118,7 +119,7 @@ static void step_until(struct incise_injury *injury, int64_t t_ns)
 	done = steps < INJURY_STEPS_MAX ? steps : INJURY_STEPS_MAX;
 	injury->steps_lost += steps - done;
 	for (uint64_t i = 0; i < done; i++)
-		step(injury);
+		step_injury(injury);
 }
 
 void incise_injury_tick(struct incise_injury *injury, const struct incise_tick *tick)

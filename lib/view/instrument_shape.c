@@ -81,8 +81,8 @@ static void corner_normal(const struct ring *all, double (*points)[AROUND][3], i
 		to[k] = (float)unit[k];
 }
 
-static void put(struct instrument_mesh *mesh, const struct ring *ring, const double p[3],
-		const float normal[3])
+static void put_instrument_shape(struct instrument_mesh *mesh, const struct ring *ring,
+				 const double p[3], const float normal[3])
 {
 	struct instrument_vertex *v = &mesh->vertices[mesh->n_vertices++];
 
@@ -129,7 +129,8 @@ static int skin(const struct ring *ring, int rings, struct instrument_mesh *mesh
 				float normal[3];
 
 				corner_normal(ring, points, rings, r, i, k, normal);
-				put(mesh, &ring[rr], points[rr][ii], normal);
+				put_instrument_shape(mesh, &ring[rr], points[rr][ii],
+						     normal);
 			}
 		}
 	return 0;

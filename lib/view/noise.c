@@ -179,7 +179,7 @@ float cells_fade(const struct cells *cells)
 	return cells->fade;
 }
 
-static int within(int i, int n)
+static int keep_within_noise(int i, int n)
 {
 	return i < 1 ? 1 : i > n - 2 ? n - 2 : i;
 }
@@ -203,8 +203,8 @@ void cells_row(const struct cells *cells, int y, const float *warp_x, const floa
 		float v = top + warp_y[x], first = 8, second = 8;
 		const float(*point)[2] =
 			cells->point +
-			(within((int)v, cells->rows) - 1) * cells->columns +
-			within((int)u, cells->columns) - 1;
+			(keep_within_noise((int)v, cells->rows) - 1) * cells->columns +
+			keep_within_noise((int)u, cells->columns) - 1;
 
 		for (int j = 0; j < 3; j++, point += cells->columns)
 			for (int i = 0; i < 3; i++) {

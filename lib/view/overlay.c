@@ -68,7 +68,7 @@ static cairo_surface_t *overlay_surface(int width, int height)
 	return NULL;
 }
 
-static cairo_t *begin(cairo_surface_t *surface)
+static cairo_t *begin_overlay(cairo_surface_t *surface)
 {
 	cairo_t *cr = cairo_create(surface);
 	double w = cairo_image_surface_get_width(surface);
@@ -107,7 +107,7 @@ static void text(cairo_t *cr, double x, double y, double size, double align,
 }
 
 /* The least of 1, 2, 5, 10 … times @unit that covers a graph. */
-static double range_of(const struct overlay_graph *graph, double unit)
+static double range_of_overlay(const struct overlay_graph *graph, double unit)
 {
 	double most = 0, range = unit;
 
@@ -151,7 +151,7 @@ static void curve(cairo_t *cr, const struct overlay_graph *graph, double top,
 static void graph(cairo_t *cr, const struct overlay_graph *graph, double top,
 		  const char *name, const char *unit, double least, const double rgb[3])
 {
-	double range = range_of(graph, least);
+	double range = range_of_overlay(graph, least);
 	char words[64];
 
 	grey(cr, 0.32);
@@ -269,7 +269,7 @@ static void paint_panel(const struct incise_overlay *overlay,
 			const struct incise_view_status *status)
 {
 	static const double force[3] = {1.0, 0.80, 0.38}, depth[3] = {0.45, 0.80, 1.0};
-	cairo_t *cr = begin(overlay->panel);
+	cairo_t *cr = begin_overlay(overlay->panel);
 	double y = 14;
 
 	graph(cr, &overlay->force, y, "force", "N", 0.5, force);
@@ -290,7 +290,7 @@ static void paint_panel(const struct incise_overlay *overlay,
 
 static void paint_keys(const struct incise_overlay *overlay)
 {
-	cairo_t *cr = begin(overlay->keys);
+	cairo_t *cr = begin_overlay(overlay->keys);
 
 	for (int i = 0; i < overlay->n_lines; i++) {
 		const char *line = overlay->line[i], *tab = strchr(line, '\t');

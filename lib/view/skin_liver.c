@@ -31,8 +31,8 @@ enum { TONE, RED, SPECK, UX, UY, NEAR, FAR, SINUS_NEAR, SINUS_FAR, PALENESS };
 
 static const float base[3] = {94, 41, 33};
 
-static void mix(const struct skin_work *work, int y, float *const colour[3],
-		float *height_mm)
+static void mix_skin_liver(const struct skin_work *work, int y, float *const colour[3],
+			   float *height_mm)
 {
 	const float fade = cells_fade(work->cells[LOBULE]);
 	const float *tone = SKIN_SUM(work, y, TONE, TONE_WIDE, 0.5F, 0.4F, 0.3F, 0.3F);
@@ -90,5 +90,5 @@ const struct skin_look skin_liver = {
 			[BUMP_WIDE] = {13, 12},
 		},
 	.cells = {[LOBULE] = {1.4, 1.3}, [SINUS] = {0.31, 0.33}},
-	.mix = mix,
+	.mix = mix_skin_liver,
 };

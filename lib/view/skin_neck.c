@@ -185,8 +185,8 @@ static void veins(const struct skin_work *work, int y)
 	}
 }
 
-static void mix(const struct skin_work *work, int y, float *const colour[3],
-		float *height_mm)
+static void mix_skin_neck(const struct skin_work *work, int y, float *const colour[3],
+			  float *height_mm)
 {
 	float *const *row = work->row;
 	const float *share;
@@ -247,5 +247,5 @@ const struct skin_look skin_neck = {
 			[PORE] = {1.5, 1.6},
 			[MOLE] = {12, 13},
 		},
-	.mix = mix,
+	.mix = mix_skin_neck,
 };

@@ -325,7 +325,7 @@ struct grid {
 	struct node *node; /* SIDE² */
 };
 
-static bool place(struct grid *grid, struct node *node, const double px[2])
+static bool place_uv_node(struct grid *grid, struct node *node, const double px[2])
 {
 	double point[3];
 
@@ -362,13 +362,13 @@ static void to_border(struct grid *grid, struct node *node, const double on[2],
 
 		px[0] = on[0] + mid * (off[0] - on[0]);
 		px[1] = on[1] + mid * (off[1] - on[1]);
-		if (place(grid, node, px))
+		if (place_uv_node(grid, node, px))
 			in = mid;
 		else
 			out = mid;
 	}
 	if (in == 0)
-		place(grid, node, on);
+		place_uv_node(grid, node, on);
 }
 
 static void place_all(struct grid *grid)
@@ -379,7 +379,7 @@ static void place_all(struct grid *grid)
 
 	for (int i = 0; i < SIDE * SIDE; i++) {
 		node_px(grid, i, px);
-		grid->node[i].there = place(grid, &grid->node[i], px);
+		grid->node[i].there = place_uv_node(grid, &grid->node[i], px);
 	}
 	/* `there` does not change here: vertices move towards true neighbours only. */
 	for (int i = 0; i < SIDE * SIDE; i++) {
@@ -628,7 +628,7 @@ static double bell(double x, double width)
 }
 
 /* From 0 to 1 where x goes from -width to width. */
-static double step(double x, double width)
+static double step_uv_map(double x, double width)
 {
 	double t = fmin(fmax(0.5 + 0.5 * x / width, 0), 1);
 
@@ -642,7 +642,7 @@ static double step(double x, double width)
 static double thyroid(double caudal_mm, double side_mm)
 {
 	double ridge = 0.55 * bell(side_mm, 7) + 0.45 * bell(side_mm, 17);
-	double along = step(caudal_mm + 31, 6) * step(-caudal_mm - 7, 5.5);
+	double along = step_uv_map(caudal_mm + 31, 6) * step_uv_map(-caudal_mm - 7, 5.5);
 	double rise = 0.45 + 0.55 * bell(caudal_mm + 20, 9);
 	double notch = 1 - 0.75 * bell(caudal_mm + 30, 6) * bell(side_mm, 4.5);
 
@@ -652,8 +652,8 @@ static double thyroid(double caudal_mm, double side_mm)
 double larynx_height_mm(double caudal_mm, double side_mm)
 {
 	double cricoid = 2.0 * bell(caudal_mm - 9.5, 5) * bell(side_mm, 14);
-	double trachea = 0.7 * step(caudal_mm - 14, 8) * step(58 - caudal_mm, 16) *
-			 bell(side_mm, 12);
+	double trachea = 0.7 * step_uv_map(caudal_mm - 14, 8) *
+			 step_uv_map(58 - caudal_mm, 16) * bell(side_mm, 12);
 	double height = thyroid(caudal_mm, side_mm) + cricoid + trachea;
 
 	return isfinite(height) ? fmin(height, 5) : 0;

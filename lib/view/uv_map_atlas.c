@@ -115,7 +115,7 @@ static void reach(const struct uv_map *map, int cells, const struct patch *patch
 }
 
 /* The mean size of the texture on the surface, as a square. Returns the number of triangles. */
-static uint32_t measure(struct uv_map *map)
+static uint32_t measure_uv_map_atlas(struct uv_map *map)
 {
 	double mm2 = 0, px2 = 0;
 	struct patch patch;
@@ -200,7 +200,7 @@ static int make_lists(struct uv_map *map, uint32_t n)
 
 int uv_atlas_init(struct uv_map *map)
 {
-	uint32_t n = measure(map);
+	uint32_t n = measure_uv_map_atlas(map);
 
 	if (!n)
 		return 0;
@@ -239,8 +239,8 @@ bool uv_atlas_px(const struct uv_map *map, const double point_mm[3], double px[2
 }
 
 /* The triangle of a texel; among several the one with the largest inside(). */
-static bool find(const struct uv_map *map, const double px[2], struct patch *found,
-		 uint32_t *triangle)
+static bool find_uv_map_atlas(const struct uv_map *map, const double px[2],
+			      struct patch *found, uint32_t *triangle)
 {
 	const struct uv_atlas *atlas = map->atlas;
 	size_t cell = (size_t)cell_of(map, atlas->cells, px[1]) * (size_t)atlas->cells +
@@ -273,7 +273,7 @@ bool uv_atlas_point(const struct uv_map *map, const double px[2], double point_m
 	struct patch patch;
 	uint32_t triangle;
 
-	if (!find(map, px, &patch, &triangle))
+	if (!find_uv_map_atlas(map, px, &patch, &triangle))
 		return false;
 	v3_add(point_mm, patch.corner[0], px[0] - patch.px[0][0], patch.right);
 	v3_add(point_mm, point_mm, px[1] - patch.px[0][1], patch.down);
@@ -291,7 +291,7 @@ bool uv_atlas_metric(const struct uv_map *map, const double px[2], double right_
 	struct patch patch;
 	uint32_t triangle;
 
-	if (!find(map, px, &patch, &triangle))
+	if (!find_uv_map_atlas(map, px, &patch, &triangle))
 		return false;
 	v3_copy(right_mm, patch.right);
 	v3_copy(down_mm, patch.down);

@@ -138,8 +138,8 @@ void incise_window_show(struct incise_window *window)
 }
 
 /* SDL uses desktop coordinates; a pixel of the frame may be smaller. */
-static void place(const struct incise_window *window, double x, double y,
-		  struct incise_view_event *event)
+static void place_window_pointer(const struct incise_window *window, double x, double y,
+				 struct incise_view_event *event)
 {
 	int wide, high, w, h;
 
@@ -241,7 +241,7 @@ static bool take_button(const struct incise_window *window,
 	to->pressed = from->state == SDL_PRESSED;
 	to->buttons = held(SDL_GetMouseState(NULL, NULL));
 	to->pressure = 1;
-	place(window, from->x, from->y, to);
+	place_window_pointer(window, from->x, from->y, to);
 	return true;
 }
 
@@ -254,7 +254,7 @@ static bool take_wheel(const struct incise_window *window,
 	to->wheel = from->direction == SDL_MOUSEWHEEL_FLIPPED ? -from->preciseY
 							      : from->preciseY;
 	to->buttons = held(SDL_GetMouseState(&x, &y));
-	place(window, x, y, to);
+	place_window_pointer(window, x, y, to);
 	return true;
 }
 
@@ -307,7 +307,7 @@ static bool take(struct incise_window *window, const SDL_Event *from,
 		to->type = INCISE_VIEW_MOTION;
 		to->buttons = held(from->motion.state);
 		to->pressure = 1;
-		place(window, from->motion.x, from->motion.y, to);
+		place_window_pointer(window, from->motion.x, from->motion.y, to);
 		return true;
 	case SDL_MOUSEBUTTONDOWN:
 	case SDL_MOUSEBUTTONUP:

@@ -58,7 +58,7 @@ static float field_inside_mm(const struct field_texel *texel)
 }
 
 /* fminf() and fmaxf() are calls. */
-static inline float least(float a, float b)
+static inline float least_wound(float a, float b)
 {
 	return a < b ? a : b;
 }
@@ -71,7 +71,7 @@ static inline float most(float a, float b)
 /* Width of the reddened skin along a cut: mm, more along a deep one. */
 static float halo_mm(float depth_mm)
 {
-	return least(0.7f + 0.35f * depth_mm, 2.5f);
+	return least_wound(0.7f + 0.35f * depth_mm, 2.5f);
 }
 
 /* The texels within a reach of others, clipped to the texture. */
@@ -145,18 +145,19 @@ static void raise_texel(struct field_texel *texel, const struct field_stretch *s
 	inside = half - off;
 	if (inside > FIELD_INSIDE_MIN_MM &&
 	    raise_to(&texel->inside,
-		     (least(inside, FIELD_INSIDE_MAX_MM) + FIELD_BIAS_MM) *
+		     (least_wound(inside, FIELD_INSIDE_MAX_MM) + FIELD_BIAS_MM) *
 			     FIELD_STEPS_MM)) {
 		/* The wall faces the middle. */
 		float lit = u * s->lamp[0] + v * s->lamp[1];
 
-		texel->half = (uint8_t)(least(half, FIELD_INSIDE_MAX_MM) * HALF_STEPS_MM);
+		texel->half =
+			(uint8_t)(least_wound(half, FIELD_INSIDE_MAX_MM) * HALF_STEPS_MM);
 		texel->lean = (int8_t)(-127 * lit / (off + 0.05f));
 	}
-	red = least(depth * (1 / 1.5f), 1) * 65535;
+	red = least_wound(depth * (1 / 1.5f), 1) * 65535;
 	if (inside > 0) {
 		off /= half; /* 0 in the middle, 1 at the lips */
-		raise_to(&texel->depth, least(depth, FIELD_DEPTH_MAX_MM) *
+		raise_to(&texel->depth, least_wound(depth, FIELD_DEPTH_MAX_MM) *
 						(1 - off * off) * FIELD_STEPS_MM);
 		raise_to(&texel->halo, red);
 	} else {
@@ -208,11 +209,11 @@ static void over(float to[4], float r, float g, float b, float alpha)
 
 static float smooth(float from, float to, float x)
 {
-	x = least(most((x - from) / (to - from), 0), 1);
+	x = least_wound(most((x - from) / (to - from), 0), 1);
 	return x * x * (3 - 2 * x);
 }
 
-static float mix(float a, float b, float t)
+static float mix_wound(float a, float b, float t)
 {
 	return a + (b - a) * t;
 }
@@ -220,9 +221,10 @@ static float mix(float a, float b, float t)
 /* No colour may exceed its alpha, rounding included. */
 static void put_colour(uint8_t rgba[4], const float colour[4])
 {
-	rgba[3] = (uint8_t)(least(colour[3], 1) * 255 + 0.5f);
+	rgba[3] = (uint8_t)(least_wound(colour[3], 1) * 255 + 0.5f);
 	for (int i = 0; i < 3; i++)
-		rgba[i] = (uint8_t)(least(most(colour[i], 0), colour[3]) * 255 + 0.5f);
+		rgba[i] = (uint8_t)(least_wound(most(colour[i], 0), colour[3]) * 255 +
+				    0.5f);
 }
 
 /* Skin along the cut: reddened, and its rim pale, risen, lit from one side. */
@@ -271,8 +273,9 @@ static void colour_flesh(const struct field_texel *texel, float inside, float co
 {
 	float floor = (float)texel->depth * (1 / FIELD_STEPS_MM), colour[4] = {0};
 	float half = most((float)texel->half * (1 / HALF_STEPS_MM), 0.05f);
-	float off = least(most(1 - inside / half, 0), 1);
-	float wall = least(WALL_STEEP * most(inside, 0) * (1 + 0.25f * grain), floor);
+	float off = least_wound(most(1 - inside / half, 0), 1);
+	float wall =
+		least_wound(WALL_STEEP * most(inside, 0) * (1 + 0.25f * grain), floor);
 	float open = smooth(OPEN_FROM_MM, OPEN_MM, half), narrow = 0.30f * floor / half;
 	float lit = (float)texel->lean * (1 / 127.0f) * smooth(0, 0.5f, off);
 	float fat = smooth(0.7f * DERMIS_MM, 1.2f * DERMIS_MM, wall);
@@ -287,11 +290,11 @@ static void colour_flesh(const struct field_texel *texel, float inside, float co
 		     smooth(AIRWAY_INSIDE_MM, AIRWAY_INSIDE_MM + 0.9f, inside);
 
 	for (int i = 0; i < 3; i++) {
-		float layer = mix(dermis_rgb[i], fat_rgb[i], fat);
+		float layer = mix_wound(dermis_rgb[i], fat_rgb[i], fat);
 
-		layer = mix(raw_rgb[i], mix(layer, rgb[i], red), open);
+		layer = mix_wound(raw_rgb[i], mix_wound(layer, rgb[i], red), open);
 		/* Blood colours all of it. */
-		layer = mix(layer, raw_rgb[i], 0.30f + 0.12f * grain);
+		layer = mix_wound(layer, raw_rgb[i], 0.30f + 0.12f * grain);
 		rgb[i] = layer * light * (1 - 0.93f * hole);
 	}
 	over(colour, rgb[0], rgb[1], rgb[2], core * 0.98f);
@@ -697,7 +700,7 @@ static bool is_discontinuity(const struct wound *wound, const struct blade *blad
 	return along_mm > JUMP_MIN_MM + 3 * *way_mm;
 }
 
-static void place(struct wound *wound, const struct blade *blade)
+static void place_wound_blade(struct wound *wound, const struct blade *blade)
 {
 	struct wound_point *tip = &wound->tip;
 
@@ -712,13 +715,13 @@ static void place(struct wound *wound, const struct blade *blade)
 	wound->tip_ns = blade->t_ns;
 }
 
-static void begin(struct wound *wound, const struct blade *blade)
+static void begin_wound(struct wound *wound, const struct blade *blade)
 {
 	struct wound_stroke none;
 
 	wound->cutting = true;
 	wound->tip = (struct wound_point){0};
-	place(wound, blade);
+	place_wound_blade(wound, blade);
 	push(wound, &none);
 }
 
@@ -759,8 +762,8 @@ static void push_way(struct wound *wound, double since_mm, struct wound_stroke *
 	*stroke = all;
 }
 
-static bool cut(struct wound *wound, const struct blade *blade,
-		struct wound_stroke *stroke)
+static bool cut_wound(struct wound *wound, const struct blade *blade,
+		      struct wound_stroke *stroke)
 {
 	const struct wound_point *last;
 	double way_mm = 0, since_mm;
@@ -768,13 +771,13 @@ static bool cut(struct wound *wound, const struct blade *blade,
 
 	if (!wound->cutting || is_discontinuity(wound, blade, &way_mm)) {
 		added = lift(wound, stroke);
-		begin(wound, blade);
+		begin_wound(wound, blade);
 		mark_tail(wound);
 		return added;
 	}
 	wound->cut_mm += way_mm;
 	mark_tail(wound);
-	place(wound, blade);
+	place_wound_blade(wound, blade);
 	last = line_point(wound, wound->end - 1);
 	since_mm = ground_length_mm(&wound->tip.metric, wound->tip.px[0] - last->px[0],
 				    wound->tip.px[1] - last->px[1]);
@@ -839,7 +842,7 @@ bool wound_tick(struct wound *wound, const struct incise_tick *tick,
 		insert(wound, tick);
 	if (in && tick->phase == INCISE_PHASE_CUTTING &&
 	    tick->tool == INCISE_TOOL_BLADE && read_blade(wound, tick, &blade))
-		return cut(wound, &blade, stroke);
+		return cut_wound(wound, &blade, stroke);
 	return lift(wound, stroke);
 }
 
@@ -943,8 +946,8 @@ static float stays_mm(const struct wound *wound, uint64_t number, float end_mm)
 			continue;
 		open_mm = fmax(open_mm, cut->place[incise_cut_place(along_mm)].open_mm);
 	}
-	return least(0.5f * (float)open_mm,
-		     CORNER * fmaxf(least(p->arc_mm, end_mm - p->arc_mm), 0));
+	return least_wound(0.5f * (float)open_mm,
+			   CORNER * fmaxf(least_wound(p->arc_mm, end_mm - p->arc_mm), 0));
 }
 
 /* The stretches on both sides of a point are to be painted. */
@@ -1043,7 +1046,7 @@ static uint64_t together(const struct wound *wound, uint64_t from)
 static void bound_stretch(struct field_stretch *s)
 {
 	const float along_mm = 1 / sqrtf(s->inverse_mm2), reach = s->reach_mm / along_mm;
-	const float ends[2] = {most(s->first, -reach), least(s->last, 1 + reach)};
+	const float ends[2] = {most(s->first, -reach), least_wound(s->last, 1 + reach)};
 	float low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
 
 	for (int i = 0; i < 4; i++) {
@@ -1053,13 +1056,13 @@ static void bound_stretch(struct field_stretch *s)
 		float px[2] = {s->x + (u - s->metric.b * y) / s->metric.a, s->y + y};
 
 		for (int k = 0; k < 2; k++) {
-			low[k] = least(low[k], px[k]);
+			low[k] = least_wound(low[k], px[k]);
 			high[k] = most(high[k], px[k]);
 		}
 	}
 	for (int k = 0; k < 2; k++) {
 		s->from_px[k] = (int)most((float)s->from_px[k], floorf(low[k]) - 1);
-		s->to_px[k] = (int)least((float)s->to_px[k], ceilf(high[k]) + 1);
+		s->to_px[k] = (int)least_wound((float)s->to_px[k], ceilf(high[k]) + 1);
 	}
 }
 

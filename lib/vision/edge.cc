@@ -235,8 +235,8 @@ static int middle_of(const int *count, int n)
 }
 
 /* The pixels around the end; a colour becomes one number that rises outwards. */
-static bool gather(edge_search &s, const image &image, const cv::Point2d &end,
-		   const cv::Point2d &out, double reach, double half)
+static bool gather_edge(edge_search &s, const image &image, const cv::Point2d &end,
+			const cv::Point2d &out, double reach, double half)
 {
 	int channels = image.channels();
 	double wide = std::fabs(out.x) * reach + std::fabs(out.y) * half;
@@ -603,7 +603,7 @@ const char *edge_find(edge_search &s, const image &image, const cv::Point2d &end
 	curve c;
 	int n;
 
-	if (!gather(s, image, end, out, reach, half))
+	if (!gather_edge(s, image, end, out, reach, half))
 		return "the handle reaches the picture's border";
 	if (!find_line(s, reach, half, &place, &slope, &share))
 		return no_step;

@@ -153,8 +153,8 @@ struct line {
 };
 
 /* x = a + b y through the rows from @y0 to @y1, by weights of Tukey's. */
-static bool fit_line(handle_search &s, const std::vector<double> &x, double y0, double y1,
-		     line &line)
+static bool fit_handle_line(handle_search &s, const std::vector<double> &x, double y0,
+			    double y1, line &line)
 {
 	size_t n = s.y.size(), used = 0;
 	double scale = 0;
@@ -229,12 +229,12 @@ static void read_sides(handle_search &s, int piece, const cv::Rect &box, int ste
 
 static bool fit_sides(handle_search &s, double y0, double y1, line *side)
 {
-	return fit_line(s, s.side[0], y0, y1, side[0]) &&
-	       fit_line(s, s.side[1], y0, y1, side[1]);
+	return fit_handle_line(s, s.side[0], y0, y1, side[0]) &&
+	       fit_handle_line(s, s.side[1], y0, y1, side[1]);
 }
 
 /* NULL for a handle; else the reason why it is no handle. */
-static const char *judge(handle_search &s, double area, handle &h)
+static const char *judge_handle(handle_search &s, double area, handle &h)
 {
 	double y0, y1, slope, width, corner, length;
 	line side[2];
@@ -436,7 +436,7 @@ bool handle_find(handle_search &s, image &image, const struct incise_vision_setu
 		handle h;
 
 		read_sides(s, k, box, step);
-		fault = judge(s, area, h);
+		fault = judge_handle(s, area, h);
 		if (!fault && (at_border(h, box) || piece.x == 0 || piece.y == 0 ||
 			       piece.x + piece.width == s.mask.cols ||
 			       piece.y + piece.height == s.mask.rows))

@@ -27,7 +27,7 @@ static void leave(j_common_ptr jpeg)
 }
 
 /* For libjpeg, truncated or damaged data are only a warning, and it fills in grey. */
-static void judge(j_common_ptr jpeg, int level)
+static void judge_jpeg(j_common_ptr jpeg, int level)
 {
 	if (level >= 0)
 		return;
@@ -46,8 +46,8 @@ static void be_silent(j_common_ptr jpeg)
 	(void)jpeg;
 }
 
-static int decode(struct reader *r, const struct incise_camera_frame *frame,
-		  struct incise_vision_box *area, uint8_t *rgb)
+static int decode_jpeg(struct reader *r, const struct incise_camera_frame *frame,
+		       struct incise_vision_box *area, uint8_t *rgb)
 {
 	struct jpeg_decompress_struct *jpeg = &r->jpeg;
 	JDIMENSION x = area->x, width = area->width;
@@ -88,11 +88,11 @@ int incise_jpeg_decode(const struct incise_camera_frame *frame,
 
 	r.jpeg.err = jpeg_std_error(&r.errors);
 	r.errors.error_exit = leave;
-	r.errors.emit_message = judge;
+	r.errors.emit_message = judge_jpeg;
 	r.errors.output_message = be_silent;
 	if (!setjmp(r.out)) {
 		jpeg_create_decompress(&r.jpeg);
-		ret = decode(&r, frame, area, rgb);
+		ret = decode_jpeg(&r, frame, area, rgb);
 	} else if (r.errors.msg_code == JERR_OUT_OF_MEMORY) {
 		ret = -ENOMEM;
 	}

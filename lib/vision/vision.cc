@@ -35,12 +35,13 @@ struct opencv_vision {
 	vision::edge_search edge;
 };
 
-static bool within(const int range[2], int most)
+static bool within_vision(const int range[2], int most)
 {
 	return range[0] >= 0 && range[0] <= range[1] && range[1] <= most;
 }
 
-static int check_setup(const struct incise_vision_setup *s, struct incise_error *err)
+static int check_vision_setup(const struct incise_vision_setup *s,
+			      struct incise_error *err)
 {
 	const struct incise_vision_box *roi = &s->roi;
 
@@ -49,7 +50,7 @@ static int check_setup(const struct incise_vision_setup *s, struct incise_error 
 			err, EINVAL,
 			"vision: hue %d to %d: give degrees over 2, 0 to 179", s->hue[0],
 			s->hue[1]);
-	if (!within(s->saturation, 255) || !within(s->value, 255))
+	if (!within_vision(s->saturation, 255) || !within_vision(s->value, 255))
 		return incise_error_set(
 			err, EINVAL,
 			"vision: saturation %d to %d, value %d to %d: give "
@@ -85,9 +86,9 @@ static double clip01(double value)
 	return std::min(1.0, std::max(0.0, value));
 }
 
-static void report(struct opencv_vision *v, const vision::handle &handle,
-		   const vision::edge &top, const vision::edge &bottom,
-		   struct incise_vision_result *result)
+static void report_vision(struct opencv_vision *v, const vision::handle &handle,
+			  const vision::edge &top, const vision::edge &bottom,
+			  struct incise_vision_result *result)
 {
 	cv::Point2d edge = handle.bottom + bottom.u * handle.axis;
 	double contrast = bottom.step / (10 * std::max(bottom.noise, 0.1));
@@ -125,8 +126,8 @@ static cv::Rect follow(const cv::Rect &last, const cv::Rect &now)
 }
 
 /* Search a region. 0 with result->found, or a negative errno. */
-static int search(struct opencv_vision *v, const cv::Rect &region,
-		  struct incise_vision_result *result)
+static int search_vision(struct opencv_vision *v, const cv::Rect &region,
+			 struct incise_vision_result *result)
 {
 	vision::edge top, bottom;
 	vision::handle handle;
@@ -148,7 +149,7 @@ static int search(struct opencv_vision *v, const cv::Rect &region,
 		result->why = why;
 		return 0;
 	}
-	report(v, handle, top, bottom, result);
+	report_vision(v, handle, top, bottom, result);
 	if (result->quality < worst_quality) {
 		report_nothing(result, result->t_ns, unclear);
 		return 0;
@@ -175,8 +176,9 @@ static cv::Rect fit_region(cv::Rect region, const cv::Size &size)
 	return region;
 }
 
-static int measure(struct opencv_vision *v, const struct incise_camera_frame *frame,
-		   struct incise_vision_result *result)
+static int measure_vision(struct opencv_vision *v,
+			  const struct incise_camera_frame *frame,
+			  struct incise_vision_result *result)
 {
 	int ret = v->image.take(*frame);
 
@@ -188,7 +190,7 @@ static int measure(struct opencv_vision *v, const struct incise_camera_frame *fr
 	if (region.area() > 0) {
 		bool followed = v->last.area() > 0;
 
-		ret = search(v, region, result);
+		ret = search_vision(v, region, result);
 		if (ret || result->found)
 			return ret;
 		/* It is not clear, and would not be in the whole image: save that time. The
@@ -199,7 +201,7 @@ static int measure(struct opencv_vision *v, const struct incise_camera_frame *fr
 		}
 	}
 	v->region = v->last = cv::Rect();
-	return search(v, all, result);
+	return search_vision(v, all, result);
 }
 
 static int opencv_measure(struct incise_vision *vision,
@@ -210,7 +212,7 @@ static int opencv_measure(struct incise_vision *vision,
 
 	report_nothing(result, frame->t_ns, "no picture");
 	try {
-		ret = measure((struct opencv_vision *)vision, frame, result);
+		ret = measure_vision((struct opencv_vision *)vision, frame, result);
 	} catch (const std::bad_alloc &) {
 		ret = -ENOMEM;
 	} catch (const cv::Exception &e) {
@@ -249,7 +251,7 @@ struct range {
 	int low, middle, high;
 };
 
-static range range_of(std::vector<uint8_t> &values)
+static range range_of_vision(std::vector<uint8_t> &values)
 {
 	size_t n = values.size();
 
@@ -272,12 +274,12 @@ static range range_of_hues(std::vector<uint8_t> &hues, int *turn)
 	*turn = 90 - (int)(std::max_element(count, count + 180) - count);
 	for (uint8_t &hue : hues)
 		hue = (uint8_t)((hue + *turn + 180) % 180);
-	return range_of(hues);
+	return range_of_vision(hues);
 }
 
-static int learn(const struct incise_camera_frame &frame,
-		 const struct incise_vision_box &given, struct incise_vision_setup &setup,
-		 struct incise_error *err)
+static int learn_vision(const struct incise_camera_frame &frame,
+			const struct incise_vision_box &given,
+			struct incise_vision_setup &setup, struct incise_error *err)
 {
 	vision::image image;
 	int turn, ret = image.take(frame);
@@ -318,7 +320,7 @@ static int learn(const struct incise_camera_frame &frame,
 				channel[hsv.channels() == 1 ? 2 : k].push_back(
 					hsv.ptr(y)[x * hsv.channels() + k]);
 
-	range value = range_of(channel[2]);
+	range value = range_of_vision(channel[2]);
 	if (value.high - value.low > SPREAD)
 		return incise_error_set(
 			err, ERANGE,
@@ -334,7 +336,7 @@ static int learn(const struct incise_camera_frame &frame,
 	if (channel[0].empty() || value.middle < DARK)
 		return 0;
 
-	range saturation = range_of(channel[1]);
+	range saturation = range_of_vision(channel[1]);
 	if (saturation.middle < PALE) {
 		setup.saturation[1] = up_to_255(saturation.high * 3 / 2 + 10);
 		return 0;
@@ -362,7 +364,7 @@ static int opencv_learn(struct incise_vision *, const struct incise_camera_frame
 	int ret;
 
 	try {
-		ret = learn(*frame, *box, learnt, err);
+		ret = learn_vision(*frame, *box, learnt, err);
 	} catch (const std::bad_alloc &) {
 		ret = incise_error_set(err, ENOMEM, "vision: out of memory");
 	} catch (...) {
@@ -379,7 +381,7 @@ void *vision_opencv_open(const struct incise_backend_request *request,
 	static const struct incise_vision_ops ops = {opencv_measure, opencv_learn,
 						     opencv_close};
 	const struct incise_vision_setup *setup = request->vision;
-	int ret = check_setup(setup, err);
+	int ret = check_vision_setup(setup, err);
 
 	if (ret) {
 		errno = -ret;

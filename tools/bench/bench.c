@@ -16,7 +16,7 @@
 /* --- members of a row --- */
 
 /* NaN without a value, and for text. */
-static double number_of(const struct bench_column *c, const void *row)
+static double number_of_bench(const struct bench_column *c, const void *row)
 {
 	const char *member = (const char *)row + c->offset;
 	double value = NAN;
@@ -46,7 +46,7 @@ static double number_of(const struct bench_column *c, const void *row)
 }
 
 /* NULL without a text, and for numbers. */
-static const char *text_of(const struct bench_column *c, const void *row)
+static const char *text_of_bench(const struct bench_column *c, const void *row)
 {
 	const char *member = (const char *)row + c->offset, *text = NULL;
 
@@ -67,17 +67,18 @@ static json_t *json_of(const struct bench_column *c, const void *row)
 		return value ? json_incref(value) : json_null();
 	case BENCH_TEXT:
 	case BENCH_CHARS:
-		return text_of(c, row) ? json_text(text_of(c, row)) : json_null();
+		return text_of_bench(c, row) ? json_text(text_of_bench(c, row))
+					     : json_null();
 	case BENCH_BOOL:
-		return json_boolean(number_of(c, row) != 0);
+		return json_boolean(number_of_bench(c, row) != 0);
 	case BENCH_NUMBER:
-		if (c->whole && number_of(c, row) == round(number_of(c, row)))
-			return json_integer((json_int_t)number_of(c, row));
-		return json_number(number_of(c, row));
+		if (c->whole && number_of_bench(c, row) == round(number_of_bench(c, row)))
+			return json_integer((json_int_t)number_of_bench(c, row));
+		return json_number(number_of_bench(c, row));
 	default:
-		if (c->scale != 0 || isnan(number_of(c, row)))
-			return json_number(number_of(c, row));
-		return json_integer((json_int_t)number_of(c, row));
+		if (c->scale != 0 || isnan(number_of_bench(c, row)))
+			return json_number(number_of_bench(c, row));
+		return json_integer((json_int_t)number_of_bench(c, row));
 	}
 }
 
@@ -86,9 +87,10 @@ static void word_of(const struct bench_column *c, const void *row, const char *f
 		    char *word, size_t size)
 {
 	if (c->type == BENCH_TEXT || c->type == BENCH_CHARS)
-		snprintf(word, size, "%s", text_of(c, row) ? text_of(c, row) : "");
+		snprintf(word, size, "%s",
+			 text_of_bench(c, row) ? text_of_bench(c, row) : "");
 	else
-		snprintf(word, size, format, number_of(c, row));
+		snprintf(word, size, format, number_of_bench(c, row));
 }
 
 static const struct bench_column *column_of(const struct bench_table *table,
@@ -105,7 +107,7 @@ static const char *failed_of(const struct bench_table *table, const void *row)
 {
 	for (const struct bench_column *c = table->columns; c->key || c->heading; c++)
 		if (c->key && !strcmp(c->key, "failed"))
-			return text_of(c, row);
+			return text_of_bench(c, row);
 	return NULL;
 }
 
@@ -154,7 +156,7 @@ void bench_text(const struct bench_run *run, const char *fmt, ...)
 }
 
 /* "%-18s" takes 18 characters, "  (%6.3f)" ten; below 0 at the left. */
-static int width_of(const char *format)
+static int width_of_bench(const char *format)
 {
 	const char *percent = strchr(format, '%'), *end;
 	bool left = percent[1] == '-';
@@ -168,12 +170,12 @@ static int width_of(const char *format)
 
 static void print_cell(const struct bench_column *c, const void *row)
 {
-	double value = number_of(c, row) * (c->text_scale != 0 ? c->text_scale : 1);
+	double value = number_of_bench(c, row) * (c->text_scale != 0 ? c->text_scale : 1);
 
-	if (text_of(c, row))
-		printf(c->format, text_of(c, row));
+	if (text_of_bench(c, row))
+		printf(c->format, text_of_bench(c, row));
 	else if (isnan(value))
-		printf("%*s", width_of(c->format), "-");
+		printf("%*s", width_of_bench(c->format), "-");
 	else
 		printf(c->format, value);
 }
@@ -187,10 +189,10 @@ static void print_headings(const struct bench_column *columns)
 		if (!c->heading)
 			continue;
 		if (c != columns && !*c->heading) {
-			blank += 1 + abs(width_of(c->format));
+			blank += 1 + abs(width_of_bench(c->format));
 			continue;
 		}
-		printf("%*s%*s", blank, "", width_of(c->format), c->heading);
+		printf("%*s%*s", blank, "", width_of_bench(c->format), c->heading);
 		blank = 1;
 	}
 	putchar('\n');
@@ -207,8 +209,9 @@ static void print_line(const struct bench_table *table, const void *row)
 		if (failed && n == table->failed_after)
 			break;
 		blank += n++ > 0;
-		if (c->blank && !text_of(c, row) && isnan(number_of(c, row))) {
-			blank += abs(width_of(c->format));
+		if (c->blank && !text_of_bench(c, row) &&
+		    isnan(number_of_bench(c, row))) {
+			blank += abs(width_of_bench(c->format));
 			continue;
 		}
 		printf("%*s", blank, "");
@@ -273,7 +276,7 @@ void bench_times(const struct bench_table *table, void *rows, int n,
 /* --- JSON and metrics --- */
 
 /* "a.b" is b of the object a, which is made where it is missing. */
-static void set(json_t *object, const char *path, json_t *value)
+static void set_bench(json_t *object, const char *path, json_t *value)
 {
 	const char *dot = strchr(path, '.');
 	char first[64];
@@ -289,12 +292,12 @@ static void set(json_t *object, const char *path, json_t *value)
 		inner = json_object();
 		json_object_set_new(object, first, inner);
 	}
-	set(inner, dot + 1, value);
+	set_bench(inner, dot + 1, value);
 }
 
 void bench_value(struct bench_run *run, const char *key, json_t *value)
 {
-	set(run->report, key, value);
+	set_bench(run->report, key, value);
 }
 
 static void update(json_t *object, const char *fmt, va_list args)
@@ -332,7 +335,7 @@ static json_t *row_json(const struct bench_table *table, const void *row)
 
 	for (const struct bench_column *c = table->columns; c->key || c->heading; c++)
 		if (c->key && !c->data)
-			set(object, c->key, json_of(c, row));
+			set_bench(object, c->key, json_of(c, row));
 	return object;
 }
 
@@ -555,7 +558,7 @@ static void reserve(const struct bench_run *run, const struct bench_plot *plot)
 	free(name);
 }
 
-static void draw(const struct bench_run *run, const struct bench_plot *plot)
+static void draw_bench(const struct bench_run *run, const struct bench_plot *plot)
 {
 	const struct bench_rows *rows = rows_of(run, plot->data.table),
 				*more = rows_of(run, plot->more.table);
@@ -651,7 +654,7 @@ void bench_measure(struct bench_run *run)
 		json_print(json_incref(run->report));
 	cli_finish();
 	for (const struct bench_plot *p = run->bench->plots; run->plot && p->script; p++)
-		draw(run, p);
+		draw_bench(run, p);
 	if (old) {
 		worse = print_comparison(run, old);
 	} else if (!run->json) {

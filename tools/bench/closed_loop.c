@@ -49,7 +49,7 @@ struct incise_tracker_info closed_loop_tracker(const struct closed_loop *loop)
 	};
 }
 
-static void take_pose(struct running *r, double t_s)
+static void take_closed_loop_pose(struct running *r, double t_s)
 {
 	double noise_mm = t_s < NOISE_SHARE * r->loop->run_s ? r->loop->noise_mm : 0;
 	struct pose *pose = &r->pose[r->last % UNDERWAY];
@@ -166,7 +166,7 @@ bool closed_loop_run(struct incise_plan *plan, const struct closed_loop *loop, i
 		double t_s = (double)i * STEP_S;
 
 		if (t_s >= r.next_pose_s)
-			take_pose(&r, t_s);
+			take_closed_loop_pose(&r, t_s);
 		if (i % STEPS == 0)
 			tick(&r, t_s, force_N);
 		if (t_s > AIR_S)

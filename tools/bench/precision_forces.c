@@ -110,7 +110,7 @@ static struct memory_file sphere_of(int cells, int *triangles)
 }
 
 /* The blade goes in off the top, and round: 3 mm deep, 24 mm to and fro, at up to 75 mm/s. */
-static void place(double t_s, double p[3])
+static void place_precision_stroke(double t_s, double p[3])
 {
 	double along = 0.2 * sin(2 * M_PI * 0.9 * t_s) + 0.05;
 	double across = 0.04 * sin(2 * M_PI * 1.7 * t_s);
@@ -168,7 +168,7 @@ static void measure_error(struct error_row *row)
 		double p[3];
 
 		before = deep;
-		place(k / RATE_HZ, p);
+		place_precision_stroke(k / RATE_HZ, p);
 		tick_at(row, k / RATE_HZ, p, &tick);
 		for (int i = 0; i < 3; i++) {
 			q[i] = tick.tool_mm[i] + (i == 2 ? RADIUS_MM : 0);
@@ -210,14 +210,14 @@ static void measure_error(struct error_row *row)
 	row->ripple_mrad = 1e3 * sqrt(ripple / row->contact);
 }
 
-static void run_timed(void *context)
+static void run_precision_forces_timed(void *context)
 {
 	struct error_row *row = context;
 	struct incise_tick tick;
 	double p[3];
 
 	for (int k = 0; k < TICKS; k++) {
-		place(k / RATE_HZ, p);
+		place_precision_stroke(k / RATE_HZ, p);
 		tick_at(row, k / RATE_HZ, p, &tick);
 	}
 	row->begin_s += TICKS / RATE_HZ;
@@ -263,7 +263,8 @@ void precision_forces(struct bench_run *run)
 		prepare(&rows[i]);
 		measure_error(&rows[i]);
 	}
-	bench_times(&precision_force_table, rows, n, run_timed, TICKS, REPEATS(run));
+	bench_times(&precision_force_table, rows, n, run_precision_forces_timed, TICKS,
+		    REPEATS(run));
 	bench_text(run,
 		   "force laws of Bhasin et al. (2005) on a sphere of %g mm: error, and "
 		   "run time of a tick with its pose\n",

@@ -238,7 +238,7 @@ static int timed_ticks(const struct row *row)
 	return ticks < TICKS ? ticks : TICKS;
 }
 
-static void run_timed(void *context)
+static void run_stability_integrators_timed(void *context)
 {
 	static double places[TICKS];
 
@@ -250,17 +250,18 @@ static void measure_times(int repeats)
 	static struct harness_variant variants[ROWS_MAX];
 
 	for (int i = 0; i < n_rows; i++)
-		variants[i] = (struct harness_variant){.run = run_timed,
-						       .context = &rows[i],
-						       .units = timed_ticks(&rows[i]),
-						       .time = &rows[i].time};
+		variants[i] =
+			(struct harness_variant){.run = run_stability_integrators_timed,
+						 .context = &rows[i],
+						 .units = timed_ticks(&rows[i]),
+						 .time = &rows[i].time};
 	harness_times(variants, n_rows, repeats);
 	for (struct row *row = rows; row < rows + n_rows; row++)
 		row->ns_per_step = row->time.ns.median * row->step_s / TICK_S;
 }
 
-static void add(const struct integrator *integrator, double K, int substeps,
-		const double *truth)
+static void add_stability_integrators(const struct integrator *integrator, double K,
+				      int substeps, const double *truth)
 {
 	struct row *row = &rows[n_rows++];
 
@@ -276,7 +277,7 @@ static void add(const struct integrator *integrator, double K, int substeps,
 /* Springs that smaller steps are tried at, too. */
 static const double swept[] = {1e3, 1e5};
 
-static void measure(bool quick)
+static void measure_stability_integrators(bool quick)
 {
 	static const double springs[] = {1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9};
 	static double truth[TICKS];
@@ -284,7 +285,7 @@ static void measure(bool quick)
 	for (int i = 0; i < N(springs); i += quick ? 2 : 1) {
 		true_places(springs[i], truth);
 		for (int k = 0; k < N(integrators); k++)
-			add(&integrators[k], springs[i], 1, truth);
+			add_stability_integrators(&integrators[k], springs[i], 1, truth);
 	}
 	/* Work against precision: smaller and smaller steps. */
 	for (int i = 0; i < N(swept); i++) {
@@ -292,7 +293,8 @@ static void measure(bool quick)
 		for (int k = 0; !integrators[k].exact; k++)
 			for (int substeps = 2; substeps <= (quick ? 16 : 1024);
 			     substeps *= quick ? 8 : 2)
-				add(&integrators[k], swept[i], substeps, truth);
+				add_stability_integrators(&integrators[k], swept[i],
+							  substeps, truth);
 	}
 	measure_times(quick ? QUICK_REPEATS : REPEATS);
 }
@@ -323,7 +325,7 @@ void stability_integrators(struct bench_run *run)
 {
 	int missed = 0;
 
-	measure(run->quick);
+	measure_stability_integrators(run->quick);
 	bench_text(
 		run,
 		"integrators of a spring: %g kg, damping ratio %g; errors relative to the "

@@ -319,7 +319,7 @@ static void add_cases(const struct bench_run *run)
 			}
 }
 
-static void measure(const struct bench_run *run)
+static void measure_stability_rest(const struct bench_run *run)
 {
 	pthread_t thread[64];
 	long n = sysconf(_SC_NPROCESSORS_ONLN);
@@ -403,7 +403,7 @@ void stability_rest(struct bench_run *run)
 	double swing, accepted, early;
 	int n = 0;
 
-	measure(run);
+	measure_stability_rest(run);
 	cli_progress_end();
 	for (int i = 0; i < n_cases; i++) {
 		if (!i || cases[i].surface != cases[i - 1].surface ||

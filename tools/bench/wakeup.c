@@ -305,7 +305,7 @@ static void add_stall(struct run *run, int64_t to_ns, uint64_t skipped)
 	run->found += skipped;
 }
 
-static int ticked(void *context, const struct incise_tick *tick)
+static int ticked_wakeup(void *context, const struct incise_tick *tick)
 {
 	struct run *run = context;
 	int64_t index = (tick->t_ns - run->due_ns) / run->period_ns;
@@ -341,7 +341,7 @@ static void run_loop(struct run *run)
 		.rate_hz = run->rate_hz,
 		.duration_ns = (int64_t)(run->wakeups->seconds * 1e9),
 		.stop = &cli_stop,
-		.ticked = ticked,
+		.ticked = ticked_wakeup,
 		.context = run,
 	};
 
@@ -527,8 +527,9 @@ static void run_both(struct run *run, const char *scene, struct wakeup *row)
 	name_wakeups(row);
 }
 
-static void measure(const char *scene, enum load_kind load, const struct wakeups *wakeups,
-		    const struct incise_realtime *realtime, struct wakeup *row)
+static void measure_wakeup(const char *scene, enum load_kind load,
+			   const struct wakeups *wakeups,
+			   const struct incise_realtime *realtime, struct wakeup *row)
 {
 	struct run *run = cli_alloc(1, sizeof(*run));
 	struct load_run beside = {0};
@@ -621,8 +622,8 @@ void wakeups_measure(const char *scene, struct memory_file (*own)(double rate_hz
 				.tick_max_us = NAN,
 				.frames_hz = NAN,
 			};
-			measure(scene ? scene : file.path, (enum load_kind)load, wakeups,
-				realtime, row);
+			measure_wakeup(scene ? scene : file.path, (enum load_kind)load,
+				       wakeups, realtime, row);
 			wakeups->n++;
 		}
 		if (file.file)

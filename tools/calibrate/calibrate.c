@@ -119,7 +119,7 @@ static void fill_row(const struct calibrate *c,
 }
 
 /* Columns on the screen of UTF-8. */
-static int width_of(const char *text)
+static int width_of_calibrate(const char *text)
 {
 	int width = 0;
 
@@ -145,12 +145,13 @@ static void print_result(const struct calibrate *c, FILE *out)
 			fill_row(c, &record->values[i], &rows[n++]);
 	for (int i = 0; i < n; i++)
 		for (int k = 0; k < COLUMNS; k++)
-			width[k] = (int)fmax(width[k], width_of(rows[i].text[k]));
+			width[k] =
+				(int)fmax(width[k], width_of_calibrate(rows[i].text[k]));
 	fputc('\n', out);
 	for (int i = 0; i < n; i++) {
 		for (int k = 0; k < CHANGE; k++)
 			fprintf(out, "%s%*s", rows[i].text[k],
-				width[k] - width_of(rows[i].text[k]) + 2, "");
+				width[k] - width_of_calibrate(rows[i].text[k]) + 2, "");
 		fprintf(out, "%s\n", rows[i].text[CHANGE]);
 	}
 	fprintf(out, "%s%s%s: %s\n", cli_colour(out, record->pass ? CLI_GREEN : CLI_RED),

@@ -313,7 +313,7 @@ static json_t *json_comparison(const struct comparison *c)
 	return object;
 }
 
-static void print_json(const struct check *check, int due)
+static void print_check_json(const struct check *check, int due)
 {
 	json_t *list = json_array();
 
@@ -356,7 +356,7 @@ int calibrate_check(int argc, char **argv)
 		due += check.only[k] && check.status[k].due;
 	}
 	if (check.common.json)
-		print_json(&check, due);
+		print_check_json(&check, due);
 	else
 		print_text(&check);
 	cli_finish();

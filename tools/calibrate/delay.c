@@ -88,7 +88,7 @@ static const struct cli_command command = {
 	.failure = "failed or refused",
 };
 
-static void check_options(void *run, int argc, char **argv)
+static void check_delay_options(void *run, int argc, char **argv)
 {
 	struct delay *delay = run;
 	const struct calibrate *common = &delay->common;
@@ -396,7 +396,7 @@ static void print_fit(FILE *out, const char *name, const struct delay_stream *st
 		fprintf(out, "  contact begins at a depth of %.2f mm\n", fit->contact_mm);
 }
 
-static void print_report(const void *run, FILE *out)
+static void print_delay_report(const void *run, FILE *out)
 {
 	const struct delay *delay = run;
 
@@ -444,7 +444,7 @@ static json_t *fit_json(const struct delay_stream *stream)
 	return object;
 }
 
-static json_t *make_json(const void *run)
+static json_t *make_delay_json(const void *run)
 {
 	const struct delay *delay = run;
 
@@ -511,12 +511,12 @@ int calibrate_delay(int argc, char **argv)
 	static const struct calibrate_kind kind = {
 		.name = "delay",
 		.command = &command,
-		.check = check_options,
+		.check = check_delay_options,
 		.read = read_streams,
 		.measure = record_streams,
 		.fit = fit_streams,
-		.text = print_report,
-		.json = make_json,
+		.text = print_delay_report,
+		.json = make_delay_json,
 		.draw = draw_streams,
 	};
 	static struct delay delay = {

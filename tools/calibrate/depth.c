@@ -134,7 +134,7 @@ static void parse_files(struct depth *depth, int argc, char **argv)
 				  depth->path[i]);
 }
 
-static void check_options(void *run, int argc, char **argv)
+static void check_depth_options(void *run, int argc, char **argv)
 {
 	struct depth *depth = run;
 	const char *method;
@@ -446,7 +446,7 @@ static void print_vision(const struct depth *r, FILE *out)
 		s->value[1], r->fit.full_px);
 }
 
-static void print_report(const void *run, FILE *out)
+static void print_depth_report(const void *run, FILE *out)
 {
 	const struct depth *r = run;
 
@@ -523,7 +523,7 @@ static void add_board_json(const struct depth *r, json_t *object)
 	json_object_set_new(object, "outliers", outliers);
 }
 
-static json_t *make_json(const void *run)
+static json_t *make_depth_json(const void *run)
 {
 	const struct depth *r = run;
 	const struct incise_calibration_value *value = &r->common.record.values[0];
@@ -631,7 +631,7 @@ static void draw_fit(const struct depth *r, bool line, bool outliers, FILE *scri
 	fputc('\n', script);
 }
 
-static void draw_plots(const void *run, const char *folder)
+static void draw_depth_plots(const void *run, const char *folder)
 {
 	const struct depth *r = run;
 	FILE *script, *data = plot_data(folder, "depth.dat");
@@ -671,15 +671,15 @@ int calibrate_depth(int argc, char **argv)
 	static const struct calibrate_kind kind = {
 		.name = "depth",
 		.command = &command,
-		.check = check_options,
+		.check = check_depth_options,
 		.read = depth_read,
 		.measure = depth_measure,
 		.write = depth_write,
 		.fit = fit_depth,
-		.text = print_report,
-		.summary = print_report,
-		.json = make_json,
-		.draw = draw_plots,
+		.text = print_depth_report,
+		.summary = print_depth_report,
+		.json = make_depth_json,
+		.draw = draw_depth_plots,
 	};
 	struct incise_calibration nominal;
 	static struct depth depth = {

@@ -202,7 +202,7 @@ static void find_gravity(struct force *force)
 	}
 }
 
-static void check_options(void *run, int argc, char **argv)
+static void check_force_options(void *run, int argc, char **argv)
 {
 	struct force *force = run;
 	const struct calibrate *common = &force->common;
@@ -260,7 +260,7 @@ static bool has_pair(const struct table *table)
 	return table->at[READING] >= 0 && (table->at[MASS] < 0) != (table->at[FORCE] < 0);
 }
 
-static void add_row(void *run, const struct table *table, const double *row)
+static void add_force_row(void *run, const struct table *table, const double *row)
 {
 	const struct incise_calibrate_force_pair pair = {
 		.mass_g = row[MASS],
@@ -287,7 +287,7 @@ static void read_pairs(void *run, const char *path)
 		has_pair,
 	};
 
-	table_read(path, &form, add_row, run);
+	table_read(path, &form, add_force_row, run);
 }
 
 static void write_pairs(const void *run, FILE *out)
@@ -700,7 +700,7 @@ static void print_summary(const void *run, FILE *out)
 	print_pairs(run, false, out);
 }
 
-static void print_report(const void *run, FILE *out)
+static void print_force_report(const void *run, FILE *out)
 {
 	const struct force *force = run;
 	const struct incise_calibration_record *record = &force->common.record;
@@ -735,7 +735,7 @@ static json_t *json_pairs(const struct force *force)
 	return list;
 }
 
-static json_t *make_json(const void *run)
+static json_t *make_force_json(const void *run)
 {
 	const struct force *force = run;
 	const struct incise_calibrate_force *r = &force->result;
@@ -795,7 +795,7 @@ static void put_pairs(FILE *script, int column, const bool there[3])
 }
 
 /* Both plots use one file: force, reading, residual, and whether it was used. */
-static void draw_plots(const void *run, const char *folder)
+static void draw_force_plots(const void *run, const char *folder)
 {
 	const struct force *force = run;
 	const struct incise_calibrate_force *r = &force->result;
@@ -837,16 +837,16 @@ int calibrate_force(int argc, char **argv)
 	static const struct calibrate_kind kind = {
 		.name = "force",
 		.command = &command,
-		.check = check_options,
+		.check = check_force_options,
 		.read = read_pairs,
 		.measure = measure_loads,
 		.write = write_pairs,
 		.fit = fit_force,
 		.reports_refusal = true,
-		.text = print_report,
+		.text = print_force_report,
 		.summary = print_summary,
-		.json = make_json,
-		.draw = draw_plots,
+		.json = make_force_json,
+		.draw = draw_force_plots,
 	};
 	static struct force force = {
 		.latitude_deg = NAN,

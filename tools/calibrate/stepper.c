@@ -87,7 +87,7 @@ static const struct cli_command command = {
 	.failure = "failed, refused or stopped",
 };
 
-static void check_options(void *run, int argc, char **argv)
+static void check_stepper_options(void *run, int argc, char **argv)
 {
 	struct stepper *stepper = run;
 	const struct calibrate *common = &stepper->common;
@@ -154,7 +154,7 @@ struct reader {
 	double first_mm, first_steps;
 };
 
-static void add_row(void *context, const struct table *table, const double *row)
+static void add_stepper_row(void *context, const struct table *table, const double *row)
 {
 	struct reader *r = context;
 	double mm = row[POSITION], steps = row[STEPS];
@@ -200,7 +200,7 @@ static void read_points(void *run, const char *path)
 	struct reader r = {.stepper = stepper};
 
 	find_sensor_u(stepper);
-	table_read(path, &form, add_row, &r);
+	table_read(path, &form, add_stepper_row, &r);
 	if (isnan(stepper->step_mm) && r.counted > 0 && r.has_both)
 		stepper->step_mm = r.mm / r.counted;
 	if (!(stepper->step_mm > 0))
@@ -387,7 +387,7 @@ static void print_rate(const struct stepper_rate *rate, FILE *out)
 			rate->off_mm);
 }
 
-static void print_report(const void *run, FILE *out)
+static void print_stepper_report(const void *run, FILE *out)
 {
 	const struct stepper *stepper = run;
 	const struct incise_calibrate_stepper *fit = &stepper->fit;
@@ -443,7 +443,7 @@ static json_t *rate_json(const struct stepper_rate *rate)
 			 json_number(rate->off_mm));
 }
 
-static json_t *make_json(const void *run)
+static json_t *make_stepper_json(const void *run)
 {
 	const struct stepper *stepper = run;
 	const struct incise_calibrate_stepper *fit = &stepper->fit;
@@ -493,7 +493,7 @@ static bool has_state(const struct stepper *stepper, int from, int to)
 	return false;
 }
 
-static void draw_plots(const struct stepper *stepper, const char *folder)
+static void draw_stepper_plots(const struct stepper *stepper, const char *folder)
 {
 	const struct incise_calibrate_stepper *fit = &stepper->fit;
 	FILE *script = plot_begin(folder, "fit", 900, 560);
@@ -548,7 +548,7 @@ static void draw_report(const void *run, const char *folder)
 			p->force_N - line, up, (int)stepper->states[i]);
 	}
 	plot_data_end(data, folder);
-	draw_plots(stepper, folder);
+	draw_stepper_plots(stepper, folder);
 }
 
 int calibrate_stepper(int argc, char **argv)
@@ -556,14 +556,14 @@ int calibrate_stepper(int argc, char **argv)
 	static const struct calibrate_kind kind = {
 		.name = "stepper",
 		.command = &command,
-		.check = check_options,
+		.check = check_stepper_options,
 		.read = read_points,
 		.measure = measure_points,
 		.write = write_points,
 		.fit = fit_strokes,
-		.text = print_report,
-		.summary = print_report,
-		.json = make_json,
+		.text = print_stepper_report,
+		.summary = print_stepper_report,
+		.json = make_stepper_json,
 		.draw = draw_report,
 	};
 	static struct stepper stepper = {

@@ -71,7 +71,7 @@ static const struct cli_command command = {
 	.failure = "failed or refused",
 };
 
-static void check_options(void *run, int argc, char **argv)
+static void check_tip_options(void *run, int argc, char **argv)
 {
 	struct tip *tip = run;
 
@@ -140,7 +140,7 @@ static bool has_pose(const struct table *table)
 	return true;
 }
 
-static void add_row(void *run, const struct table *table, const double *row)
+static void add_tip_row(void *run, const struct table *table, const double *row)
 {
 	struct tip *tip = run;
 	double t_s = isnan(row[0]) ? tip->n : row[0];
@@ -164,7 +164,7 @@ static void read_poses(void *run, const char *path)
 	if (S_ISDIR(st.st_mode) || cli_ends_with(path, ".rec"))
 		read_recording(run, path);
 	else
-		table_read(path, &form, add_row, run);
+		table_read(path, &form, add_tip_row, run);
 }
 
 static void write_poses(const void *run, FILE *out)
@@ -304,7 +304,7 @@ static int fit_tip(void *run, struct incise_error *err)
 
 #define OUTLIERS_LISTED 20
 
-static void print_report(const void *run, FILE *out)
+static void print_tip_report(const void *run, FILE *out)
 {
 	const struct tip *tip = run;
 	const struct incise_tip_fit *fit = &tip->fit;
@@ -344,7 +344,7 @@ static void print_report(const void *run, FILE *out)
 		fputc('\n', out);
 }
 
-static json_t *make_json(const void *run)
+static json_t *make_tip_json(const void *run)
 {
 	const struct tip *tip = run;
 	json_t *details = json_object(), *outliers = json_array();
@@ -400,7 +400,7 @@ static void put_plot(const struct tip *tip, bool residuals, FILE *script)
 	fputc('\n', script);
 }
 
-static void draw_plots(const void *run, const char *folder)
+static void draw_tip_plots(const void *run, const char *folder)
 {
 	static const char *const plots[] = {"residuals", "fit"};
 	const struct tip *tip = run;
@@ -431,14 +431,14 @@ int calibrate_tip(int argc, char **argv)
 	static const struct calibrate_kind kind = {
 		.name = "tip",
 		.command = &command,
-		.check = check_options,
+		.check = check_tip_options,
 		.read = read_poses,
 		.measure = record_poses,
 		.write = write_poses,
 		.fit = fit_tip,
-		.text = print_report,
-		.json = make_json,
-		.draw = draw_plots,
+		.text = print_tip_report,
+		.json = make_tip_json,
+		.draw = draw_tip_plots,
 	};
 	static struct tip tip = {.u_surface_mm = NAN};
 

@@ -110,8 +110,8 @@ static int row_of(const struct axis *axis, int rows, double value)
 }
 
 /* Newest to the right; a column begins where the one before ended, so that the line is whole. */
-static void draw(struct canvas *canvas, const struct trace *trace,
-		 const struct axis *axis, int dots, int rows)
+static void draw_trace(struct canvas *canvas, const struct trace *trace,
+		       const struct axis *axis, int dots, int rows)
 {
 	double before = NAN;
 
@@ -179,7 +179,7 @@ void trace_put(const struct trace *trace, int width, int height, bool braille, F
 		return;
 	if (height > HEIGHT_MOST)
 		height = HEIGHT_MOST;
-	draw(&canvas, trace, &axis, dots, 4 * height);
+	draw_trace(&canvas, trace, &axis, dots, 4 * height);
 	last = height - 1;
 	for (int y = 0; y < height; y++) {
 		put_label(y ? axis.low : axis.high, trace->unit, !y || y == last, out);

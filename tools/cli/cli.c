@@ -99,8 +99,8 @@ static const char *argument_of(const struct cli_command *command, const char *gi
 }
 
 /* Bad usage: option @given, or its letter @letter, is no option of this command. */
-_Noreturn static void refuse(const struct cli_command *command, const char *given,
-			     int letter)
+_Noreturn static void refuse_cli(const struct cli_command *command, const char *given,
+				 int letter)
 {
 	const char *names[OPTIONS_MAX + 4] = {0}, *nearest;
 	char *option = cli_text("%.*s", (int)strcspn(given, "="), given);
@@ -171,7 +171,7 @@ static const struct cli_option *next(const struct cli_command *command, int argc
 	for (int n = 0; (opt = help_option(command, n)); n++)
 		if (id == LONG + n || id == opt->id)
 			return opt;
-	refuse(command, argv[optind - 1], optopt);
+	refuse_cli(command, argv[optind - 1], optopt);
 }
 
 static void store_integer(const struct cli_option *opt, void *member)
@@ -296,8 +296,8 @@ static void list_choices(const struct cli_option *opt)
 	opt->parse((char *)completed + opt->offset, nothing);
 }
 
-static void complete(const struct cli_command *command, int n, char **words,
-		     void *options)
+static void complete_cli(const struct cli_command *command, int n, char **words,
+			 void *options)
 {
 	current = command;
 	completed = options;
@@ -306,7 +306,7 @@ static void complete(const struct cli_command *command, int n, char **words,
 }
 
 /* While a command line is completed, names that are expected are the answer. */
-static void answer(const char *const *names)
+static void answer_completion(const char *const *names)
 {
 	if (!completed)
 		return;
@@ -333,7 +333,7 @@ void cli_parse(const struct cli_command *command, int argc, char **argv, void *o
 	const struct cli_option *opt;
 
 	if (argc > 1 && !strcmp(argv[1], "--complete"))
-		complete(command, argc - 2, argv + 2, options);
+		complete_cli(command, argc - 2, argv + 2, options);
 	if (argc > 1 && !strcmp(argv[1], "--table")) {
 		help_print_table(command);
 		cli_finish();
@@ -504,7 +504,7 @@ void cli_unknown(const char *what, const char *name, const char *const *names)
 {
 	const char *nearest = incise_nearest_name(name, names);
 
-	answer(names);
+	answer_completion(names);
 	if (nearest)
 		cli_usage("unknown %s '%s'; did you mean '%s'?", what, name, nearest);
 	cli_usage("unknown %s '%s'; expected %s", what, name, one_of(names));
@@ -598,7 +598,7 @@ int cli_choice(const char *option, const char *text, const char *const *names)
 {
 	const char *nearest = incise_nearest_name(text, names);
 
-	answer(names);
+	answer_completion(names);
 	for (int i = 0; names[i]; i++)
 		if (!strcmp(text, names[i]))
 			return i;

@@ -14,7 +14,7 @@
 #include "features.h"
 
 /* The text that a function of a loaded library returns, or NULL. */
-static const char *text_of(void *handle, const char *function)
+static const char *text_of_features(void *handle, const char *function)
 {
 	const char *(*call)(void) = (const char *(*)(void))dlsym(handle, function);
 
@@ -35,8 +35,8 @@ static void try(struct feature *feature, const char *path)
 		return;
 	}
 	/* By the names of libgpiod 2 and 1. */
-	gpiod = text_of(handle, "gpiod_api_version");
-	gpiod = gpiod ? gpiod : text_of(handle, "gpiod_version_string");
+	gpiod = text_of_features(handle, "gpiod_api_version");
+	gpiod = gpiod ? gpiod : text_of_features(handle, "gpiod_version_string");
 	if (gpiod && !strcmp(feature->name, "gpio"))
 		snprintf(feature->detail, sizeof(feature->detail), "libgpiod %.20s",
 			 gpiod);
@@ -100,7 +100,7 @@ struct lines {
 	char text[KINDS][600];
 };
 
-static void add(void *context, const struct feature *feature)
+static void add_features(void *context, const struct feature *feature)
 {
 	struct lines *lines = context;
 
@@ -121,7 +121,7 @@ static void print_library(FILE *out, const char *label, const char *library,
 			  const char *function)
 {
 	void *handle = dlopen(library, RTLD_LAZY | RTLD_LOCAL);
-	const char *text = handle && function ? text_of(handle, function) : NULL;
+	const char *text = handle && function ? text_of_features(handle, function) : NULL;
 
 	fprintf(out, "  %-11s%s\n", label, text ? text : handle ? "yes" : "no");
 	if (handle)
@@ -135,7 +135,7 @@ void features_print(FILE *out)
 
 	for (size_t i = 0; i < KINDS; i++)
 		snprintf(lines.text[i], sizeof(lines.text[i]), "%s", kinds[i].built_in);
-	features_each(add, &lines);
+	features_each(add_features, &lines);
 	for (size_t i = 0; i < KINDS; i++)
 		fprintf(out, "  %-11s%s\n", kinds[i].label,
 			*lines.text[i] ? lines.text[i] : "none");

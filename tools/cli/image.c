@@ -48,7 +48,8 @@ static void read_jpeg(const char *path, struct incise_camera_frame *frame)
 }
 
 /* Parse the next number of a header after blanks and comments; returns its end. */
-static size_t number(const uint8_t *d, size_t size, size_t at, unsigned long *value)
+static size_t read_image_number(const uint8_t *d, size_t size, size_t at,
+				unsigned long *value)
 {
 	bool any = false;
 
@@ -69,11 +70,11 @@ static size_t number(const uint8_t *d, size_t size, size_t at, unsigned long *va
 static void read_pnm(const char *path, struct incise_camera_frame *frame, uint8_t *data)
 {
 	unsigned long width, height, top;
-	size_t at = number(data, frame->size, 2, &width);
+	size_t at = read_image_number(data, frame->size, 2, &width);
 	int channels = data[1] == '6' ? 3 : 1;
 
-	at = number(data, frame->size, at, &height);
-	at = number(data, frame->size, at, &top) + 1;
+	at = read_image_number(data, frame->size, at, &height);
+	at = read_image_number(data, frame->size, at, &top) + 1;
 	if (at >= frame->size || top != 255)
 		cli_fail("%s: expected a PGM or PPM of 8 bits, with 255 in its header",
 			 path);

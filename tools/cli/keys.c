@@ -26,7 +26,7 @@ static char *origin_of(const struct incise_key *key, const char *path)
 }
 
 /* Columns that a UTF-8 text takes on a terminal. */
-static int width_of(const char *text)
+static int width_of_keys(const char *text)
 {
 	int width = 0;
 
@@ -40,8 +40,8 @@ void keys_print(const struct keys *keys, const char *path, bool all)
 	int longest = 0;
 
 	for (size_t i = 0; i < keys->n; i++)
-		if (width_of(keys->key[i].name) > longest)
-			longest = width_of(keys->key[i].name);
+		if (width_of_keys(keys->key[i].name) > longest)
+			longest = width_of_keys(keys->key[i].name);
 	printf("%-*s %-24s %s\n", longest, "key", "value", "from");
 	for (size_t i = 0; i < keys->n; i++) {
 		const struct incise_key *key = &keys->key[i];
@@ -54,7 +54,8 @@ void keys_print(const struct keys *keys, const char *path, bool all)
 				 *unit ? " " : "", unit);
 		origin = origin_of(key, path);
 		printf("%-*s %s%*s %s\n", longest, key->name, value,
-		       width_of(value) < 24 ? 24 - width_of(value) : 0, "", origin);
+		       width_of_keys(value) < 24 ? 24 - width_of_keys(value) : 0, "",
+		       origin);
 		free(value);
 		free(origin);
 	}

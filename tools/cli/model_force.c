@@ -22,7 +22,7 @@ static bool inputs(const struct incise_model *model, const struct model_force *a
 	return true;
 }
 
-static bool find(const char *path, struct model_force *force)
+static bool find_model_force(const char *path, struct model_force *force)
 {
 	struct incise_model *model = incise_model_load(path, NULL);
 	char *sd = cli_text("%s.sd", path);
@@ -50,7 +50,7 @@ bool model_force_at(const struct incise_scene *scene, double depth_mm,
 				      .velocity_mm_s = velocity_mm_s};
 	for (int i = 0; (path = incise_scene_file(scene, i)); i++)
 		if (cli_ends_with(path, ".fis"))
-			return find(path, force);
+			return find_model_force(path, force);
 	return false;
 }
 

@@ -12,7 +12,7 @@
 #define SAMPLES 200 /* of a curve */
 #define MESH 40	    /* of the surface, per input */
 
-static double between(const struct incise_variable *v, int i, int n)
+static double between_model_plot(const struct incise_variable *v, int i, int n)
 {
 	return v->min + (v->max - v->min) * i / n;
 }
@@ -79,7 +79,7 @@ void model_plot_write_functions(const struct incise_model *model, const char *fo
 
 		for (int k = 0; k < info->n_mfs[i]; k++) {
 			for (int s = 0; s <= SAMPLES; s++) {
-				double x = between(v, s, SAMPLES);
+				double x = between_model_plot(v, s, SAMPLES);
 
 				fprintf(out, "%g %g\n", x,
 					incise_mf_eval(incise_model_mf(model, i, k), x));
@@ -107,7 +107,7 @@ static struct peak peak_of(const struct incise_variable *v, const struct incise_
 	double highest = -1, from = 0, to = 0;
 
 	for (int s = 0; s <= SAMPLES; s++) {
-		double x = between(v, s, SAMPLES), y = incise_mf_eval(mf, x);
+		double x = between_model_plot(v, s, SAMPLES), y = incise_mf_eval(mf, x);
 
 		if (y > highest + 1e-9) {
 			highest = y;
@@ -149,7 +149,7 @@ static bool peaks_fit(const struct peak *peak, int n)
 	16 /* characters of a name; more is cut, as a legend takes the plot's place */
 
 /* As a string of gnuplot in double quotes; @space for '_'. */
-static void put_name(FILE *script, const char *name, const char *space)
+static void put_model_plot_name(FILE *script, const char *name, const char *space)
 {
 	int n = 0;
 
@@ -186,7 +186,7 @@ void model_plot_functions(FILE *script, const struct incise_model *model, int in
 	put_axis(script, "x", v);
 	for (int k = 0; k < n && fit; k++) {
 		fprintf(script, "set label %d ", k + 1);
-		put_name(script, peak[k].name, "\\n");
+		put_model_plot_name(script, peak[k].name, "\\n");
 		fprintf(script, " at %.9g,1.14 center noenhanced font small\n",
 			peak[k].x);
 	}
@@ -194,7 +194,7 @@ void model_plot_functions(FILE *script, const struct incise_model *model, int in
 	for (int k = 0; k < n; k++) {
 		fprintf(script, "%s '%s' index %d using 1:2 with lines lt %d title ",
 			k ? ", \\\n " : "", data, first + k, k + 1);
-		put_name(script, fit ? "" : peak[k].name, " ");
+		put_model_plot_name(script, fit ? "" : peak[k].name, " ");
 	}
 	fputs("\nunset label\nset ytics auto\nset xrange [*:*]\n", script);
 }
@@ -208,16 +208,16 @@ void model_plot_write_surface(const struct model_surface *surface, const char *f
 	int n = surface->n_inputs;
 
 	for (int i = 2; i < n; i++)
-		x[i] = between(&surface->input[i], 1, 2);
+		x[i] = between_model_plot(&surface->input[i], 1, 2);
 	for (int i = 0; n > 1 && i <= MESH; i++, fputc('\n', out))
 		for (int j = 0; j <= MESH; j++) {
-			x[0] = between(a, i, MESH);
-			x[1] = between(b, j, MESH);
+			x[0] = between_model_plot(a, i, MESH);
+			x[1] = between_model_plot(b, j, MESH);
 			fprintf(out, "%g %g %g\n", x[0], x[1],
 				surface->eval(surface->of, x));
 		}
 	for (int i = 0; n == 1 && i <= SAMPLES; i++) {
-		x[0] = between(a, i, SAMPLES);
+		x[0] = between_model_plot(a, i, SAMPLES);
 		fprintf(out, "%g %g\n", x[0], surface->eval(surface->of, x));
 	}
 	plot_data_end(out, folder);
@@ -257,11 +257,11 @@ static struct contours contours_of(const struct model_surface *surface)
 	double low = INFINITY, high = -INFINITY, x[INCISE_MODEL_INPUTS_MAX], step, power;
 
 	for (int i = 2; i < surface->n_inputs; i++)
-		x[i] = between(&surface->input[i], 1, 2);
+		x[i] = between_model_plot(&surface->input[i], 1, 2);
 	for (int i = 0; i <= MESH; i++)
 		for (int j = 0; j <= MESH; j++) {
-			x[0] = between(&surface->input[0], i, MESH);
-			x[1] = between(&surface->input[1], j, MESH);
+			x[0] = between_model_plot(&surface->input[0], i, MESH);
+			x[1] = between_model_plot(&surface->input[1], j, MESH);
 			low = fmin(low, surface->eval(surface->of, x));
 			high = fmax(high, surface->eval(surface->of, x));
 		}

@@ -123,7 +123,7 @@ void recording_remove(const char *path)
 }
 
 /* Fail if recording_replace() could not replace what is at @path. */
-static void check(const char *path)
+static void check_recording(const char *path)
 {
 	char file[PATH_MAX];
 	struct stat st;
@@ -141,7 +141,7 @@ static void check(const char *path)
 }
 
 /* Without the slashes that completion puts behind a folder. */
-static char *plain(const char *path)
+static char *make_plain_path(const char *path)
 {
 	size_t n = strlen(path);
 
@@ -152,12 +152,12 @@ static char *plain(const char *path)
 
 char *recording_target(const char *given)
 {
-	char *path = plain(given);
+	char *path = make_plain_path(given);
 	char *target = cli_text("%s%s", path, cli_overwrite() ? ".new" : "");
 	char *part = cli_text("%s.part", path), *rest = cli_text("%s.part", target);
 
 	if (cli_overwrite()) {
-		check(path);
+		check_recording(path);
 		recording_remove(part);
 		recording_remove(rest);
 		recording_remove(target);
@@ -193,7 +193,7 @@ static void replace(const char *new, const char *path)
 
 void recording_replace(const char *new, const char *given)
 {
-	char *path = plain(given);
+	char *path = make_plain_path(given);
 
 	replace(new, path);
 	free(path);

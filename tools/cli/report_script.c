@@ -12,7 +12,7 @@
 #include "report_script.h"
 
 /* The last line that it said. */
-static int failed(FILE *said, struct incise_error *err)
+static int failed_report_script(FILE *said, struct incise_error *err)
 {
 	char line[400] = "it failed", text[400];
 
@@ -52,7 +52,7 @@ int report_script(const char *what, const char *folder, const json_t *data, FILE
 				      "report: %s: %s; install python3-jinja2",
 				      REPORT_PYTHON, strerror(errno));
 	else if (status)
-		rc = failed(said.file, err);
+		rc = failed_report_script(said.file, err);
 	fclose(in.file);
 	fclose(said.file);
 	free(script);

@@ -14,7 +14,8 @@ const char stream_heading[] =
 	"stream     rate/s      rows   lost   late jitter ms     drift ppm     offset ms";
 
 /* "1.23", or "-" for what is not known. */
-static const char *number(char *text, size_t size, double value, int decimals)
+static const char *format_report_number(char *text, size_t size, double value,
+					int decimals)
 {
 	if (isfinite(value))
 		snprintf(text, size, "%.*f", decimals, value);
@@ -38,7 +39,7 @@ static void put_with_sd(char *text, size_t size, double value, double sd, int de
 		pair[n] = 0;
 	} else {
 		snprintf(pair, sizeof(pair), "%s%s",
-			 number(known, sizeof(known), value, decimals),
+			 format_report_number(known, sizeof(known), value, decimals),
 			 isfinite(value) ? "±?" : "");
 	}
 	/* ± has two bytes. */
@@ -52,10 +53,11 @@ int stream_line(const struct incise_stream *s, char *text, size_t size)
 	put_with_sd(drift, sizeof(drift), s->drift_ppm, s->drift_sd_ppm, 2, 13);
 	put_with_sd(offset, sizeof(offset), s->offset_ms, s->offset_sd_ms, 3, 13);
 	return snprintf(text, size, "%-7s %9s %9llu %6llu %6llu %9s %s %s", s->name,
-			number(rate, sizeof(rate), s->rate_hz, 2),
+			format_report_number(rate, sizeof(rate), s->rate_hz, 2),
 			(unsigned long long)s->rows, (unsigned long long)s->lost,
 			(unsigned long long)s->late,
-			number(jitter, sizeof(jitter), s->jitter_ms, 3), drift, offset);
+			format_report_number(jitter, sizeof(jitter), s->jitter_ms, 3),
+			drift, offset);
 }
 
 /* Whose offsets are no surer than their devices' word. */

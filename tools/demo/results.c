@@ -57,7 +57,7 @@ struct incise_model *demo_model(const struct demo *demo, const char *name)
 }
 
 /* A number of a report, in the object @a of it if there is a @b. */
-static double number_of(const json_t *report, const char *a, const char *b)
+static double number_of_results(const json_t *report, const char *a, const char *b)
 {
 	const json_t *value = json_object_get(report, a);
 
@@ -146,7 +146,7 @@ void demo_interrupted(const char *folder)
 
 /* --- plots --------------------------------------------------------------------------- */
 
-static void draw(const struct demo *demo, FILE *script, const char *name)
+static void draw_results(const struct demo *demo, FILE *script, const char *name)
 {
 	bool drawn = plot_draw(script, demo->folder, name);
 
@@ -284,7 +284,7 @@ static void figure_force(const struct demo *demo)
 	fputs("plot for [i=0:3] 'force-averaged.dat' index i using 1:2 with lines lt (i+1)\n"
 	      "unset multiplot\n",
 	      script);
-	draw(demo, script, "fig2-force");
+	draw_results(demo, script, "fig2-force");
 	incise_dataset_free(raw);
 }
 
@@ -310,7 +310,7 @@ static void figure_membership(const struct demo *demo)
 		model_plot_functions(script, model, i, "membership-after.dat",
 				     i ? "(d) after training" : "(c) after training");
 	fputs("unset multiplot\n", script);
-	draw(demo, script, "fig3a-membership");
+	draw_results(demo, script, "fig3a-membership");
 	incise_model_free(before);
 	incise_model_free(model);
 }
@@ -326,7 +326,7 @@ static void figure_surface(const struct demo *demo, const struct incise_model *m
 			   "Cutting force of the trained model; markers: averaged pairs "
 			   "(compare figure 3b of Song et al., 2006)",
 			   ", \\\n  'pairs.dat' with points pt 7 ps 0.5 lc rgb ink");
-	draw(demo, script, "fig3b-surface");
+	draw_results(demo, script, "fig3b-surface");
 }
 
 static void write_pairs(const struct demo *demo)
@@ -404,7 +404,7 @@ static void figure_prediction(const struct demo *demo)
 		"  NaN with lines lc rgb ink dt 2 lw 1 title 'commanded force'\n"
 		"unset multiplot\n",
 		duration_s);
-	draw(demo, script, "fig5-prediction");
+	draw_results(demo, script, "fig5-prediction");
 	incise_dataset_free(cut);
 	incise_dataset_free(log);
 }
@@ -438,7 +438,7 @@ static void write_lateness(const json_t *histogram, double ticks, FILE *data)
 static void figure_lateness(const struct demo *demo, const json_t *haptic)
 {
 	const json_t *lateness = json_object_get(haptic, "lateness_us");
-	double ticks = fmax(1, number_of(haptic, "ticks", NULL));
+	double ticks = fmax(1, number_of_results(haptic, "ticks", NULL));
 	char *median = quantile_us(haptic, "lateness_us", "median", 1);
 	char *p999 = quantile_us(haptic, "lateness_us", "p999", 1);
 	FILE *data = plot_data(demo->folder, "lateness.dat");
@@ -460,9 +460,9 @@ static void figure_lateness(const struct demo *demo, const json_t *haptic)
 		"plot 'lateness.dat' using (sqrt($1*$2)):3:1:2:(%g):3 "
 		"with boxxyerror fc rgb blue\n",
 		ticks, json_string_value(json_object_get(haptic, "scheduling")), median,
-		p999, number_of(lateness, "max", NULL), 0.5 / ticks, 0.5 / ticks);
+		p999, number_of_results(lateness, "max", NULL), 0.5 / ticks, 0.5 / ticks);
 	free(median), free(p999);
-	draw(demo, script, "tick-lateness");
+	draw_results(demo, script, "tick-lateness");
 }
 
 /* ---- The camera's frame ---- */
@@ -506,9 +506,10 @@ static void annotate(FILE *script, const struct incise_vision_result *r, double 
 }
 
 /* Measure the frame as incise capture does; false without the module for it. */
-static bool measure(struct incise_rig *rig, const struct incise_camera_frame *frame,
-		    struct incise_vision_setup *setup,
-		    struct incise_vision_result *result)
+static bool measure_results(struct incise_rig *rig,
+			    const struct incise_camera_frame *frame,
+			    struct incise_vision_setup *setup,
+			    struct incise_vision_result *result)
 {
 	struct incise_error err = {0};
 	struct incise_vision *vision;
@@ -554,12 +555,12 @@ static void figure_camera(const struct demo *demo)
 		"set size ratio -1\nunset grid\nset xrange [0:%d]\nset yrange [%d:0]\n"
 		"set xlabel 'x / px'\nset ylabel 'y / px'\n",
 		mm_px, frame.width, frame.height + 120);
-	if (measure(rig, &frame, &setup, &result))
+	if (measure_results(rig, &frame, &setup, &result))
 		annotate(script, &result, mm_px);
 	fprintf(script,
 		"plot 'camera.rgb' binary array=(%d,%d) format='%%uchar' with rgbimage\n",
 		frame.width, frame.height);
-	draw(demo, script, "camera");
+	draw_results(demo, script, "camera");
 	incise_rig_close(rig);
 	free(spec);
 }
@@ -576,7 +577,7 @@ void demo_figures(struct demo *demo, const struct incise_model *model)
 	figure_lateness(demo, json_object_get(demo->summary, "haptic"));
 	figure_camera(demo);
 	json_set_number(demo->summary, "new_cut_rms_error_N",
-			number_of(replay, "rms_error_N", NULL));
+			number_of_results(replay, "rms_error_N", NULL));
 }
 
 /* --- the summary ---------------------------------------------------------------------- */
@@ -645,31 +646,33 @@ void demo_summary_print(const struct demo *demo, FILE *out, double seconds)
 		"  force            largest %.3f N, actuator off by %.4f N rms\n"
 		"\n"
 		"took               %.0f s\n",
-		incise_version(), demo->seed, number_of(capture, "seconds", NULL),
-		number_of(capture, "force", NULL),
-		number_of(capture, "force_lost", NULL) +
-			number_of(capture, "tracker_lost", NULL),
-		number_of(capture, "force_clipped", NULL),
-		number_of(halves, "pairs", NULL), number_of(halves, "train", "mse_N2"),
-		number_of(halves, "check", "mse_N2"), DEMO_SPLITS,
+		incise_version(), demo->seed, number_of_results(capture, "seconds", NULL),
+		number_of_results(capture, "force", NULL),
+		number_of_results(capture, "force_lost", NULL) +
+			number_of_results(capture, "tracker_lost", NULL),
+		number_of_results(capture, "force_clipped", NULL),
+		number_of_results(halves, "pairs", NULL),
+		number_of_results(halves, "train", "mse_N2"),
+		number_of_results(halves, "check", "mse_N2"), DEMO_SPLITS,
 		(splits[DEMO_SPLITS / 2 - 1] + splits[DEMO_SPLITS / 2]) / 2, splits[0],
 		splits[DEMO_SPLITS - 1], PAPER_MSE_TRAIN, PAPER_MSE_CHECK,
-		number_of(unseen, "train", "rms_error_N"),
-		number_of(unseen, "check", "rms_error_N"),
-		number_of(lines, "mean", "rms_error_N"),
-		number_of(lines, "linear", "rms_error_N"),
-		number_of(lines, "knn", "rms_error_N"),
-		number_of(demo->summary, "truth_rms_error_N", NULL),
-		number_of(demo->summary, "new_cut_rms_error_N", NULL),
-		number_of(demo->summary, "fixed_point", "max_difference_N") * 1e3,
+		number_of_results(unseen, "train", "rms_error_N"),
+		number_of_results(unseen, "check", "rms_error_N"),
+		number_of_results(lines, "mean", "rms_error_N"),
+		number_of_results(lines, "linear", "rms_error_N"),
+		number_of_results(lines, "knn", "rms_error_N"),
+		number_of_results(demo->summary, "truth_rms_error_N", NULL),
+		number_of_results(demo->summary, "new_cut_rms_error_N", NULL),
+		number_of_results(demo->summary, "fixed_point", "max_difference_N") * 1e3,
 		(GRID + 1) * (GRID + 1),
-		number_of(demo->summary, "fixed_point", "bound_N") * 1e3,
-		number_of(haptic, "ticks", NULL), number_of(haptic, "rate_hz", NULL),
-		number_of(haptic, "skipped", NULL),
+		number_of_results(demo->summary, "fixed_point", "bound_N") * 1e3,
+		number_of_results(haptic, "ticks", NULL),
+		number_of_results(haptic, "rate_hz", NULL),
+		number_of_results(haptic, "skipped", NULL),
 		json_string_value(json_object_get(haptic, "scheduling")), late50, late999,
-		number_of(haptic, "lateness_us", "max"), tick50, tick999,
-		number_of(haptic, "force_max_N", NULL),
-		number_of(haptic, "rendered_rms_error_N", NULL), seconds);
+		number_of_results(haptic, "lateness_us", "max"), tick50, tick999,
+		number_of_results(haptic, "force_max_N", NULL),
+		number_of_results(haptic, "rendered_rms_error_N", NULL), seconds);
 	free(late50), free(late999), free(tick50), free(tick999);
 }
 

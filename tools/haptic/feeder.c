@@ -55,7 +55,7 @@ static bool feeder_lives(const char *page, pid_t *pid, char **of)
 }
 
 /* A session of its own: neither a Ctrl-C nor the end of this process is for it. */
-static pid_t start(char **argv)
+static pid_t start_feeder(char **argv)
 {
 	pid_t pid = fork();
 	int null;
@@ -130,7 +130,7 @@ int feeder_begin(struct feeder *feeder, char **argv, struct incise_error *err)
 					"a service does not start incise feed; start "
 					"incise-feed@.service of that scene");
 	argv[0] = program();
-	feeder->pid = start(argv);
+	feeder->pid = start_feeder(argv);
 	feeder->own = true;
 	rc = feeder->pid < 0
 		     ? incise_error_set(err, errno, "%s: %s", argv[0], strerror(errno))

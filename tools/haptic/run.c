@@ -24,7 +24,7 @@
 #define LOOKS_HZ 1000
 
 /* Leave the reason in the state page, too. */
-static _Noreturn void fail(struct haptic_job *job, const struct incise_error *err)
+static _Noreturn void fail_run(struct haptic_job *job, const struct incise_error *err)
 {
 	incise_state_run(job->haptic.state, INCISE_RUN_FAULT, err->text);
 	incise_state_free(job->haptic.state);
@@ -90,7 +90,7 @@ static void open_state(struct haptic_job *job, bool real)
 		return;
 	haptic->state = incise_state_new(path, &setup, &err);
 	if (!haptic->state)
-		fail(job, &err);
+		fail_run(job, &err);
 	haptic->loop.state = haptic->state;
 	haptic->page = path;
 	incise_state_scene(haptic->state, haptic->argument.path, haptic->plan);
@@ -224,7 +224,7 @@ static void take_calibration(struct haptic_job *job, const char *rig)
 }
 
 /* Everything but power: scene, real time, devices, plan, self-test. */
-static void set_up(struct haptic_job *job)
+static void set_up_run(struct haptic_job *job)
 {
 	struct haptic *haptic = &job->haptic;
 	const char *spec = job->scripted ? PROCEDURE_RIG : cli_rig(job->rig);
@@ -479,7 +479,7 @@ static void kernel_line(const struct haptic *haptic)
 	       (unsigned long long)r.refused, reasons);
 }
 
-static void report_json(const struct haptic *haptic)
+static void report_run_json(const struct haptic *haptic)
 {
 	struct incise_stepper *stepper = incise_rig_stepper(haptic->rig);
 	const struct incise_loop_stats *s = haptic->stats;
@@ -524,7 +524,7 @@ static void felt_line(const struct haptic *haptic)
 	       haptic->stats->unfelt_max_N);
 }
 
-static void report_text(const struct haptic *haptic)
+static void report_run_text(const struct haptic *haptic)
 {
 	struct incise_stepper *stepper = incise_rig_stepper(haptic->rig);
 	const struct incise_loop_stats *s = haptic->stats;
@@ -580,7 +580,7 @@ static void report_text(const struct haptic *haptic)
 /* --- the session ----------------------------------------------------------------------- */
 
 /* Between two ticks of simulated time. */
-static int ticked(void *context, const struct incise_tick *tick)
+static int ticked_run(void *context, const struct incise_tick *tick)
 {
 	struct haptic_job *job = context;
 
@@ -604,7 +604,7 @@ static void open_session(struct haptic_job *job)
 	haptic->session = session_log_begin(&job->session, &start);
 	if (start.real || (!haptic->session && !job->scripted))
 		return;
-	haptic->loop.ticked = ticked;
+	haptic->loop.ticked = ticked_run;
 	haptic->loop.context = job;
 }
 
@@ -630,12 +630,12 @@ int haptic_run(struct haptic_job *job)
 
 	haptic->stats = &stats;
 	haptic->loop.stop = &cli_stop;
-	set_up(job);
+	set_up_run(job);
 	if (job->log) {
 		/* A wrong path fails before the run, not after it. */
 		file = incise_outfile_open(job->log, &err);
 		if (!file)
-			fail(job, &err);
+			fail_run(job, &err);
 		make_log(job->duration, &haptic->loop);
 	}
 	open_session(job);
@@ -644,7 +644,7 @@ int haptic_run(struct haptic_job *job)
 	if (begin_force(job, &err)) {
 		/* Closed, as a motor that this process steps keeps its power without it. */
 		incise_rig_close(haptic->rig);
-		fail(job, &err);
+		fail_run(job, &err);
 	}
 	cli_progress("%s: %g Hz, Ctrl-C ends", haptic->argument.path,
 		     haptic->loop.rate_hz);
@@ -672,9 +672,9 @@ int haptic_run(struct haptic_job *job)
 			 "tissue.cuts_most cuts already; raise it",
 			 (unsigned long long)ticks_with(&stats, INCISE_TICK_FULL));
 	if (job->json) {
-		report_json(haptic);
+		report_run_json(haptic);
 	} else if (!job->log || strcmp(job->log, "-")) {
-		report_text(haptic);
+		report_run_text(haptic);
 		cli_written();
 	}
 	cli_finish();

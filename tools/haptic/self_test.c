@@ -56,8 +56,8 @@ static int run_tick(struct trajectory *trajectory, bool fed, struct self_test *t
 	return 0;
 }
 
-static int run(struct trajectory *trajectory, double force_N, struct self_test *test,
-	       struct incise_error *err)
+static int run_self_test(struct trajectory *trajectory, double force_N,
+			 struct self_test *test, struct incise_error *err)
 {
 	int64_t end_ns = (int64_t)(STROKE_S * INCISE_NS_PER_S), most_ns;
 	int rc = 0;
@@ -115,7 +115,7 @@ int haptic_self_test(const struct incise_scene *scene, struct incise_tracker *tr
 	test->silent_max_ms = limits.pose_age_ms +
 			      (double)incise_plan_fade_ns(trajectory.plan) * 1e-6 +
 			      2e-6 * (double)trajectory.period_ns;
-	rc = run(&trajectory, limits.force_N, test, &why);
+	rc = run_self_test(&trajectory, limits.force_N, test, &why);
 	incise_plan_free(trajectory.plan);
 	return rc ? incise_error_set(err, -rc, "%s: %s", incise_scene_file(scene, 0),
 				     why.text)

@@ -277,7 +277,7 @@ static void *run_loop(void *argument)
 	return NULL;
 }
 
-static int start_thread(struct supervisor *s, struct incise_error *err)
+static int start_supervisor_thread(struct supervisor *s, struct incise_error *err)
 {
 	sigset_t all, before;
 	int rc;
@@ -447,7 +447,8 @@ static const char *order_tool(struct supervisor *s, enum incise_tool tool)
 }
 
 /* "tool", or "tool NAME". */
-static void answer(void *context, const char *request, char reply[CONTROL_LINE])
+static void answer_supervisor_request(void *context, const char *request,
+				      char reply[CONTROL_LINE])
 {
 	struct supervisor *s = context;
 	const char *name = request + strlen("tool"), *why = NULL;
@@ -614,7 +615,7 @@ static void take_session(struct supervisor *s)
 }
 
 /* Once a second: overruns since the last line, and the rate. */
-static void report(struct supervisor *s, uint64_t ticks, int64_t now_ns)
+static void report_supervisor(struct supervisor *s, uint64_t ticks, int64_t now_ns)
 {
 	struct haptic *haptic = s->haptic;
 	struct incise_realtime_counts counts;
@@ -638,7 +639,7 @@ static void report(struct supervisor *s, uint64_t ticks, int64_t now_ns)
 	s->reported_ticks = ticks;
 }
 
-static void look(struct supervisor *s)
+static void look_supervisor(struct supervisor *s)
 {
 	struct haptic *haptic = s->haptic;
 	uint64_t ticks = incise_loop_control_ticks(haptic->loop.control);
@@ -675,7 +676,7 @@ static void look(struct supervisor *s)
 	if (reload_asked && s->ready)
 		start_reload(s);
 	if (now_ns >= s->report_ns) {
-		report(s, ticks, now_ns);
+		report_supervisor(s, ticks, now_ns);
 		s->report_ns = now_ns + REPORT_NS;
 	}
 }
@@ -711,13 +712,13 @@ static bool wait_for_orders(struct supervisor *s)
 	if (ready > 0 && polled[0].revents)
 		return false;
 	if (ready > 0 && s->control)
-		control_serve(s->control, polled + n, answer, s);
+		control_serve(s->control, polled + n, answer_supervisor_request, s);
 	if (ready > 0 && polled[1].revents)
 		take_key(s);
 	if (ready > 0 && polled[2].revents)
 		take_foot(s);
 	if (ready <= 0 || incise_clock_now(s->time) >= s->look_ns) {
-		look(s);
+		look_supervisor(s);
 		s->look_ns = incise_clock_now(s->time) + LOOK_MS * 1000000LL;
 	}
 	return true;
@@ -748,7 +749,7 @@ static void close_orders(struct supervisor *s)
 
 static int supervise(struct supervisor *s, struct incise_error *err)
 {
-	int rc = start_thread(s, err);
+	int rc = start_supervisor_thread(s, err);
 
 	if (rc)
 		return rc;

@@ -39,7 +39,7 @@ struct table {
 };
 
 /* Whether a header has a column. */
-static bool has(const char *header, const char *name)
+static bool has_dataset_column(const char *header, const char *name)
 {
 	size_t n = strlen(name);
 
@@ -82,18 +82,18 @@ static void read_table(struct table *table, const char *path)
 	int n = 0, last;
 
 	for (int i = 0; i < COLUMNS; i++) {
-		bool there = i < VELOCITY || has(header, names[i]);
+		bool there = i < VELOCITY || has_dataset_column(header, names[i]);
 
 		table->column[i] = there ? n : -1;
 		if (there)
 			columns[n++] = names[i];
 	}
 	/* A resampled recording is also the time between its cuts. */
-	if (has(header, "recording") && has(header, "cut"))
+	if (has_dataset_column(header, "recording") && has_dataset_column(header, "cut"))
 		table->where = "cut";
-	else if (has(header, "advancing"))
+	else if (has_dataset_column(header, "advancing"))
 		table->where = "advancing";
-	table->group = has(header, "cut") ? "cut" : NULL;
+	table->group = has_dataset_column(header, "cut") ? "cut" : NULL;
 	last = table->column[UNCERTAINTY];
 	table->data = incise_dataset_read_where(path, columns, n, table->group,
 						table->where, &table->left_out, &err);
@@ -169,7 +169,7 @@ struct moments {
 	double n, mean, m2;
 };
 
-static void add(struct moments *m, double x)
+static void add_dataset(struct moments *m, double x)
 {
 	double d = x - m->mean;
 
@@ -195,9 +195,9 @@ static void write_bins(const struct table *table, int over, const char *folder,
 		/* Also where all rows have one value. */
 		int k = place > 0 ? (int)fmin(place, BINS - 1) : 0;
 
-		add(&bin[k], value(table, i, FORCE));
-		add(&at[k], x);
-		add(&u[k], uncertainty(table, i));
+		add_dataset(&bin[k], value(table, i, FORCE));
+		add_dataset(&at[k], x);
+		add_dataset(&u[k], uncertainty(table, i));
 	}
 	for (int k = 0; k < BINS; k++)
 		if (bin[k].n)
@@ -212,7 +212,8 @@ static void write_cuts(const struct table *table, const char *folder, const char
 	FILE *data = plot_data(folder, name);
 
 	for (size_t i = 0; i < table->n; i++)
-		add(&cut[incise_dataset_group(table->data, i)], value(table, i, FORCE));
+		add_dataset(&cut[incise_dataset_group(table->data, i)],
+			    value(table, i, FORCE));
 	for (int k = 0; k < table->n_groups; k++)
 		fprintf(data, "%d %.6g %.6g\n", k + 1, cut[k].mean, sd(&cut[k]));
 	free(cut);

@@ -35,7 +35,7 @@ struct grid {
 };
 
 /* The next row of that height has panels of half the figure's width, or of all of it. */
-static void place(struct grid *grid, int column, int columns, int height)
+static void place_model_plot(struct grid *grid, int column, int columns, int height)
 {
 	fprintf(grid->script, "set size %g,%g\nset origin %g,%g\n", 1.0 / columns,
 		(double)height / grid->height, (double)column / columns,
@@ -84,7 +84,7 @@ static struct residuals residuals_of(const struct model_surface *surface,
 	return r;
 }
 
-static void widen(double *low, double *high, const double *value, size_t n)
+static void widen_model(double *low, double *high, const double *value, size_t n)
 {
 	*low = *high = value[0];
 	for (size_t i = 1; i < n; i++) {
@@ -100,8 +100,8 @@ static void write_residuals(const struct residuals *r, const char *folder,
 	double low[2], high[2];
 	struct scatter scatter;
 
-	widen(&low[0], &high[0], r->at, r->n);
-	widen(&low[1], &high[1], r->value, r->n);
+	widen_model(&low[0], &high[0], r->at, r->n);
+	widen_model(&low[1], &high[1], r->value, r->n);
 	scatter_begin(&scatter, low, high);
 	for (size_t i = 0; i < r->n; i++)
 		if (scatter_takes(&scatter, r->at[i], r->value[i]))
@@ -136,7 +136,7 @@ static void put_residuals(struct grid *grid, const struct model_surface *surface
 	/* Three digits of the RMSE. */
 	int decimals = r->rms > 0 ? (int)fmin(fmax(2 - floor(log10(r->rms)), 0), 12) : 0;
 
-	place(grid, 0, 2, RESIDUALS_HEIGHT);
+	place_model_plot(grid, 0, 2, RESIDUALS_HEIGHT);
 	fprintf(grid->script,
 		"unset key\nset xrange [*:*]\nset yrange [*:*]\n"
 		"set title '%zu rows: measured - model, RMSE %.*f, mean %.*f'\n"
@@ -149,7 +149,7 @@ static void put_residuals(struct grid *grid, const struct model_surface *surface
 	fprintf(grid->script,
 		"plot '%s' with points pt 7 ps 0.4 lc rgb blue, 0 with lines lc rgb ink\n",
 		grid->residuals);
-	place(grid, 1, 2, RESIDUALS_HEIGHT);
+	place_model_plot(grid, 1, 2, RESIDUALS_HEIGHT);
 	fprintf(grid->script,
 		"set title 'quantiles of the residuals; line: normal distribution'\n"
 		"set xlabel 'quantile of the normal distribution / SD'\n"
@@ -202,7 +202,7 @@ static void write_band(const struct incise_model *model,
 static void put_band(struct grid *grid, const struct model_surface *surface, int input,
 		     int columns)
 {
-	place(grid, input, columns, BAND_HEIGHT);
+	place_model_plot(grid, input, columns, BAND_HEIGHT);
 	fputs("set key inside top left\nset xrange [*:*]\nset yrange [*:*]\n"
 	      "set title '95 % intervals'\nset xlabel ",
 	      grid->script);
@@ -228,23 +228,23 @@ static void put_surface(struct grid *grid, const struct model_surface *surface)
 
 	fputs("unset key\nset xrange [*:*]\n", grid->script);
 	if (surface->n_inputs == 1) {
-		place(grid, 0, 1, SURFACE_HEIGHT);
+		place_model_plot(grid, 0, 1, SURFACE_HEIGHT);
 		model_plot_surface(grid->script, surface, grid->surface, title, "");
 		return;
 	}
 	/* The map has the colours of the surface. */
 	fputs("unset colorbox\n", grid->script);
-	place(grid, 0, 2, SURFACE_HEIGHT);
+	place_model_plot(grid, 0, 2, SURFACE_HEIGHT);
 	model_plot_surface(grid->script, surface, grid->surface, title, "");
 	fputs("set colorbox\n", grid->script);
-	place(grid, 1, 2, SURFACE_HEIGHT);
+	place_model_plot(grid, 1, 2, SURFACE_HEIGHT);
 	model_plot_contours(grid->script, surface, grid->surface, title);
 }
 
 /* @model NULL: a compiled model has no known functions; @uncertainty NULL: unknown. */
-static FILE *draw(const struct figure *figure, const struct model_surface *surface,
-		  const struct incise_model *model,
-		  const struct incise_uncertainty *uncertainty)
+static FILE *draw_model(const struct figure *figure, const struct model_surface *surface,
+			const struct incise_model *model,
+			const struct incise_uncertainty *uncertainty)
 {
 	int n = model ? surface->n_inputs : 0, columns = n > 1 ? 2 : 1;
 	int rows = (n + columns - 1) / columns;
@@ -275,7 +275,7 @@ static FILE *draw(const struct figure *figure, const struct model_surface *surfa
 	grid.script = plot_begin(figure->folder, figure->name, FIGURE_WIDTH, grid.height);
 	fputs("set multiplot\nset key outside right center\n", grid.script);
 	for (int i = 0; i < n; i++) {
-		place(&grid, i % columns, columns, FUNCTIONS_HEIGHT);
+		place_model_plot(&grid, i % columns, columns, FUNCTIONS_HEIGHT);
 		model_plot_functions(grid.script, model, i, grid.functions, "");
 	}
 	if (n % columns)
@@ -297,7 +297,7 @@ FILE *figure_of_model(const struct figure *figure)
 		cli_require(incise_model_load(figure->path, &err), &err);
 	struct model_surface surface = model_surface_of(model);
 	struct incise_uncertainty *uncertainty = uncertainty_of(figure->path, model);
-	FILE *script = draw(figure, &surface, model, uncertainty);
+	FILE *script = draw_model(figure, &surface, model, uncertainty);
 
 	incise_uncertainty_free(uncertainty);
 
@@ -311,7 +311,7 @@ FILE *figure_of_compiled(const struct figure *figure)
 	struct incise_fixed *fixed =
 		cli_require(incise_fixed_load(figure->path, &err), &err);
 	struct model_surface surface = model_surface_of_fixed(fixed);
-	FILE *script = draw(figure, &surface, NULL, NULL);
+	FILE *script = draw_model(figure, &surface, NULL, NULL);
 
 	incise_fixed_free(fixed);
 	return script;

@@ -246,7 +246,7 @@ static bool note_sample(struct recorded *r, int stream, int64_t seq, double t_s,
 	return lost;
 }
 
-static void widen(struct range *range, const struct line *line)
+static void widen_recording(struct range *range, const struct line *line)
 {
 	range->low = fmin(range->low, line->least);
 	range->high = fmax(range->high, line->largest);
@@ -294,7 +294,7 @@ static void read_lines(struct recorded *r, struct ArrowArrayStream *stream,
 		stream->release(stream);
 	for (int k = 0; k < shown->n; k++) {
 		line_close(&lines[k], folder);
-		widen(&r->range[shown->panel], &lines[k]);
+		widen_recording(&r->range[shown->panel], &lines[k]);
 	}
 }
 
@@ -350,8 +350,8 @@ static void read_depth(struct recorded *r)
 	stream.release(&stream);
 	line_close(&depth, folder);
 	line_close(&speed, folder);
-	widen(&r->range[PANEL_DEPTH], &depth);
-	widen(&r->range[PANEL_SPEED], &speed);
+	widen_recording(&r->range[PANEL_DEPTH], &depth);
+	widen_recording(&r->range[PANEL_SPEED], &speed);
 }
 
 static void read_tracker(struct recorded *r)
@@ -563,7 +563,7 @@ static int figure_height(void)
 }
 
 /* Set where the next panel is, below @top pixels, with its key to the right. */
-static void place(FILE *script, int top, int height, int gap)
+static void place_recording_plot(FILE *script, int top, int height, int gap)
 {
 	double whole = figure_height(), upper = 1 - (top + 8) / whole;
 
@@ -612,7 +612,7 @@ static void put_panel(FILE *script, const struct recorded *r, int i, int top, in
 	const struct range *range = &r->range[i];
 	bool first = i == PANEL_FORCE;
 
-	place(script, top, panel->height, 8);
+	place_recording_plot(script, top, panel->height, 8);
 	fprintf(script, "set ylabel '%s'\nset yrange [%g:%g]\nplot ", panel->label,
 		range->low, range->high);
 	if (cuts)
@@ -651,7 +651,7 @@ static void put_streams(FILE *script, const struct recorded *r, int top,
 	char tics[200] = "";
 	int row = 0;
 
-	place(script, top, STREAMS_HEIGHT, 72);
+	place_recording_plot(script, top, STREAMS_HEIGHT, 72);
 	for (int i = 0; i <= STREAMS; i++)
 		if (i < STREAMS ? r->presence[i].rows > 0 : r->n_events > 0)
 			snprintf(tics + strlen(tics), sizeof(tics) - strlen(tics),
@@ -709,7 +709,7 @@ static void put_title(FILE *script, const struct recorded *r)
 		1 - 20.0 / figure_height());
 }
 
-static FILE *draw(struct recorded *r)
+static FILE *draw_recording(struct recorded *r)
 {
 	int top = TITLE_HEIGHT, cuts = write_cuts(r), lost[STREAMS];
 	FILE *script;
@@ -763,7 +763,7 @@ FILE *figure_of_recording(const struct figure *figure)
 	read_frames(r);
 	read_events(r);
 	cli_progress_end();
-	script = draw(r);
+	script = draw_recording(r);
 	incise_recording_close(r->recording);
 	free(r);
 	return script;

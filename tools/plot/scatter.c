@@ -21,7 +21,7 @@ void scatter_begin(struct scatter *scatter, const double low[2], const double hi
 }
 
 /* The place of a value along an axis of n places. */
-static int place(double value, double low, double high, int n)
+static int find_scatter_place(double value, double low, double high, int n)
 {
 	double share = (value - low) / (high - low);
 
@@ -31,8 +31,8 @@ static int place(double value, double low, double high, int n)
 
 bool scatter_takes(struct scatter *scatter, double x, double y)
 {
-	int at = place(x, scatter->low[0], scatter->high[0], COLUMNS) +
-		 COLUMNS * place(y, scatter->low[1], scatter->high[1], ROWS);
+	int at = find_scatter_place(x, scatter->low[0], scatter->high[0], COLUMNS) +
+		 COLUMNS * find_scatter_place(y, scatter->low[1], scatter->high[1], ROWS);
 	uint8_t *byte = &scatter->taken[at / 8], bit = (uint8_t)(1 << at % 8);
 
 	if (*byte & bit)

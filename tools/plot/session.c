@@ -15,7 +15,7 @@
 #define LINES_HEIGHT 260
 #define HEIGHT (TITLE_HEIGHT + PATH_HEIGHT + 2 * LINES_HEIGHT)
 
-static void place(FILE *script, int top, int height)
+static void place_session_plot(FILE *script, int top, int height)
 {
 	fprintf(script, "set size 1,%.5f\nset origin 0,%.5f\n", (double)height / HEIGHT,
 		1 - (double)(top + height) / HEIGHT);
@@ -50,13 +50,14 @@ FILE *figure_of_session(const struct figure *figure)
 		cli_fail("%s: ended before its first tick", figure->path);
 	script = plot_begin(figure->folder, figure->name, FIGURE_WIDTH, HEIGHT);
 	put_title(script, figure->path, s);
-	place(script, TITLE_HEIGHT, PATH_HEIGHT);
+	place_session_plot(script, TITLE_HEIGHT, PATH_HEIGHT);
 	session_figure_path(script, s, NULL);
 	fputs("set size noratio\nset lmargin at screen 0.08\nset rmargin at screen 0.86\n",
 	      script);
-	place(script, TITLE_HEIGHT + PATH_HEIGHT, LINES_HEIGHT);
+	place_session_plot(script, TITLE_HEIGHT + PATH_HEIGHT, LINES_HEIGHT);
 	session_figure_depth(script, s, NULL);
-	place(script, TITLE_HEIGHT + PATH_HEIGHT + LINES_HEIGHT, LINES_HEIGHT);
+	place_session_plot(script, TITLE_HEIGHT + PATH_HEIGHT + LINES_HEIGHT,
+			   LINES_HEIGHT);
 	session_figure_force(script, s, NULL);
 	fputs("unset multiplot\n", script);
 	free(s);

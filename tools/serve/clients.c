@@ -99,7 +99,7 @@ void message_drop(struct message *message)
 		free(message);
 }
 
-static struct message **place(struct client *client, int i)
+static struct message **find_client_message(struct client *client, int i)
 {
 	return &client->queue[(client->first + i) % CLIENT_QUEUE];
 }
@@ -135,7 +135,7 @@ static void flush(struct client *client)
 		ssize_t n;
 
 		for (int i = 0; i < client->waiting && i < GATHER; i++) {
-			message = *place(client, i);
+			message = *find_client_message(client, i);
 			parts[gathered.msg_iovlen++] =
 				(struct iovec){message->bytes, message->n};
 		}
@@ -153,7 +153,7 @@ static void flush(struct client *client)
 		client->moved_ns = cli_now_ns();
 		client->begun += (size_t)n;
 		while (client->waiting &&
-		       client->begun >= (message = *place(client, 0))->n) {
+		       client->begun >= (message = *find_client_message(client, 0))->n) {
 			client->begun -= message->n;
 			client->first = (client->first + 1) % CLIENT_QUEUE;
 			client->waiting--;
@@ -167,9 +167,9 @@ static void flush(struct client *client)
 
 static void lose(struct client *client, int i)
 {
-	message_drop(*place(client, i));
+	message_drop(*find_client_message(client, i));
 	for (; i < client->waiting - 1; i++)
-		*place(client, i) = *place(client, i + 1);
+		*find_client_message(client, i) = *find_client_message(client, i + 1);
 	client->waiting--;
 	client->lost++;
 	client->clients->lost++;
@@ -181,7 +181,7 @@ static void make_place(struct client *client, const struct message *message)
 	int most = message->large ? 1 : CLIENT_WAITING, same = 0, oldest = -1;
 
 	for (int i = client->begun ? 1 : 0; i < client->waiting; i++) {
-		if ((*place(client, i))->kind != message->kind)
+		if ((*find_client_message(client, i))->kind != message->kind)
 			continue;
 		oldest = same++ ? oldest : i;
 	}
@@ -199,7 +199,7 @@ void clients_send(struct client *client, struct message *message)
 		client->moved_ns = cli_now_ns();
 	make_place(client, message);
 	message->refs++;
-	*place(client, client->waiting++) = message;
+	*find_client_message(client, client->waiting++) = message;
 	/* Nothing is lost for want of a flush. */
 	if ((message->large || client->waiting >= GATHER) && !(client->events & EPOLLOUT))
 		flush(client);
@@ -213,7 +213,7 @@ void clients_flush(struct clients *clients)
 			flush(clients->client[i]);
 }
 
-static void receive(struct client *client)
+static void receive_clients(struct client *client)
 {
 	struct clients *clients = client->clients;
 	uint8_t bytes[4096];
@@ -257,7 +257,7 @@ static void close_client(struct clients *clients, int i)
 		clients->left_out++;
 	clients->lost += (uint64_t)client->waiting;
 	while (client->waiting) {
-		message_drop(*place(client, 0));
+		message_drop(*find_client_message(client, 0));
 		client->first = (client->first + 1) % CLIENT_QUEUE;
 		client->waiting--;
 	}
@@ -297,7 +297,7 @@ static void set_option(int fd, int level, int name, int value)
 }
 
 /* Unread bytes would make close() a reset, which takes the answer with it. */
-static void refuse(struct clients *clients, int fd)
+static void refuse_clients(struct clients *clients, int fd)
 {
 	uint8_t bytes[1024];
 	size_t n;
@@ -326,7 +326,7 @@ static void accept_one(struct clients *clients, int listener)
 
 		address_text((struct sockaddr *)&from, n, address, sizeof(address));
 		cli_note("%s: refused: %d clients are connected", address, CLIENTS_MOST);
-		refuse(clients, fd);
+		refuse_clients(clients, fd);
 		return;
 	}
 	set_option(fd, IPPROTO_TCP, TCP_NODELAY, 1);
@@ -379,7 +379,7 @@ void clients_work(struct clients *clients)
 		if (events[i].events & EPOLLOUT)
 			flush(client);
 		if (events[i].events & EPOLLIN)
-			receive(client);
+			receive_clients(client);
 		else if (events[i].events & (EPOLLERR | EPOLLHUP))
 			doom(client, "the connection broke");
 	}

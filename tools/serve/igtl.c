@@ -370,8 +370,9 @@ static void send_capability(struct client *client, int version)
 	message_drop(message);
 }
 
-static void answer(struct igtl *igtl, struct client *client, struct peer *peer,
-		   const struct incise_igtl_message *message)
+static void answer_igtl_client(struct igtl *igtl, struct client *client,
+			       struct peer *peer,
+			       const struct incise_igtl_message *message)
 {
 	bool get = !strncmp(message->type, "GET_", 4);
 	bool start = !strncmp(message->type, "STT_", 4);
@@ -406,7 +407,7 @@ static const char *igtl_received(void *context, struct client *client, void *use
 		if (found == -EPROTO)
 			return "it sent bytes that are not OpenIGTLink";
 		if (found == 1)
-			answer(igtl, client, peer, &message);
+			answer_igtl_client(igtl, client, peer, &message);
 		else
 			igtl->ignored++;
 	}

@@ -58,7 +58,7 @@ struct lsl {
 	bool has_state;
 };
 
-static struct lsl *of(struct serve_sink *sink)
+static struct lsl *lsl_of(struct serve_sink *sink)
 {
 	return (struct lsl *)sink;
 }
@@ -101,7 +101,7 @@ static void send_values(struct lsl *lsl, enum output output, const double *value
 
 static void lsl_send(struct serve_sink *sink, const struct serve_item *item)
 {
-	struct lsl *lsl = of(sink);
+	struct lsl *lsl = lsl_of(sink);
 	const double *p = item->pose.position_mm, *q = item->pose.quaternion;
 	const double *f = item->force.mean_N;
 
@@ -130,7 +130,7 @@ static int lsl_summary(const struct serve_sink *sink, char *text, size_t size)
 
 static void lsl_close(struct serve_sink *sink)
 {
-	struct lsl *lsl = of(sink);
+	struct lsl *lsl = lsl_of(sink);
 
 	for (int i = 0; i < OUTPUTS; i++)
 		lsl->outlets->close(lsl->outlet[i]);

@@ -50,7 +50,7 @@ static void jpeg_be_quiet(j_common_ptr jpeg)
 	(void)jpeg;
 }
 
-static int decode(struct pixels *pixels, const struct incise_camera_frame *frame)
+static int decode_pixels(struct pixels *pixels, const struct incise_camera_frame *frame)
 {
 	struct jpeg_decompress_struct jpeg;
 	struct jpeg_failure failure;
@@ -84,7 +84,7 @@ static int decode(struct pixels *pixels, const struct incise_camera_frame *frame
 	return 0;
 }
 #else
-static int decode(struct pixels *pixels, const struct incise_camera_frame *frame)
+static int decode_pixels(struct pixels *pixels, const struct incise_camera_frame *frame)
 {
 	(void)pixels;
 	(void)frame;
@@ -99,7 +99,7 @@ int pixels_convert(struct pixels *pixels, const struct incise_camera_frame *fram
 		     (frame->pixels == INCISE_PIXELS_YUYV ? 2 : (size_t)components);
 
 	if (frame->pixels == INCISE_PIXELS_MJPEG)
-		return decode(pixels, frame);
+		return decode_pixels(pixels, frame);
 	if (!set_size(pixels, frame->width, frame->height, components) ||
 	    (size_t)frame->stride < row ||
 	    frame->size < (size_t)frame->stride * ((size_t)frame->height - 1) + row)

@@ -40,7 +40,7 @@ static void follow_next(struct loop *loop)
 	}
 }
 
-static void look(struct loop *loop, struct serve_stream *stream)
+static void look_source_loop(struct loop *loop, struct serve_stream *stream)
 {
 	static const enum serve_state states[INCISE_RUNS] = {
 		[INCISE_RUN_STARTING] = SERVE_STARTS, [INCISE_RUN_RUNNING] = SERVE_RUNS,
@@ -76,7 +76,7 @@ static int loop_read(struct serve_source *source, struct serve_stream *stream,
 	*next_ns = now_ns + POLL_NS;
 	if (now_ns - loop->looked_ns >= LOOK_NS) {
 		loop->looked_ns = now_ns;
-		look(loop, stream);
+		look_source_loop(loop, stream);
 	}
 	do {
 		n = incise_state_ticks(loop->state, &loop->cursor, ticks, BATCH,
@@ -111,7 +111,7 @@ static const struct serve_source_ops loop_ops = {
 	.read = loop_read, .utc = loop_utc, .free = loop_free};
 
 /* The named page, or the page of the only loop that runs. */
-static struct state_page_file *choose(struct state_pages *pages, bool named)
+static struct state_page_file *choose_source_loop(struct state_pages *pages, bool named)
 {
 	struct state_page_file *one = named && pages->n == 1 ? pages->page : NULL;
 
@@ -142,7 +142,7 @@ struct serve_source *serve_loop_open(const struct serve_source_options *options,
 		cli_fail("--camera frames: a loop has no frames; give --rig RIG or a "
 			 "recording");
 	state_pages_open(&loop->pages, options->operand);
-	page = choose(&loop->pages, options->operand);
+	page = choose_source_loop(&loop->pages, options->operand);
 	/* The chosen one first, so that closing the pages closes the rest, too. */
 	first = *loop->pages.page;
 	*loop->pages.page = *page;

@@ -101,7 +101,7 @@ static void open_rows(struct playback *playback)
 		playback->first_ns = rows_time(&playback->times);
 }
 
-static void start(struct playback *playback, struct serve_stream *stream)
+static void start_source_recording(struct playback *playback, struct serve_stream *stream)
 {
 	/* Opening takes its time. */
 	playback->here_ns = playback->read_ns = cli_now_ns();
@@ -191,7 +191,7 @@ static int playback_read(struct serve_source *source, struct serve_stream *strea
 
 	*next_ns = now_ns + POLL_NS;
 	if (!p->here_ns)
-		start(p, stream);
+		start_source_recording(p, stream);
 	else if (now_ns - p->read_ns > STALL_NS) {
 		p->here_ns += now_ns - p->read_ns;
 		serve_play(stream, p->first_ns, p->here_ns, p->speed);
@@ -212,7 +212,7 @@ static int playback_read(struct serve_source *source, struct serve_stream *strea
 	}
 	if (p->endless) {
 		open_rows(p);
-		start(p, stream);
+		start_source_recording(p, stream);
 		return 0;
 	}
 	serve_status(stream, SERVE_ENDED, "ended", text);

@@ -349,7 +349,7 @@ static void add_sample(struct session_digest *digest, const struct incise_tick *
 
 /* --- ticks ----------------------------------------------------------------------------- */
 
-static bool within(const double v[3], double most)
+static bool is_within_digest(const double v[3], double most)
 {
 	return fabs(v[0]) <= most && fabs(v[1]) <= most && fabs(v[2]) <= most;
 }
@@ -365,11 +365,12 @@ static bool is_usable(const struct session_digest *digest, const struct incise_t
 					    INCISE_NS_PER_S
 				  : 0;
 	return since_s <= SESSION_TIME_MAX_S &&
-	       within(tick->tool_mm, SESSION_PLACE_MAX_MM) &&
-	       within(tick->proxy_mm, SESSION_PLACE_MAX_MM) && within(tick->normal, 2) &&
-	       within(tick->quaternion, 2) && fabs(tick->quaternion[3]) <= 2 &&
-	       within(tick->command_N, SESSION_FORCE_MAX_N / 2) && tick->depth_mm >= 0 &&
-	       tick->depth_mm <= SESSION_PLACE_MAX_MM &&
+	       is_within_digest(tick->tool_mm, SESSION_PLACE_MAX_MM) &&
+	       is_within_digest(tick->proxy_mm, SESSION_PLACE_MAX_MM) &&
+	       is_within_digest(tick->normal, 2) &&
+	       is_within_digest(tick->quaternion, 2) && fabs(tick->quaternion[3]) <= 2 &&
+	       is_within_digest(tick->command_N, SESSION_FORCE_MAX_N / 2) &&
+	       tick->depth_mm >= 0 && tick->depth_mm <= SESSION_PLACE_MAX_MM &&
 	       tick->phase <= INCISE_PHASE_INSERTION && tick->tool <= INCISE_TOOL_TUBE &&
 	       (tick->phase == INCISE_PHASE_FREE || tick->tool != INCISE_TOOL_AUTO);
 }

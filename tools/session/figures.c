@@ -17,7 +17,7 @@ struct range {
 	double low[2], high[2];
 };
 
-static void widen(struct range *range, const double at_mm[3])
+static void widen_figures(struct range *range, const double at_mm[3])
 {
 	for (int i = 0; i < 2; i++) {
 		range->low[i] = fmin(range->low[i], at_mm[i] - MARGIN_MM);
@@ -37,21 +37,21 @@ static void fill_plot(struct range *range)
 }
 
 /* Range of all shown points except the way through the air. */
-static struct range range_of(const struct session *s)
+static struct range range_of_figures(const struct session *s)
 {
 	struct range range = {{NAN, NAN}, {NAN, NAN}};
 
 	for (int i = 0; i < s->n_trace; i++)
 		if (s->trace[i].tool != INCISE_TOOL_AUTO)
-			widen(&range, s->trace[i].tool_mm);
+			widen_figures(&range, s->trace[i].tool_mm);
 	for (int i = 0; i < s->n_cuts; i++) {
-		widen(&range, s->cut[i].from_mm);
-		widen(&range, s->cut[i].to_mm);
+		widen_figures(&range, s->cut[i].from_mm);
+		widen_figures(&range, s->cut[i].to_mm);
 	}
 	if (s->has_membrane)
-		widen(&range, s->membrane.point_mm);
+		widen_figures(&range, s->membrane.point_mm);
 	if (isnan(range.low[0]))
-		widen(&range, s->trace[0].tool_mm);
+		widen_figures(&range, s->trace[0].tool_mm);
 	fill_plot(&range);
 	return range;
 }
@@ -115,7 +115,7 @@ static void put_membrane(FILE *script, const struct incise_scene_membrane *membr
 
 static void put_axes(FILE *script, const struct session *s)
 {
-	struct range range = range_of(s);
+	struct range range = range_of_figures(s);
 
 	fprintf(script,
 		"set size ratio -1\nset xlabel 'x / mm'\nset ylabel 'y / mm'\n"

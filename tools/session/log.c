@@ -45,8 +45,8 @@ static void copy_end(char *to, size_t size, const char *text)
 	snprintf(to, size, "%s", n < size ? text : text + (n - size + 1));
 }
 
-static void describe(struct session_log *log, const struct session_options *options,
-		     const struct session_start *start, uint32_t crc32c)
+static void describe_log(struct session_log *log, const struct session_options *options,
+			 const struct session_start *start, uint32_t crc32c)
 {
 	struct session *s = session_digest_now(log->digest);
 	struct timespec now;
@@ -75,7 +75,7 @@ struct session_log *session_log_begin(const struct session_options *options,
 	if (incise_scene_checksum(start->scene, &crc32c, &err))
 		cli_fail_with(&err);
 	log->digest = cli_require(session_digest_new(start->scene, &err), &err);
-	describe(log, options, start, crc32c);
+	describe_log(log, options, start, crc32c);
 	log->file = cli_require(incise_outfile_open(options->path, &err), &err);
 	return log;
 }

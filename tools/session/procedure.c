@@ -84,7 +84,7 @@ static const struct key *key_before(double t_s)
 }
 
 /* The blade's edge is along x: turned by @round about x, then by @twist about z. */
-static void turn(double round, double twist, double q[4], double axis[3])
+static void turn_procedure(double round, double twist, double q[4], double axis[3])
 {
 	double a = round * M_PI / 2, b = twist / 2;
 
@@ -99,7 +99,8 @@ static void turn(double round, double twist, double q[4], double axis[3])
 }
 
 /* @t_s: below 0 is the start, above PROCEDURE_S the end. */
-static void place(const struct procedure *procedure, double t_s, struct pose *pose)
+static void place_procedure_tool(const struct procedure *procedure, double t_s,
+				 struct pose *pose)
 {
 	const struct key *a = key_before(t_s), *b = a + 1;
 	double share = fmax(0, fmin(1, (t_s - a->t_s) / (b->t_s - a->t_s)));
@@ -109,7 +110,8 @@ static void place(const struct procedure *procedure, double t_s, struct pose *po
 	double round = a->round + s * (b->round - a->round), axis[3];
 
 	pose->tool = share < 1 ? a->tool : b->tool;
-	turn(round, a->twist + s * (b->twist - a->twist), pose->quaternion, axis);
+	turn_procedure(round, a->twist + s * (b->twist - a->twist), pose->quaternion,
+		       axis);
 	for (int i = 0; i < 3; i++)
 		pose->position_mm[i] = procedure->top.point_mm[i] + a->end_mm[i] +
 				       s * (b->end_mm[i] - a->end_mm[i]) -
@@ -121,8 +123,8 @@ static void move(const struct procedure *procedure, double t_s)
 	const double step_s = 1e-3;
 	struct pose pose, later;
 
-	place(procedure, t_s, &pose);
-	place(procedure, t_s + step_s, &later);
+	place_procedure_tool(procedure, t_s, &pose);
+	place_procedure_tool(procedure, t_s + step_s, &later);
 	for (int i = 0; i < 3; i++)
 		pose.velocity_mm_s[i] =
 			(later.position_mm[i] - pose.position_mm[i]) / step_s;

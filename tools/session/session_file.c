@@ -387,8 +387,9 @@ static bool is_clean(const char *text, size_t n)
 	return true;
 }
 
-static int take_text(const struct reader *reader, const struct member *member,
-		     const json_t *json, char *to)
+static int take_session_file_text(const struct reader *reader,
+				  const struct member *member, const json_t *json,
+				  char *to)
 {
 	size_t n = json_string_length(json);
 	char what[80];
@@ -440,7 +441,7 @@ static int take_member(const struct reader *reader, const struct member *member,
 	case VECTOR:
 		return take_vector(reader, member, json, at);
 	case TEXT:
-		return take_text(reader, member, json, at);
+		return take_session_file_text(reader, member, json, at);
 	case FLAG:
 		*(bool *)at = json_is_true(json);
 		return json_is_boolean(json)
@@ -525,7 +526,8 @@ static int take_criteria(struct reader *reader, const json_t *json,
 	return rc;
 }
 
-static int take_row(struct reader *reader, const json_t *row, struct session_sample *to)
+static int take_session_file_row(struct reader *reader, const json_t *row,
+				 struct session_sample *to)
 {
 	size_t i = 0;
 	int rc = 0;
@@ -548,8 +550,8 @@ static int take_trace(struct reader *reader, const json_t *json, struct session 
 	session->n_trace = (int)json_array_size(rows);
 	for (int i = 0; i < session->n_trace && !rc; i++) {
 		snprintf(reader->place, sizeof(reader->place), "trace.rows[%d].", i);
-		rc = take_row(reader, json_array_get(rows, (size_t)i),
-			      &session->trace[i]);
+		rc = take_session_file_row(reader, json_array_get(rows, (size_t)i),
+					   &session->trace[i]);
 		if (!rc && i && session->trace[i].t_s < session->trace[i - 1].t_s)
 			rc = expected(reader, "t_s",
 				      "a time that is not before the last");
@@ -558,7 +560,7 @@ static int take_trace(struct reader *reader, const json_t *json, struct session 
 }
 
 /* Checks beyond the tables' checks. */
-static int check(struct reader *reader, struct session *session)
+static int check_session_file(struct reader *reader, struct session *session)
 {
 	reader->place[0] = 0;
 	if (strspn(session->scene.crc32c, "0123456789abcdef") != 8)
@@ -615,7 +617,7 @@ static int take_session(struct reader *reader, const json_t *json,
 				  &session->n_cuts);
 	if (!rc)
 		rc = take_trace(reader, json, session);
-	return rc ? rc : check(reader, session);
+	return rc ? rc : check_session_file(reader, session);
 }
 
 struct session *session_parse(const char *text, size_t n, const char *name,

@@ -39,7 +39,8 @@ static char *user_of(const char *path)
 		    : cli_text("%u", (unsigned int)st.st_uid);
 }
 
-static void add(struct state_pages *pages, const char *path, struct incise_state *state)
+static void add_pages(struct state_pages *pages, const char *path,
+		      struct incise_state *state)
 {
 	const char *slash = strrchr(path, '/'), *file = slash ? slash + 1 : path;
 	size_t n = name_length(file);
@@ -83,7 +84,7 @@ static int add_folder(struct state_pages *pages, const char *folder)
 		path = cli_text("%s/%s", folder, entry->d_name);
 		state = incise_state_open(path, &err);
 		if (state)
-			add(pages, path, state);
+			add_pages(pages, path, state);
 		else
 			cli_warn("%s", err.text);
 		bad += !state;
@@ -126,7 +127,7 @@ static void open_name(struct state_pages *pages, const char *name,
 			incise_state_close(state);
 		} else if (state) {
 			state_pages_close(pages);
-			add(pages, path, state);
+			add_pages(pages, path, state);
 		}
 		found |= path && (state || err.code != ENOENT);
 		free(path);
@@ -154,7 +155,7 @@ void state_pages_open(struct state_pages *pages, const char *asked)
 		state = incise_state_open(asked, &err);
 		if (!state)
 			cli_fail_with(&err);
-		add(pages, asked, state);
+		add_pages(pages, asked, state);
 		return;
 	}
 	state_folders(list);

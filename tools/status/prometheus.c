@@ -29,8 +29,8 @@ static void put_label(FILE *out, const char *label, const char *value)
 }
 
 /* A line up to its value; label may be NULL. */
-static void begin(FILE *out, loop *l, const char *metric, const char *label,
-		  const char *value)
+static void begin_prometheus(FILE *out, loop *l, const char *metric, const char *label,
+			     const char *value)
 {
 	fprintf(out, "%s{", metric);
 	put_label(out, "scene", l->name);
@@ -44,13 +44,13 @@ static void begin(FILE *out, loop *l, const char *metric, const char *label,
 static void put_count(FILE *out, loop *l, const char *metric, const char *label,
 		      const char *value, uint64_t count)
 {
-	begin(out, l, metric, label, value);
+	begin_prometheus(out, l, metric, label, value);
 	fprintf(out, "%" PRIu64 "\n", count);
 }
 
-static void put_number(FILE *out, loop *l, const char *metric, double number)
+static void put_prometheus_number(FILE *out, loop *l, const char *metric, double number)
 {
-	begin(out, l, metric, NULL, NULL);
+	begin_prometheus(out, l, metric, NULL, NULL);
 	/* The spelling of the format. */
 	if (isnan(number))
 		fputs("NaN\n", out);
@@ -100,7 +100,7 @@ static void put_info(FILE *out, loop *l, const char *metric)
 
 static void put_start(FILE *out, loop *l, const char *metric)
 {
-	begin(out, l, metric, NULL, NULL);
+	begin_prometheus(out, l, metric, NULL, NULL);
 	/* To the ms, the resolution of a double here. */
 	fprintf(out, "%.3f\n", state_unix_s(l->now, l->now->start_ns));
 }
@@ -145,7 +145,7 @@ static void put_histogram(FILE *out, loop *l, const char *metric,
 	}
 	put_count(out, l, name, "le", "+Inf", total);
 	snprintf(name, sizeof(name), "%s_sum", metric);
-	put_number(out, l, name, (double)sum_ns * 1e-9);
+	put_prometheus_number(out, l, name, (double)sum_ns * 1e-9);
 	snprintf(name, sizeof(name), "%s_count", metric);
 	put_count(out, l, name, NULL, NULL, total);
 }
@@ -232,11 +232,12 @@ static void put_metric(FILE *out, loop *l, size_t i)
 		put_count(out, l, name, NULL, NULL, *(const uint64_t *)value);
 		break;
 	case REAL:
-		put_number(out, l, name, *(const double *)value * metrics[i].unit);
+		put_prometheus_number(out, l, name,
+				      *(const double *)value * metrics[i].unit);
 		break;
 	case TIME:
-		put_number(out, l, name,
-			   (double)*(const int64_t *)value * metrics[i].unit);
+		put_prometheus_number(out, l, name,
+				      (double)*(const int64_t *)value * metrics[i].unit);
 		break;
 	case OTHER:
 		metrics[i].put(out, l, name);

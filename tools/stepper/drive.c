@@ -149,7 +149,7 @@ void stepper_drive_end(struct stepper_drive *drive)
 }
 
 /* After a target was given. */
-static void follow(struct stepper_drive *drive, int rc)
+static void follow_drive(struct stepper_drive *drive, int rc)
 {
 	int64_t now = incise_clock_now(drive->clock);
 
@@ -175,12 +175,12 @@ static void follow(struct stepper_drive *drive, int rc)
 
 void stepper_drive_to(struct stepper_drive *drive, double position_mm)
 {
-	follow(drive, incise_stepper_set(drive->stepper, position_mm));
+	follow_drive(drive, incise_stepper_set(drive->stepper, position_mm));
 }
 
 void stepper_drive_at(struct stepper_drive *drive, double velocity_mm_s)
 {
-	follow(drive, incise_stepper_jog(drive->stepper, velocity_mm_s));
+	follow_drive(drive, incise_stepper_jog(drive->stepper, velocity_mm_s));
 }
 
 void stepper_drive_hold(struct stepper_drive *drive, double seconds)

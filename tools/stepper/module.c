@@ -342,7 +342,7 @@ static void put_sync(const struct controller *controller)
 		       cli_count(sync->pulses, "pulse"), (uint64_t)sync->missed);
 }
 
-static void put_text(const struct controller *controller)
+static void put_module_text(const struct controller *controller)
 {
 	const struct incise_stepper_controller *info = &controller->info;
 
@@ -477,7 +477,7 @@ void stepper_module_show(const char *what, bool json)
 		if (json)
 			json_array_append_new(controllers, module_json(&controller));
 		else
-			put_text(&controller);
+			put_module_text(&controller);
 	}
 	if (json)
 		json_print(json_pack("{ss sO}", "kind", "stepper", "controllers",

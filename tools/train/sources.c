@@ -166,7 +166,7 @@ static int open_recording(struct incise_train_source *source, struct incise_erro
 }
 
 /* Its name, and the origins that the file carries, as many as fit. */
-static int open_file(struct incise_train_source *source, struct incise_error *err)
+static int open_sources_file(struct incise_train_source *source, struct incise_error *err)
 {
 	struct own *own = source->user;
 	size_t at = (size_t)snprintf(own->text, sizeof(own->text), "%.300s",
@@ -264,7 +264,7 @@ struct incise_train_source *sources_new(char **paths, int n,
 			continue;
 		}
 		source->path = source->name;
-		source->open = open_file;
+		source->open = open_sources_file;
 		if (!strcmp(source->path, "-") ||
 		    (!stat(source->path, &st) && !S_ISREG(st.st_mode) &&
 		     !S_ISDIR(st.st_mode)))

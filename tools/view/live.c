@@ -79,7 +79,7 @@ static void *run(void *argument)
 	return NULL;
 }
 
-static int start(struct view_live *live, struct incise_error *err)
+static int start_live(struct view_live *live, struct incise_error *err)
 {
 	sigset_t all, before;
 	int rc;
@@ -117,7 +117,7 @@ struct view_live *view_live_begin(struct incise_plan *plan, struct incise_rig *r
 	if (live->options.state) {
 		incise_state_run(live->options.state, INCISE_RUN_RUNNING, "");
 		live->state = incise_state_open(live->page, err);
-		rc = live->state ? start(live, err) : -errno;
+		rc = live->state ? start_live(live, err) : -errno;
 		/* Not for other programs. */
 		unlink(live->page);
 	} else {

@@ -24,8 +24,8 @@ static void make_plan(struct view_job *job)
 }
 
 /* End in a failure, of a file if @path is not NULL, with the session up to here. */
-static _Noreturn void fail(struct view_job *job, const char *path,
-			   const struct incise_error *err)
+static _Noreturn void fail_sources(struct view_job *job, const char *path,
+				   const struct incise_error *err)
 {
 	struct incise_error session_err = {0};
 
@@ -61,7 +61,7 @@ static void run_live(struct view_job *job, struct view_live *live, struct view_h
 		last = now;
 		rc = view_live_take(live, job->view, job->log, &status, &err);
 		if (rc < 0)
-			fail(job, NULL, &err);
+			fail_sources(job, NULL, &err);
 		view_job_draw(job, &status, (double)(now - begin) / INCISE_NS_PER_S);
 		job->lost = status.lost;
 		/* With vertical synchronization this does not wait. */
@@ -195,7 +195,7 @@ void view_procedure(struct view_job *job)
 	loop.duration_ns = (int64_t)(end_s * INCISE_NS_PER_S);
 	if (incise_loop_run(job->plan, incise_rig_clock(job->own_rig), &loop, &stats,
 			    &err) < 0)
-		fail(job, NULL, &err);
+		fail_sources(job, NULL, &err);
 }
 
 static int replay_tick(void *context, const struct incise_replay_tick *tick,
@@ -236,6 +236,6 @@ void view_recording(struct view_job *job)
 	view_job_view(job);
 	if (incise_replay(recording, job->scene, &replay, &stats, &report, &err) &&
 	    !run.ended)
-		fail(job, job->from, &err);
+		fail_sources(job, job->from, &err);
 	incise_recording_close(recording);
 }

@@ -123,8 +123,8 @@ static int card_error(const struct card *card, int code, const char *what,
 }
 
 /* "/dev/comedi0:1"; -1 in @subdevice without a number. */
-static int parse(struct card *card, const char *arguments, int *subdevice,
-		 struct incise_error *err)
+static int parse_comedi_force(struct card *card, const char *arguments, int *subdevice,
+			      struct incise_error *err)
 {
 	const char *colon = strrchr(arguments, ':');
 	size_t length = colon ? (size_t)(colon - arguments) : strlen(arguments);
@@ -284,7 +284,7 @@ static int take_rate(struct card *card, struct incise_error *err)
 
 static int card_open(struct card *card, const char *arguments, struct incise_error *err)
 {
-	int subdevice, rc = parse(card, arguments, &subdevice, err);
+	int subdevice, rc = parse_comedi_force(card, arguments, &subdevice, err);
 
 	rc = rc ? rc : open_device(card, err);
 	rc = rc ? rc : take_subdevice(card, subdevice, err);
@@ -502,7 +502,7 @@ static int handle_read(struct comedi_force *f, ssize_t got)
 	return (double)(incise_monotonic_ns() - f->received_ns) > dead_ns ? -EIO : 0;
 }
 
-static void *run(void *argument)
+static void *run_comedi_force(void *argument)
 {
 	struct comedi_force *f = argument;
 	int fd = comedi_fileno(f->card.device), rc = 0;
@@ -538,7 +538,7 @@ static const struct incise_force_ops force_ops = {
 	.cause = daq_feed_cause,
 };
 
-static int start(struct comedi_force *f, struct incise_error *err)
+static int start_comedi_force(struct comedi_force *f, struct incise_error *err)
 {
 	struct incise_force_info *info = &f->feed.info;
 	int fd = comedi_fileno(f->card.device), rc;
@@ -559,7 +559,7 @@ static int start(struct comedi_force *f, struct incise_error *err)
 		rc = card_start(&f->card);
 	}
 	if (!rc)
-		rc = daq_feed_start(&f->feed, run, f);
+		rc = daq_feed_start(&f->feed, run_comedi_force, f);
 	return rc ? incise_error_set(err, -rc, "%s: %s does not start: %s; see dmesg",
 				     f->card.where, f->card.path, strerror(-rc))
 		  : 0;
@@ -581,7 +581,7 @@ static void *force_open(const struct incise_backend_request *request,
 	f->card.where = request->where;
 	rc = daq_feed_setup(request, &f->card.setup, err);
 	rc = rc ? rc : card_open(&f->card, request->arguments, err);
-	rc = rc ? rc : start(f, err);
+	rc = rc ? rc : start_comedi_force(f, err);
 	f->card.where = NULL; /* the caller's */
 	if (!rc)
 		return &f->feed.force;
@@ -613,8 +613,9 @@ static void add_ranges(struct incise_scan_device *device, comedi_t *card,
 	incise_scan_tell(device, "ranges_V", "%s", text);
 }
 
-static void describe(const char *path, comedi_t *card, unsigned int subdevice,
-		     struct incise_scan_device *device)
+static void describe_comedi_force(const char *path, comedi_t *card,
+				  unsigned int subdevice,
+				  struct incise_scan_device *device)
 {
 	int flags = comedi_get_subdevice_flags(card, subdevice);
 	int n = comedi_get_n_channels(card, subdevice);
@@ -658,7 +659,7 @@ static int scan_card(const char *path, incise_scan_found *found, void *context)
 
 	for (int i = 0; i < n && !rc; i++)
 		if (can_stream(card, (unsigned int)i)) {
-			describe(path, card, (unsigned int)i, &device);
+			describe_comedi_force(path, card, (unsigned int)i, &device);
 			rc = found(context, &device);
 		}
 	if (card)

@@ -134,7 +134,7 @@ struct iio_force {
 };
 
 /* An unplugged device shows when reading, not when waiting. */
-static void *run(void *argument)
+static void *run_iio_force(void *argument)
 {
 	struct iio_force *f = argument;
 	int64_t dead_ms =
@@ -205,7 +205,7 @@ static int start_buffer(struct iio_force *f, struct incise_error *err)
 		  : 0;
 }
 
-static int start(struct iio_force *f, struct incise_error *err)
+static int start_iio_force(struct iio_force *f, struct incise_error *err)
 {
 	const struct iio_source *s = &f->source;
 	const char *name = iio_device_get_name(s->device);
@@ -228,7 +228,7 @@ static int start(struct iio_force *f, struct incise_error *err)
 	rc = start_buffer(f, err);
 	if (rc)
 		return rc;
-	rc = daq_feed_start(&f->feed, run, f);
+	rc = daq_feed_start(&f->feed, run_iio_force, f);
 	return rc ? incise_error_set(err, -rc, "%s: no thread to read it: %s", s->where,
 				     strerror(-rc))
 		  : 0;
@@ -260,7 +260,7 @@ static void *force_open(const struct incise_backend_request *request,
 	f->source.trigger_folder = IIO_SOURCE_TRIGGERS;
 	rc = daq_feed_setup(request, &f->source.setup, err);
 	rc = rc ? rc : iio_source_open(&f->source, request->arguments, err);
-	rc = rc ? rc : start(f, err);
+	rc = rc ? rc : start_iio_force(f, err);
 	f->source.where = NULL; /* the caller's */
 	if (!rc)
 		return &f->feed.force;
@@ -317,9 +317,10 @@ static void add_text(struct incise_scan_device *device, const struct iio_device 
 		incise_scan_tell(device, key, "%.99s", text);
 }
 
-static void describe(const struct iio_context *context, const struct iio_device *iio,
-		     const struct iio_channel *channel, int channels,
-		     struct incise_scan_device *device)
+static void describe_iio_force(const struct iio_context *context,
+			       const struct iio_device *iio,
+			       const struct iio_channel *channel, int channels,
+			       struct incise_scan_device *device)
 {
 	const char *id = iio_device_get_id(iio), *name = iio_device_get_name(iio);
 	const struct iio_data_format *data = iio_channel_get_data_format(channel);
@@ -371,7 +372,7 @@ static int force_scan(const char *arguments, incise_scan_found *found, void *con
 		if (!channels || iio_device_is_trigger(one) ||
 		    (*arguments && iio_context_find_device(iio, arguments) != one))
 			continue;
-		describe(iio, one, channel, channels, &device);
+		describe_iio_force(iio, one, channel, channels, &device);
 		rc = found(context, &device);
 	}
 	iio_context_destroy(iio);

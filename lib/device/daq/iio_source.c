@@ -286,8 +286,8 @@ bool iio_source_volts(const struct iio_channel *channel, const struct iio_format
 }
 
 /* All devices, or all triggers: "incise-sim-adc (iio:device0), …". */
-static void list(const struct iio_context *context, bool triggers, char *text,
-		 size_t size)
+static void list_iio_source(const struct iio_context *context, bool triggers, char *text,
+			    size_t size)
 {
 	unsigned int n = iio_context_get_devices_count(context);
 	size_t used = 0;
@@ -321,15 +321,15 @@ static int find_device(struct iio_source *s, const char *name, struct incise_err
 	s->device = iio_context_find_device(s->context, name);
 	if (s->device && !iio_device_is_trigger(s->device))
 		return 0;
-	list(s->context, false, known, sizeof(known));
+	list_iio_source(s->context, false, known, sizeof(known));
 	return incise_error_set(err, ENODEV,
 				"%s: no such IIO device \"%.60s\"; there are: %s",
 				s->where, name, known);
 }
 
 /* @what: "set the rate". */
-static int refused(const struct iio_source *s, int rc, const char *what,
-		   struct incise_error *err)
+static int refused_iio_source(const struct iio_source *s, int rc, const char *what,
+			      struct incise_error *err)
 {
 	const char *id = iio_device_get_id(s->device);
 
@@ -358,9 +358,9 @@ static int check_alone(struct iio_source *s, struct incise_error *err)
 	snprintf(path, sizeof(path), "/dev/%.60s", iio_device_get_id(s->device));
 	s->fd = open(path, O_RDONLY | O_NONBLOCK | O_CLOEXEC);
 	if (s->fd < 0)
-		return refused(s, -errno, "open the file", err);
+		return refused_iio_source(s, -errno, "open the file", err);
 	if (iio_device_buffer_attr_write(s->device, "enable", "0") == -EACCES)
-		return refused(s, -EACCES, "change the settings", err);
+		return refused_iio_source(s, -EACCES, "change the settings", err);
 	return 0;
 }
 
@@ -404,7 +404,7 @@ static int set_clock(struct iio_source *s, struct incise_error *err)
 	ssize_t rc = iio_device_attr_write(s->device, key, "monotonic");
 
 	if (rc < 0)
-		return refused(s, (int)rc, "set the clock of timestamps", err);
+		return refused_iio_source(s, (int)rc, "set the clock of timestamps", err);
 	rc = iio_device_attr_read(s->device, key, is, sizeof(is));
 	/*
 	 * Linux 6.1 adds a NUL behind the end of the line; libiio removes only one of the
@@ -457,7 +457,7 @@ static int use_named(struct iio_source *s, struct incise_error *err)
 	int rc = use_trigger(s, s->setup.trigger);
 
 	if (rc == -ENODEV) {
-		list(s->context, true, known, sizeof(known));
+		list_iio_source(s->context, true, known, sizeof(known));
 		return incise_error_set(err, ENODEV,
 					"%s: no such trigger \"%s\"; there are: %s",
 					s->where, s->setup.trigger, known);
@@ -468,7 +468,7 @@ static int use_named(struct iio_source *s, struct incise_error *err)
 					"remove force_setup.trigger",
 					s->where, iio_device_get_id(s->device),
 					s->setup.trigger);
-	return rc ? refused(s, rc, "set the trigger", err) : 0;
+	return rc ? refused_iio_source(s, rc, "set the trigger", err) : 0;
 }
 
 /* The trigger named in rig.conf, our own, or the trigger already set. */

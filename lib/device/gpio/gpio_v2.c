@@ -60,9 +60,9 @@ static struct gpiod_chip *find_chip(const char *name)
 }
 
 /* Add the settings of all wired lines. Returns 0, or -1 with errno. */
-static int describe(struct gpio_lines *lines, const int *line, unsigned int idle,
-		    struct gpiod_line_settings *settings,
-		    struct gpiod_line_config *config)
+static int describe_gpio_v2(struct gpio_lines *lines, const int *line, unsigned int idle,
+			    struct gpiod_line_settings *settings,
+			    struct gpiod_line_config *config)
 {
 	for (int i = 0; i < INCISE_LINES; i++) {
 		bool out = i < INCISE_LINES_OUT;
@@ -90,8 +90,9 @@ static int describe(struct gpio_lines *lines, const int *line, unsigned int idle
 	return 0;
 }
 
-static struct gpiod_line_request *take(struct gpio_lines *lines, struct gpiod_chip *chip,
-				       const int *line, unsigned int idle)
+static struct gpiod_line_request *take_gpio_v2(struct gpio_lines *lines,
+					       struct gpiod_chip *chip, const int *line,
+					       unsigned int idle)
 {
 	struct gpiod_line_settings *settings = gpiod_line_settings_new();
 	struct gpiod_line_config *config = gpiod_line_config_new();
@@ -101,7 +102,7 @@ static struct gpiod_line_request *take(struct gpio_lines *lines, struct gpiod_ch
 
 	if (settings && config && asked) {
 		gpiod_request_config_set_consumer(asked, CONSUMER);
-		if (!describe(lines, line, idle, settings, config))
+		if (!describe_gpio_v2(lines, line, idle, settings, config))
 			request = gpiod_chip_request_lines(chip, asked, config);
 		code = errno;
 	}
@@ -122,7 +123,7 @@ struct gpio_lines *gpio_lines_open(const char *chip, const int *line, unsigned i
 	int code;
 
 	if (opened) {
-		lines->request = take(lines, opened, line, idle);
+		lines->request = take_gpio_v2(lines, opened, line, idle);
 		code = errno;
 		gpiod_chip_close(opened);
 		errno = code;

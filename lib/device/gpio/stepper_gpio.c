@@ -143,7 +143,7 @@ static void *thread_run(void *argument)
 
 /* --- functions of the motor --- */
 
-static struct gpio_stepper *of(struct incise_motor *motor)
+static struct gpio_stepper *stepper_gpio_of(struct incise_motor *motor)
 {
 	return (struct gpio_stepper *)motor;
 }
@@ -164,24 +164,24 @@ static int post(struct gpio_stepper *g, enum command command)
 static int gpio_enable(struct incise_motor *motor, struct incise_error *err)
 {
 	(void)err;
-	return post(of(motor), ENABLE);
+	return post(stepper_gpio_of(motor), ENABLE);
 }
 
 static int gpio_disable(struct incise_motor *motor)
 {
-	return post(of(motor), DISABLE);
+	return post(stepper_gpio_of(motor), DISABLE);
 }
 
 static int gpio_clear(struct incise_motor *motor, struct incise_error *err)
 {
 	(void)err;
-	return post(of(motor), CLEAR);
+	return post(stepper_gpio_of(motor), CLEAR);
 }
 
 static int gpio_origin(struct incise_motor *motor, int32_t steps, bool homed)
 {
-	of(motor)->steps = steps;
-	return post(of(motor), homed ? HOMED : ORIGIN);
+	stepper_gpio_of(motor)->steps = steps;
+	return post(stepper_gpio_of(motor), homed ? HOMED : ORIGIN);
 }
 
 static INCISE_REALTIME int64_t gpio_now(struct incise_motor *motor)
@@ -192,7 +192,7 @@ static INCISE_REALTIME int64_t gpio_now(struct incise_motor *motor)
 
 static void gpio_close(struct incise_motor *motor)
 {
-	struct gpio_stepper *g = of(motor);
+	struct gpio_stepper *g = stepper_gpio_of(motor);
 
 	if (g->runs) {
 		motor->stepper.ops->disable(&motor->stepper, NULL);
@@ -245,7 +245,7 @@ static int self_test(struct gpio_stepper *g, uint32_t *rate_max, uint32_t *pulse
 	return *rate_max ? 0 : -ERANGE;
 }
 
-static int start_thread(struct gpio_stepper *g)
+static int start_stepper_gpio_thread(struct gpio_stepper *g)
 {
 	size_t length = strlen(g->motor.name);
 	bool real_time;
@@ -313,8 +313,9 @@ static int request_lines(struct gpio_stepper *g,
 				request->arguments, todo);
 }
 
-static int set_up(struct gpio_stepper *g, const struct incise_backend_request *request,
-		  struct incise_error *err)
+static int set_up_stepper_gpio(struct gpio_stepper *g,
+			       const struct incise_backend_request *request,
+			       struct incise_error *err)
 {
 	struct incise_stepper_config config;
 	uint32_t rate_max, pulse_ns;
@@ -337,7 +338,7 @@ static int set_up(struct gpio_stepper *g, const struct incise_backend_request *r
 	mlock(g, sizeof(*g));
 	rc = incise_pulser_init(&g->pulser, &config);
 	if (!rc)
-		rc = start_thread(g);
+		rc = start_stepper_gpio_thread(g);
 	return rc ? incise_error_set(err, -rc, "%s: cannot begin: %s", g->motor.name,
 				     strerror(-rc))
 		  : 0;
@@ -378,7 +379,7 @@ static void *gpio_open(const struct incise_backend_request *request,
 	g->pulser.world = g;
 	g->pulser.motion.setpoint = &g->setpoint;
 	g->pulser.motion.slot = &g->status;
-	rc = set_up(g, request, err);
+	rc = set_up_stepper_gpio(g, request, err);
 	if (!rc)
 		return &g->motor.stepper;
 	gpio_close(&g->motor);

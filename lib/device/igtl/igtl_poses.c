@@ -199,8 +199,8 @@ bool igtl_poses_alternate(const struct igtl_poses *poses)
 }
 
 /* @matrix NULL: it is not finite. @seen: the sender does not flag it. */
-static void take(struct igtl_poses *poses, const double (*matrix)[4], bool seen,
-		 int64_t stamp_ns, int64_t t_ns)
+static void take_igtl_poses(struct igtl_poses *poses, const double (*matrix)[4],
+			    bool seen, int64_t stamp_ns, int64_t t_ns)
 {
 	struct incise_tracker_sample sample = {
 		.t_ns = t_ns, .status = INVALID, .station = 1, .quaternion = {1}};
@@ -380,15 +380,15 @@ static void take_message(struct igtl_poses *poses,
 	else if (!strcmp(message->type, "POSITION"))
 		rc = read_position(message, matrix);
 	if (rc != -EPROTO && is_ours(poses, message->name))
-		take(poses, rc ? NULL : (const double(*)[4])matrix, seen, message->utc_ns,
-		     t_ns);
+		take_igtl_poses(poses, rc ? NULL : (const double(*)[4])matrix, seen,
+				message->utc_ns, t_ns);
 	for (size_t i = 0; !strcmp(message->type, "TDATA"); i++) {
 		rc = read_tdata(message, i, name, matrix);
 		if (rc && rc != -EDOM)
 			break;
 		if (is_ours(poses, name))
-			take(poses, rc ? NULL : (const double(*)[4])matrix, seen,
-			     message->utc_ns, t_ns);
+			take_igtl_poses(poses, rc ? NULL : (const double(*)[4])matrix,
+					seen, message->utc_ns, t_ns);
 	}
 }
 

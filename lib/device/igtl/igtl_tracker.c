@@ -52,7 +52,7 @@ struct igtl_tracker {
 	uint8_t bytes[CHUNK];
 };
 
-static struct igtl_tracker *of(const struct incise_tracker *tracker)
+static struct igtl_tracker *igtl_tracker_of(const struct incise_tracker *tracker)
 {
 	return (struct igtl_tracker *)tracker;
 }
@@ -125,7 +125,7 @@ static void disconnect(struct igtl_tracker *t)
  * Receive for at most @ms. 1: something came; 0: nothing; -ECANCELED; -EPIPE (it was closed),
  * -EPROTO, or another errno of the connection.
  */
-static int receive(struct igtl_tracker *t, int64_t ms)
+static int receive_igtl_tracker(struct igtl_tracker *t, int64_t ms)
 {
 	int rc = wait_for(t, t->fd, POLLIN, ms);
 	ssize_t n;
@@ -159,7 +159,7 @@ static bool recover(struct igtl_tracker *t)
 	return false;
 }
 
-static void end(struct igtl_tracker *t, const char *what)
+static void end_igtl_tracker(struct igtl_tracker *t, const char *what)
 {
 	tracker_feed_end(&t->feed,
 			 "%s %s; start its server again, check the network, and start "
@@ -167,7 +167,7 @@ static void end(struct igtl_tracker *t, const char *what)
 			 t->name, what);
 }
 
-static void *run(void *argument)
+static void *run_igtl_tracker(void *argument)
 {
 	struct igtl_tracker *t = argument;
 	int64_t since_ns = incise_monotonic_ns();
@@ -177,21 +177,21 @@ static void *run(void *argument)
 	while (rc != -ECANCELED) {
 		int64_t now_ns;
 
-		rc = receive(t, RETRY_MS);
+		rc = receive_igtl_tracker(t, RETRY_MS);
 		now_ns = incise_monotonic_ns();
 		if (messages != t->poses.messages)
 			since_ns = now_ns;
 		messages = t->poses.messages;
 		/* A server that answers each connection with the same nonsense, too. */
 		if (now_ns - since_ns > GONE_MS * MS) {
-			end(t, "sent no message for 10 s");
+			end_igtl_tracker(t, "sent no message for 10 s");
 			break;
 		}
 		if (rc >= 0 || rc == -ECANCELED)
 			continue;
 		incise_thread_hurry(false);
 		if (!recover(t)) {
-			end(t, "disconnected and was not back after 10 s");
+			end_igtl_tracker(t, "disconnected and was not back after 10 s");
 			break;
 		}
 		incise_thread_hurry(true);
@@ -205,23 +205,24 @@ static void tracker_info(const struct incise_tracker *tracker,
 			 struct incise_tracker_info *info)
 {
 	*info = (struct incise_tracker_info){
-		.rate_hz = of(tracker)->rate_hz,
+		.rate_hz = igtl_tracker_of(tracker)->rate_hz,
 		.stations = 1,
 		.scalpel_station = 1,
 		.external_sync = true, /* the sender decides when */
 		.network = true,
 	};
-	snprintf(info->name, sizeof(info->name), "%s", of(tracker)->name);
+	snprintf(info->name, sizeof(info->name), "%s", igtl_tracker_of(tracker)->name);
 }
 
 static uint64_t tracker_lost(const struct incise_tracker *tracker)
 {
-	return atomic_load_explicit(&of(tracker)->poses.lost, memory_order_relaxed);
+	return atomic_load_explicit(&igtl_tracker_of(tracker)->poses.lost,
+				    memory_order_relaxed);
 }
 
 static void tracker_close(struct incise_tracker *tracker)
 {
-	struct igtl_tracker *t = of(tracker);
+	struct igtl_tracker *t = igtl_tracker_of(tracker);
 	uint64_t one = 1;
 
 	if (t->runs) {
@@ -247,8 +248,9 @@ static const struct incise_tracker_ops ops = {
 /* --- opening --- */
 
 /* "HOST", "HOST:PORT", "HOST:PORT:DEVICE"; an address of IPv6 in brackets. */
-static int parse(struct igtl_tracker *t, const char *arguments, const char **device,
-		 const char *where, struct incise_error *err)
+static int parse_igtl_tracker(struct igtl_tracker *t, const char *arguments,
+			      const char **device, const char *where,
+			      struct incise_error *err)
 {
 	bool bracket = *arguments == '[';
 	const char *host = arguments + bracket;
@@ -361,14 +363,15 @@ static int two_senders(const struct igtl_tracker *t, const char *where,
 }
 
 /* Receive until the rate is known. */
-static int learn(struct igtl_tracker *t, const char *where, struct incise_error *err)
+static int learn_igtl_tracker(struct igtl_tracker *t, const char *where,
+			      struct incise_error *err)
 {
 	int64_t until_ns = incise_monotonic_ns() + FIRST_MS * MS, now_ns;
 	double hz;
 	int rc = 0;
 
 	while (rc >= 0 && (now_ns = incise_monotonic_ns()) < until_ns) {
-		rc = receive(t, (until_ns - now_ns) / MS + 1);
+		rc = receive_igtl_tracker(t, (until_ns - now_ns) / MS + 1);
 		hz = igtl_poses_hz(&t->poses);
 		if (hz >= RATE_LEAST && hz <= RATE_MOST &&
 		    (double)(t->poses.last_ns - t->poses.first_ns) >= LEARN_NS) {
@@ -393,13 +396,14 @@ static int learn(struct igtl_tracker *t, const char *where, struct incise_error 
 	return no_poses(t, where, err);
 }
 
-static int begin(struct igtl_tracker *t, const struct incise_backend_request *request,
-		 struct incise_error *err)
+static int begin_igtl_tracker(struct igtl_tracker *t,
+			      const struct incise_backend_request *request,
+			      struct incise_error *err)
 {
 	static const struct incise_tracker_setup usual = {.repeat_ms = 100};
 	const char *device, *where = request->where;
 	bool real_time;
-	int rc = parse(t, request->arguments, &device, where, err);
+	int rc = parse_igtl_tracker(t, request->arguments, &device, where, err);
 
 	if (rc)
 		return rc;
@@ -412,7 +416,7 @@ static int begin(struct igtl_tracker *t, const struct incise_backend_request *re
 		return incise_error_set(err, -rc, "%s: %s; end other programs", where,
 					strerror(-rc));
 	rc = find_server(t, where, err);
-	rc = rc ? rc : learn(t, where, err);
+	rc = rc ? rc : learn_igtl_tracker(t, where, err);
 	if (rc)
 		return rc;
 	igtl_poses_start(&t->poses, t->rate_hz);
@@ -422,7 +426,7 @@ static int begin(struct igtl_tracker *t, const struct incise_backend_request *re
 	else
 		snprintf(t->name, sizeof(t->name), "OpenIGTLink %s at %.24s",
 			 t->poses.device, t->host);
-	rc = incise_thread_start(&t->thread, run, t, &real_time);
+	rc = incise_thread_start(&t->thread, run_igtl_tracker, t, &real_time);
 	t->runs = !rc;
 	return rc ? incise_error_set(err, -rc,
 				     "%s: no thread to receive it; end other programs",
@@ -447,7 +451,7 @@ static void *tracker_open(const struct incise_backend_request *request,
 	t->feed.tracker.ops = &ops;
 	t->feed.ring = &t->poses.ring;
 	t->fd = t->stop = -1;
-	rc = begin(t, request, err);
+	rc = begin_igtl_tracker(t, request, err);
 	if (!rc)
 		return &t->feed.tracker;
 	tracker_close(&t->feed.tracker);

@@ -36,7 +36,7 @@ static void be_quiet(void *handle)
 		set_content(QUIET);
 }
 
-static int load(struct liblsl *lsl, const char *where, struct incise_error *err)
+static int load_liblsl(struct liblsl *lsl, const char *where, struct incise_error *err)
 {
 	const char *missing = NULL;
 
@@ -69,7 +69,7 @@ int liblsl_open(struct liblsl *lsl, const char *where, struct incise_error *err)
 		lsl->handle = dlopen(named ? named : names[i],
 				     RTLD_NOW | RTLD_LOCAL | RTLD_NODELETE);
 	if (lsl->handle)
-		return load(lsl, where, err);
+		return load_liblsl(lsl, where, err);
 	if (named)
 		return incise_error_set(
 			err, ENOENT,

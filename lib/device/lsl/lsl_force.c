@@ -82,7 +82,8 @@ static int32_t code_of(const struct lsl_force *f, double value)
 	return (int32_t)fmax(0, fmin(code, top));
 }
 
-static void take(struct lsl_force *f, double value, double stamp_s, int64_t now_ns)
+static void take_lsl_force(struct lsl_force *f, double value, double stamp_s,
+			   int64_t now_ns)
 {
 	double t_s = stamp_s + f->correction_s, now_s = (double)now_ns * 1e-9;
 	uint64_t missing;
@@ -148,10 +149,10 @@ static int pull(struct lsl_force *f, int64_t now_ns)
 				      &error);
 	n = got / (unsigned long)f->n_channels;
 	for (unsigned long i = 0; i < n && i < most; i++)
-		take(f,
-		     f->values[i * (unsigned long)f->n_channels +
-			       (unsigned long)f->channel],
-		     f->times[i], now_ns);
+		take_lsl_force(f,
+			       f->values[i * (unsigned long)f->n_channels +
+					 (unsigned long)f->channel],
+			       f->times[i], now_ns);
 	return error < 0 && !n ? error : (int)n;
 }
 
@@ -169,7 +170,7 @@ static int correct(struct lsl_force *f, double timeout_s, double *uncertainty_s)
 	return 0;
 }
 
-static void *run(void *argument)
+static void *run_lsl_force(void *argument)
 {
 	struct lsl_force *f = argument;
 	int64_t last_ns = incise_clock_now(f->clock), corrected_ns = last_ns;
@@ -227,7 +228,7 @@ static const struct incise_force_ops force_ops = {
 };
 
 /* Text of other machines in a message. */
-static const char *plain(char *to, size_t size, const char *text)
+static const char *make_plain_lsl(char *to, size_t size, const char *text)
 {
 	size_t n = 0;
 
@@ -237,7 +238,7 @@ static const char *plain(char *to, size_t size, const char *text)
 	return to;
 }
 
-static const struct unit *unit_of(const char *name)
+static const struct unit *unit_of_lsl_force(const char *name)
 {
 	for (size_t i = 0; i < sizeof(units) / sizeof(*units); i++)
 		for (size_t k = 0; k < sizeof(units->names) / sizeof(*units->names); k++)
@@ -265,8 +266,8 @@ static int split(const char *arguments, char *name, size_t size, const char **ch
 		where, arguments);
 }
 
-static int find(struct lsl_force *f, const char *name, const char *where,
-		struct incise_error *err)
+static int find_lsl_force(struct lsl_force *f, const char *name, const char *where,
+			  struct incise_error *err)
 {
 	lsl_streaminfo found[2] = {0};
 	int n = f->lsl.lsl_resolve_byprop(found, 2, "name", name, 1, FIND_S), rc = 0;
@@ -302,8 +303,8 @@ static void append_channel(char *list, size_t size, const char *label, const cha
 	char a[40], b[20];
 
 	snprintf(list + used, size - used, "%s%s (%s)", used ? ", " : "",
-		 plain(a, sizeof(a), label),
-		 *unit ? plain(b, sizeof(b), unit) : "no unit");
+		 make_plain_lsl(a, sizeof(a), label),
+		 *unit ? make_plain_lsl(b, sizeof(b), unit) : "no unit");
 }
 
 /* By label, else by number from 0; without @asked the only one with a unit of a force. */
@@ -324,14 +325,14 @@ static int choose_channel(struct lsl_force *f, lsl_streaminfo info, const char *
 		bool described = one && !lsl->lsl_empty(one);
 		const char *label = described ? lsl->lsl_child_value_n(one, "label") : "";
 		const char *unit = described ? lsl->lsl_child_value_n(one, "unit") : "";
-		const struct unit *known = unit_of(unit);
+		const struct unit *known = unit_of_lsl_force(unit);
 
 		if (asked ? !strcmp(label, asked) || (f->channel < 0 && number == i)
 			  : !!known) {
 			fits += f->channel != i;
 			f->channel = i;
 			f->unit = known;
-			plain(wrong, sizeof(wrong), unit);
+			make_plain_lsl(wrong, sizeof(wrong), unit);
 		}
 		append_channel(list, sizeof(list), *label ? label : "no label", unit);
 		one = described ? lsl->lsl_next_sibling_n(one, "channel") : NULL;
@@ -357,8 +358,8 @@ static int choose_channel(struct lsl_force *f, lsl_streaminfo info, const char *
 		*wrong ? "\"" : "");
 }
 
-static int describe(struct lsl_force *f, const char *name, const char *asked,
-		    const char *where, struct incise_error *err)
+static int describe_lsl_force(struct lsl_force *f, const char *name, const char *asked,
+			      const char *where, struct incise_error *err)
 {
 	struct incise_force_info *out = &f->feed.info;
 	int32_t error = 0;
@@ -398,7 +399,7 @@ static int describe(struct lsl_force *f, const char *name, const char *asked,
 	out->offset_V = -out->full_scale_V / 2;
 	f->step = ldexp(out->full_scale_V, -BITS);
 	snprintf(out->name, sizeof(out->name), "LSL %s, channel %d",
-		 plain(shown, sizeof(shown), name), f->channel);
+		 make_plain_lsl(shown, sizeof(shown), name), f->channel);
 	return 0;
 }
 
@@ -426,13 +427,14 @@ static int connect_stream(struct lsl_force *f, const char *name, const char *whe
 		     : 0;
 }
 
-static int start(struct lsl_force *f, const char *where, struct incise_error *err)
+static int start_lsl_force(struct lsl_force *f, const char *where,
+			   struct incise_error *err)
 {
 	int rc = daq_feed_init(&f->feed);
 
 	incise_pace_init(&f->pace, f->feed.info.rate_hz);
 	if (!rc)
-		rc = daq_feed_start(&f->feed, run, f);
+		rc = daq_feed_start(&f->feed, run_lsl_force, f);
 	return rc ? incise_error_set(err, -rc,
 				     "%s: no thread or memory to receive it: %s; "
 				     "end other programs",
@@ -448,10 +450,10 @@ static int open_stream(struct lsl_force *f, const struct incise_backend_request 
 	int rc = split(request->arguments, name, sizeof(name), &asked, where, err);
 
 	rc = rc ? rc : liblsl_open(&f->lsl, where, err);
-	rc = rc ? rc : find(f, name, where, err);
-	rc = rc ? rc : describe(f, name, asked, where, err);
+	rc = rc ? rc : find_lsl_force(f, name, where, err);
+	rc = rc ? rc : describe_lsl_force(f, name, asked, where, err);
 	rc = rc ? rc : connect_stream(f, name, where, err);
-	return rc ? rc : start(f, where, err);
+	return rc ? rc : start_lsl_force(f, where, err);
 }
 
 static void *force_open(const struct incise_backend_request *request,
@@ -506,9 +508,9 @@ static int list_channels(const struct liblsl *lsl, lsl_streaminfo found, char *l
 		const char *unit = lsl->lsl_child_value_n(one, "unit");
 		char shown[40];
 
-		if (unit_of(unit) && !fits++)
+		if (unit_of_lsl_force(unit) && !fits++)
 			*label ? snprintf(first, first_size, "%s",
-					  plain(shown, sizeof(shown), label))
+					  make_plain_lsl(shown, sizeof(shown), label))
 			       : snprintf(first, first_size, "%d", i);
 		append_channel(list, size, *label ? label : "no label", unit);
 		one = lsl->lsl_next_sibling_n(one, "channel");
@@ -521,8 +523,8 @@ static int list_channels(const struct liblsl *lsl, lsl_streaminfo found, char *l
 }
 
 /* If there are several channels of forces, the first is named, as an example that can be opened. */
-static void show(const struct liblsl *lsl, lsl_streaminfo info,
-		 struct incise_scan_device *device)
+static void show_lsl_force(const struct liblsl *lsl, lsl_streaminfo info,
+			   struct incise_scan_device *device)
 {
 	char list[200] = "", first[48] = "";
 	bool numbers = lsl->lsl_get_channel_format(info) != LSL_STRING;
@@ -534,15 +536,15 @@ static void show(const struct liblsl *lsl, lsl_streaminfo info,
 
 	*device = (struct incise_scan_device){0};
 	snprintf(device->device, sizeof(device->device), "lsl:%.60s%s%s",
-		 plain(text, sizeof(text), lsl->lsl_get_name(info)), fits > 1 ? ":" : "",
-		 fits > 1 ? first : "");
+		 make_plain_lsl(text, sizeof(text), lsl->lsl_get_name(info)),
+		 fits > 1 ? ":" : "", fits > 1 ? first : "");
 	snprintf(device->what, sizeof(device->what),
 		 "LSL stream of type %.40s, %d channel%s",
-		 plain(text, sizeof(text), lsl->lsl_get_type(info)),
+		 make_plain_lsl(text, sizeof(text), lsl->lsl_get_type(info)),
 		 lsl->lsl_get_channel_count(info),
 		 lsl->lsl_get_channel_count(info) == 1 ? "" : "s");
 	incise_scan_tell(device, "host", "%.90s",
-			 plain(text, sizeof(text), lsl->lsl_get_hostname(info)));
+			 make_plain_lsl(text, sizeof(text), lsl->lsl_get_hostname(info)));
 	incise_scan_tell(device, "channels", "%d", lsl->lsl_get_channel_count(info));
 	if (*list)
 		incise_scan_tell(device, "channel_list", "%s", list);
@@ -568,7 +570,7 @@ static int force_scan(const char *arguments, incise_scan_found *found, void *con
 		       : lsl.lsl_resolve_all(all, STREAMS_MAX, SCAN_S);
 	for (int i = 0; i < n && i < STREAMS_MAX; i++) {
 		if (!rc) {
-			show(&lsl, all[i], &device);
+			show_lsl_force(&lsl, all[i], &device);
 			/* Poses and markers are no force channels, but a named stream is shown. */
 			if (device.usable || *arguments)
 				rc = found(context, &device);

@@ -19,7 +19,8 @@ struct incise_outlet {
 /* One for the process, as liblsl has one state in it. */
 static struct liblsl lsl;
 
-static void describe(lsl_streaminfo info, const struct incise_outlet_setup *setup)
+static void describe_lsl_outlet(lsl_streaminfo info,
+				const struct incise_outlet_setup *setup)
 {
 	lsl_xml channels = lsl.lsl_append_child(lsl.lsl_get_desc(info), "channels");
 
@@ -41,7 +42,7 @@ static lsl_outlet offer(const struct incise_outlet_setup *setup)
 
 	if (!info)
 		return NULL;
-	describe(info, setup);
+	describe_lsl_outlet(info, setup);
 	outlet = lsl.lsl_create_outlet(info, 0, MEMORY_S);
 	lsl.lsl_destroy_streaminfo(info);
 	return outlet;

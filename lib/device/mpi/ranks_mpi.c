@@ -40,7 +40,7 @@ static void *receive_bytes(int rank, size_t *n)
 }
 
 /* Each rank's bytes are broadcast in turn. */
-static int gather(const void *bytes, size_t n, void **all, size_t **sizes)
+static int gather_ranks_mpi(const void *bytes, size_t n, void **all, size_t **sizes)
 {
 	uint64_t mine = n, *counts = malloc(ranks.size * sizeof(*counts));
 	size_t total = 0, at = 0;
@@ -91,7 +91,7 @@ const struct incise_ranks *incise_ranks_join(void)
 		return NULL;
 	MPI_Comm_rank(MPI_COMM_WORLD, &ranks.rank);
 	MPI_Comm_size(MPI_COMM_WORLD, &ranks.size);
-	ranks.gather = gather;
+	ranks.gather = gather_ranks_mpi;
 	ranks.send = send_bytes;
 	ranks.receive = receive_bytes;
 	ranks.close = leave;

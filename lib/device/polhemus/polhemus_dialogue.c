@@ -13,7 +13,7 @@
 
 enum { FLAG_BINARY = 1, FLAG_CM = 2, FLAG_COMPENSATED = 4, FLAG_CONTINUOUS = 8 };
 
-static bool is_digit(char c)
+static bool is_polhemus_dialogue_digit(char c)
 {
 	return c >= '0' && c <= '9';
 }
@@ -79,10 +79,10 @@ int polhemus_reply_numbers(const char *text, double *values, int most)
 			return n;
 		if (*text == '-' || *text == '+')
 			negative = *text++ == '-';
-		for (; is_digit(*text) && digits < 9; text++, digits++)
+		for (; is_polhemus_dialogue_digit(*text) && digits < 9; text++, digits++)
 			value = value * 10 + (*text - '0');
 		if (*text == '.')
-			for (text++; is_digit(*text); text++) {
+			for (text++; is_polhemus_dialogue_digit(*text); text++) {
 				if (digits++ > 15)
 					continue;
 				scale /= 10;
@@ -199,7 +199,7 @@ static ssize_t receive_at(struct polhemus_dialogue *d, int timeout_ms, int64_t *
 	return n;
 }
 
-static ssize_t receive(struct polhemus_dialogue *d, int timeout_ms)
+static ssize_t receive_polhemus_dialogue(struct polhemus_dialogue *d, int timeout_ms)
 {
 	int64_t t_ns;
 
@@ -267,7 +267,8 @@ int polhemus_not_taken(struct polhemus_dialogue *d, const char *what, const char
 				d->where, d->line->name, what, got);
 }
 
-static int refused(struct polhemus_dialogue *d, const char *command, const char *said)
+static int refused_polhemus_dialogue(struct polhemus_dialogue *d, const char *command,
+				     const char *said)
 {
 	char text[40];
 
@@ -280,7 +281,8 @@ static int refused(struct polhemus_dialogue *d, const char *command, const char 
 }
 
 /* Take the first line out of d->bytes, without its end. */
-static bool next_line(struct polhemus_dialogue *d, char *text, size_t size)
+static bool next_polhemus_dialogue_line(struct polhemus_dialogue *d, char *text,
+					size_t size)
 {
 	unsigned char *end = memchr(d->bytes, '\n', d->n);
 	size_t n, length;
@@ -308,15 +310,15 @@ int polhemus_ask(struct polhemus_dialogue *d, const char *command, char type, ch
 	d->n = 0;
 	rc = polhemus_say(d, command);
 	while (!rc && waited < ANSWER_MS) {
-		ssize_t n = receive(d, WAIT_MS);
+		ssize_t n = receive_polhemus_dialogue(d, WAIT_MS);
 
 		if (n < 0)
 			return (int)n;
 		/* An endless stream is no answer. */
 		waited += n ? RECEIVED_MS : WAIT_MS;
-		while (next_line(d, text, sizeof(text))) {
+		while (next_polhemus_dialogue_line(d, text, sizeof(text))) {
 			if (strstr(text, "*ERROR*"))
-				return refused(d, command, text);
+				return refused_polhemus_dialogue(d, command, text);
 			if (text[0] != '2' || !text[1] || text[2] != type)
 				continue;
 			strcpy(reply, text + 3);
@@ -356,7 +358,7 @@ int polhemus_ask_frame(struct polhemus_dialogue *d, const char *command,
 	rc = polhemus_say(d, command);
 	while (!rc && waited < ANSWER_MS) {
 		size_t before = d->n;
-		ssize_t n = receive(d, WAIT_MS);
+		ssize_t n = receive_polhemus_dialogue(d, WAIT_MS);
 
 		if (n < 0)
 			return (int)n;
@@ -372,7 +374,7 @@ int polhemus_ask_frame(struct polhemus_dialogue *d, const char *command,
 			at += is > 0 ? frame->length : 1;
 			if (is > 0 && frame->error && frame->error != ' ') {
 				snprintf(said, sizeof(said), "error %#x", frame->error);
-				return refused(d, command, said);
+				return refused_polhemus_dialogue(d, command, said);
 			}
 			if (is > 0 && frame->command == type)
 				return 0;

@@ -59,7 +59,7 @@ double polhemus_real(const unsigned char *b)
 }
 
 /* A number in just ASCII_WIDTH characters, such as "-012.34", whatever the locale. */
-static bool number(const unsigned char *b, double *value)
+static bool take_polhemus_number(const unsigned char *b, double *value)
 {
 	double sum = 0, scale = 0;
 	int digits = 0;
@@ -121,7 +121,7 @@ static bool read_fastrak(const struct polhemus_layout *layout, const unsigned ch
 	for (int i = 0; i < 7; i++) {
 		if (!layout->ascii)
 			values[i] = polhemus_real(at);
-		else if (!number(at, &values[i]))
+		else if (!take_polhemus_number(at, &values[i]))
 			return false;
 		at += layout->ascii ? ASCII_WIDTH : 4;
 	}

@@ -22,9 +22,9 @@ static uint8_t mask_of(const struct incise_tracker_setup *setup)
 }
 
 /* Whether the bytes in @d are one record of each station, in their order. */
-static bool fits(const struct polhemus_dialogue *d,
-		 const struct incise_tracker_setup *setup,
-		 const struct polhemus_layout *layout, int total)
+static bool fits_polhemus_setup(const struct polhemus_dialogue *d,
+				const struct incise_tracker_setup *setup,
+				const struct polhemus_layout *layout, int total)
 {
 	size_t length = polhemus_layout_length(layout);
 	struct polhemus_record record;
@@ -43,8 +43,9 @@ static bool fits(const struct polhemus_dialogue *d,
  * Ask for one record of each station with P, which confirms the setup. The length of a
  * FASTRAK's switch, which its manual does not give, is found by it.
  */
-static int measure(struct polhemus_dialogue *d, const struct incise_tracker_setup *setup,
-		   struct polhemus_layout *layout)
+static int measure_polhemus_setup(struct polhemus_dialogue *d,
+				  const struct incise_tracker_setup *setup,
+				  struct polhemus_layout *layout)
 {
 	static const uint8_t lengths[] = {1, 2, 4};
 	int rc = polhemus_say(d, "P"), total;
@@ -56,7 +57,7 @@ static int measure(struct polhemus_dialogue *d, const struct incise_tracker_setu
 		return total;
 	for (size_t i = 0; i < sizeof(lengths); i++) {
 		layout->switch_bytes = lengths[i];
-		if (fits(d, setup, layout, total))
+		if (fits_polhemus_setup(d, setup, layout, total))
 			return 0;
 	}
 	return incise_error_set(
@@ -235,7 +236,7 @@ static int fastrak_setup(struct polhemus_dialogue *d,
 					  "the status S");
 	identity->layout = (struct polhemus_layout){.family = POLHEMUS_FASTRAK,
 						    .stations = mask_of(setup)};
-	rc = measure(d, setup, &identity->layout);
+	rc = measure_polhemus_setup(d, setup, &identity->layout);
 	if (!rc && setup->sync != INCISE_TRACKER_INTERNAL)
 		rc = set_sync(d, setup->sync);
 	return rc ? rc : polhemus_say(d, "C");
@@ -388,7 +389,7 @@ static int liberty_setup(struct polhemus_dialogue *d,
 	if (rc)
 		return rc;
 	identity->layout.stations = mask_of(setup);
-	rc = measure(d, setup, &identity->layout);
+	rc = measure_polhemus_setup(d, setup, &identity->layout);
 	return rc ? rc : polhemus_say(d, "C\r");
 }
 

@@ -47,7 +47,7 @@ uint64_t polhemus_gaps_silent(const struct polhemus_gaps *gaps, int64_t t_ns)
 	return rounds > 0 ? (uint64_t)(rounds * gaps->n) : 0;
 }
 
-static int place(const struct polhemus_gaps *gaps, uint8_t station)
+static int find_gap_place(const struct polhemus_gaps *gaps, uint8_t station)
 {
 	for (int i = 0; i < gaps->n; i++)
 		if (gaps->order[i] == station)
@@ -62,7 +62,7 @@ static void restart_window(struct polhemus_gaps *gaps)
 	gaps->least_ns = FAR_NS;
 }
 
-static void step(struct polhemus_gaps *gaps, uint64_t steps)
+static void step_polhemus_stream(struct polhemus_gaps *gaps, uint64_t steps)
 {
 	gaps->seq += steps;
 	gaps->lost += steps - 1;
@@ -107,7 +107,7 @@ static void step_over(struct polhemus_gaps *gaps, int64_t t_ns, int where)
 	/* Without a period count one round, so that the gap shows. */
 	if (!gaps->period_ns)
 		more = 1;
-	step(gaps, steps + more * (uint64_t)gaps->n);
+	step_polhemus_stream(gaps, steps + more * (uint64_t)gaps->n);
 	gaps->base_ns = t_ns - due_ns(gaps, gaps->seq);
 	gaps->broken = gaps->settled = false;
 	gaps->restarted = true;
@@ -185,7 +185,7 @@ static bool add_counted(struct polhemus_gaps *gaps, const struct polhemus_record
 		step_over(gaps, record->t_ns, where);
 		return true;
 	}
-	step(gaps, (uint64_t)steps);
+	step_polhemus_stream(gaps, (uint64_t)steps);
 	look_back(gaps, late);
 	return true;
 }
@@ -217,7 +217,7 @@ static bool add_timed(struct polhemus_gaps *gaps, const struct polhemus_record *
 	/* Its station is damaged, or it is there twice. */
 	if (is_too_early(gaps, late))
 		return false;
-	step(gaps, by_bytes(gaps, record, where));
+	step_polhemus_stream(gaps, by_bytes(gaps, record, where));
 	look_back(gaps, lateness(gaps, record->t_ns, gaps->seq));
 	return true;
 }
@@ -230,15 +230,15 @@ static void add_ordered(struct polhemus_gaps *gaps, const struct polhemus_record
 
 	if (gaps->n == 1)
 		steps += (record->skipped + gaps->length / 2) / gaps->length;
-	step(gaps, steps);
+	step_polhemus_stream(gaps, steps);
 }
 
 /*
  * Before the first record, as many are missing as the skipped bytes make and fit into the
  * time; where the link was gone, all since the start, less one round for the first.
  */
-static void begin(struct polhemus_gaps *gaps, const struct polhemus_record *record,
-		  int where)
+static void begin_polhemus_stream(struct polhemus_gaps *gaps,
+				  const struct polhemus_record *record, int where)
 {
 	uint64_t n = (uint64_t)gaps->n, missing = 0, most;
 
@@ -262,11 +262,11 @@ static void begin(struct polhemus_gaps *gaps, const struct polhemus_record *reco
 bool polhemus_gaps_add(struct polhemus_gaps *gaps, const struct polhemus_record *record,
 		       uint64_t *seq)
 {
-	int where = place(gaps, record->station);
+	int where = find_gap_place(gaps, record->station);
 
 	gaps->restarted = false;
 	if (!gaps->begun) {
-		begin(gaps, record, where);
+		begin_polhemus_stream(gaps, record, where);
 	} else if (gaps->broken) {
 		step_over(gaps, record->t_ns, where);
 	} else if (gaps->counts) {
@@ -367,7 +367,8 @@ static void put_sample(struct polhemus_stream *stream,
 		stream->overflowed++;
 }
 
-static void number(struct polhemus_stream *stream, const struct polhemus_record *record)
+static void number_polhemus_record(struct polhemus_stream *stream,
+				   const struct polhemus_record *record)
 {
 	uint64_t seq;
 
@@ -387,7 +388,7 @@ static int64_t late_if_held_up(const struct polhemus_stream *stream,
 		gaps.seq = stream->wait.seq;
 		gaps.last = stream->wait.last;
 	}
-	*seq = gaps.seq + by_bytes(&gaps, record, place(&gaps, record->station));
+	*seq = gaps.seq + by_bytes(&gaps, record, find_gap_place(&gaps, record->station));
 	return lateness(&gaps, record->t_ns, *seq);
 }
 
@@ -400,7 +401,7 @@ static void release(struct polhemus_stream *stream, uint64_t missing)
 	stream->gaps.seq += missing;
 	stream->gaps.lost += missing;
 	for (size_t i = 0; i < n; i++)
-		number(stream, &stream->wait.records[i]);
+		number_polhemus_record(stream, &stream->wait.records[i]);
 }
 
 static int64_t round_of(const struct polhemus_gaps *gaps)
@@ -450,7 +451,7 @@ static void decide(struct polhemus_stream *stream)
 		release(stream, 0);
 }
 
-static void count(struct polhemus_stream *stream, uint64_t silent)
+static void count_polhemus_stream(struct polhemus_stream *stream, uint64_t silent)
 {
 	atomic_store_explicit(&stream->lost,
 			      stream->gaps.lost + stream->overflowed + silent,
@@ -464,7 +465,7 @@ void polhemus_stream_quiet(struct polhemus_stream *stream, int64_t t_ns)
 	release(stream, stream->wait.late_ns >= round_of(&stream->gaps) * 3 / 2
 				? missing_before(stream)
 				: 0);
-	count(stream, 0);
+	count_polhemus_stream(stream, 0);
 }
 
 static void take_record(struct polhemus_stream *stream,
@@ -476,7 +477,7 @@ static void take_record(struct polhemus_stream *stream,
 	uint64_t seq;
 
 	if (!gaps->begun || gaps->broken || gaps->counts || !gaps->period_ns) {
-		number(stream, record);
+		number_polhemus_record(stream, record);
 		return;
 	}
 	late_ns = late_if_held_up(stream, record, &seq);
@@ -486,7 +487,7 @@ static void take_record(struct polhemus_stream *stream,
 		late_ns = late_if_held_up(stream, record, &seq);
 	}
 	if (!wait->n && late_ns < round_of(gaps) * 3 / 2) {
-		number(stream, record);
+		number_polhemus_record(stream, record);
 		return;
 	}
 	if (!wait->n)
@@ -497,7 +498,7 @@ static void take_record(struct polhemus_stream *stream,
 	}
 	wait->late_ns = late_ns;
 	wait->seq = seq;
-	wait->last = place(gaps, record->station);
+	wait->last = find_gap_place(gaps, record->station);
 	wait->records[wait->n++] = *record;
 	decide(stream);
 }
@@ -505,7 +506,7 @@ static void take_record(struct polhemus_stream *stream,
 void polhemus_stream_silent(struct polhemus_stream *stream, int64_t t_ns)
 {
 	polhemus_stream_quiet(stream, t_ns);
-	count(stream, polhemus_gaps_silent(&stream->gaps, t_ns));
+	count_polhemus_stream(stream, polhemus_gaps_silent(&stream->gaps, t_ns));
 }
 
 void polhemus_stream_broken(struct polhemus_stream *stream,
@@ -533,7 +534,7 @@ int polhemus_stream_put(struct polhemus_stream *stream, const unsigned char *byt
 		for (; polhemus_records_next(&stream->records, &record); found++)
 			take_record(stream, &record);
 	}
-	count(stream, 0);
+	count_polhemus_stream(stream, 0);
 	return found;
 }
 

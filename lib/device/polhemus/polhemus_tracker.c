@@ -72,7 +72,7 @@ static bool is_unresponsive(const struct polhemus_tracker *t, int64_t silent_ms,
 	       (t->stream.setup.sync == INCISE_TRACKER_INTERNAL || noise > NOISE_MAX);
 }
 
-static int64_t least(int64_t a, int64_t b)
+static int64_t least_polhemus_tracker(int64_t a, int64_t b)
 {
 	return a < b ? a : b;
 }
@@ -85,10 +85,11 @@ static int patience_ms(const struct polhemus_tracker *t)
 	if (due_ns == INT64_MAX)
 		return POLL_MS;
 	left_ns = due_ns - incise_monotonic_ns();
-	return left_ns > 0 ? (int)least(left_ns / 1000000 + 1, POLL_MS) : 1;
+	return left_ns > 0 ? (int)least_polhemus_tracker(left_ns / 1000000 + 1, POLL_MS)
+			   : 1;
 }
 
-static void *run(void *argument)
+static void *run_polhemus_tracker(void *argument)
 {
 	struct polhemus_tracker *t = argument;
 	unsigned char bytes[POLHEMUS_LINE_CHUNK];
@@ -111,7 +112,7 @@ static void *run(void *argument)
 		}
 		/* While the computer stood still, the line was not read. */
 		now = now_ms();
-		silent_ms += least(now - before_ms, 2 * POLL_MS);
+		silent_ms += least_polhemus_tracker(now - before_ms, 2 * POLL_MS);
 		before_ms = now;
 		/* A shorter silence may be due to a busy host. */
 		if (n < 0 || silent_ms >= LOST_MS)
@@ -181,8 +182,8 @@ static const struct incise_tracker_ops ops = {
 	.cause = tracker_feed_cause,
 };
 
-static int check(const struct incise_tracker_setup *setup, const char *where,
-		 struct incise_error *err)
+static int check_polhemus_tracker(const struct incise_tracker_setup *setup,
+				  const char *where, struct incise_error *err)
 {
 	const double *h = setup->hemisphere, *offset = setup->offset_mm;
 	bool tube = !setup->tube_station;
@@ -208,11 +209,12 @@ static int check(const struct incise_tracker_setup *setup, const char *where,
 					  where);
 }
 
-static int begin(struct polhemus_tracker *t, const struct incise_tracker_setup *setup,
-		 const char *where, struct incise_error *err)
+static int begin_polhemus_tracker(struct polhemus_tracker *t,
+				  const struct incise_tracker_setup *setup,
+				  const char *where, struct incise_error *err)
 {
 	bool real_time;
-	int rc = check(setup, where, err);
+	int rc = check_polhemus_tracker(setup, where, err);
 
 	if (!rc)
 		rc = polhemus_setup(t->line, setup, &t->identity, where, err);
@@ -226,7 +228,7 @@ static int begin(struct polhemus_tracker *t, const struct incise_tracker_setup *
 	if (!rc) {
 		polhemus_gaps_start(&t->stream.gaps, incise_monotonic_ns());
 		t->line->stop = &t->stop;
-		rc = incise_thread_start(&t->thread, run, t, &real_time);
+		rc = incise_thread_start(&t->thread, run_polhemus_tracker, t, &real_time);
 		if (!rc)
 			return 0;
 		incise_error_set(
@@ -262,7 +264,7 @@ struct incise_tracker *polhemus_tracker_open(struct polhemus_line *line,
 		.line = line,
 		.times = *times,
 	};
-	rc = begin(t, setup, where, err);
+	rc = begin_polhemus_tracker(t, setup, where, err);
 	if (!rc)
 		return &t->feed.tracker;
 	line->ops->close(line);

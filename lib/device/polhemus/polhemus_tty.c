@@ -44,7 +44,7 @@ static struct polhemus_tty *of_line(struct polhemus_line *line)
 }
 
 /* A line that was unplugged answers EIO, or nothing at all. */
-static int failed(int code)
+static int failed_polhemus_tty(int code)
 {
 	return code == EIO || code == ENXIO || code == ENODEV || code == EBADF ? -ENODEV
 									       : -EIO;
@@ -66,7 +66,7 @@ static int tty_write(struct polhemus_line *line, const void *bytes, size_t n)
 			if (poll(&writable, 1, WRITE_MS) <= 0)
 				return -EIO;
 		} else if (errno != EINTR) {
-			return failed(errno);
+			return failed_polhemus_tty(errno);
 		}
 	}
 	return 0;
@@ -93,7 +93,7 @@ static ssize_t tty_read(struct polhemus_line *line, void *bytes, size_t size,
 		if (n >= 0)
 			return n ? n : -ENODEV;
 		if (errno != EAGAIN && errno != EINTR)
-			return failed(errno);
+			return failed_polhemus_tty(errno);
 	}
 	return 0;
 }
@@ -135,8 +135,8 @@ static const struct polhemus_line_ops ops = {
 	.close = tty_close,
 };
 
-static void refuse(const char *path, int code, const char *where,
-		   struct incise_error *err)
+static void refuse_polhemus_tty(const char *path, int code, const char *where,
+				struct incise_error *err)
 {
 	switch (code) {
 	case ENOENT:
@@ -183,7 +183,7 @@ static void refuse(const char *path, int code, const char *where,
 }
 
 /* "PATH:RATE" or "PATH"; a path may have colons of its own. 0 or -EINVAL. */
-static int parse(struct polhemus_tty *tty, const char *arguments)
+static int parse_polhemus_tty(struct polhemus_tty *tty, const char *arguments)
 {
 	const char *colon = strrchr(arguments, ':');
 	int baud = 115200;
@@ -220,7 +220,7 @@ struct polhemus_line *polhemus_tty_open(const char *arguments, const char *where
 	}
 	tty->line.ops = &ops;
 	tty->line.family = -1;
-	if (parse(tty, arguments)) {
+	if (parse_polhemus_tty(tty, arguments)) {
 		incise_error_set(
 			err, EINVAL,
 			"%s: tty:%.100s: expected tty:/dev/ttyUSB0:RATE, with RATE "
@@ -241,7 +241,7 @@ struct polhemus_line *polhemus_tty_open(const char *arguments, const char *where
 	if (tty->fd < 0) {
 		struct incise_error none;
 
-		refuse(tty->path, -tty->fd, where, err ? err : &none);
+		refuse_polhemus_tty(tty->path, -tty->fd, where, err ? err : &none);
 		free(tty);
 		errno = err ? err->code : none.code;
 		return NULL;

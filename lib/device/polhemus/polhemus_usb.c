@@ -170,7 +170,8 @@ static bool is_kind(libusb_device *device, const struct usb_name *wanted,
 }
 
 /* *denied is set where only a serial number that may not be read could decide. */
-static bool fits(libusb_device *device, const struct usb_name *wanted, bool *denied)
+static bool fits_polhemus_usb(libusb_device *device, const struct usb_name *wanted,
+			      bool *denied)
 {
 	char path[USB_PATH_MAX], serial[USB_SERIAL_MAX];
 	struct libusb_device_descriptor d;
@@ -202,7 +203,7 @@ static struct fitting find_fitting(libusb_device **list, const struct usb_name *
 		char path[USB_PATH_MAX];
 		size_t at = strlen(f.where);
 
-		if (!fits(*list, wanted, &f.denied))
+		if (!fits_polhemus_usb(*list, wanted, &f.denied))
 			continue;
 		if (!f.n++)
 			f.first = *list;
@@ -251,7 +252,8 @@ static int none(libusb_device **list, const char *name, const char *where,
 }
 
 /* "…: no right to open NAME: …" for -EACCES, -EBUSY, -ENODEV, -ENOMEM; else for -EIO. */
-static int refuse(int rc, const char *name, const char *where, struct incise_error *err)
+static int refuse_polhemus_usb(int rc, const char *name, const char *where,
+			       struct incise_error *err)
 {
 	switch (rc) {
 	case -EACCES:
@@ -281,9 +283,9 @@ static int refuse(int rc, const char *name, const char *where, struct incise_err
 	}
 }
 
-static int choose(libusb_device **list, const struct usb_name *wanted, const char *was,
-		  const char *name, libusb_device **device, const char *where,
-		  struct incise_error *err)
+static int choose_polhemus_usb(libusb_device **list, const struct usb_name *wanted,
+			       const char *was, const char *name, libusb_device **device,
+			       const char *where, struct incise_error *err)
 {
 	struct fitting f = find_fitting(list, wanted);
 
@@ -295,7 +297,7 @@ static int choose(libusb_device **list, const struct usb_name *wanted, const cha
 		f = find_fitting(list, &again);
 	}
 	if (!f.n && f.denied)
-		return refuse(-EACCES, name, where, err);
+		return refuse_polhemus_usb(-EACCES, name, where, err);
 	if (!f.n)
 		return none(list, name, where, err);
 	if (f.n > 1)
@@ -320,8 +322,8 @@ static int find_device(libusb_context *context, const struct usb_name *wanted,
 	int rc;
 
 	if (libusb_get_device_list(context, &list) < 0)
-		return refuse(-ENOMEM, name, where, err);
-	rc = choose(list, wanted, was, name, device, where, err);
+		return refuse_polhemus_usb(-ENOMEM, name, where, err);
+	rc = choose_polhemus_usb(list, wanted, was, name, device, where, err);
 	libusb_free_device_list(list, 1);
 	return rc;
 }
@@ -335,9 +337,10 @@ static bool is_plain(const char *serial)
 	return true;
 }
 
-static int show(libusb_device *device, const struct libusb_device_descriptor *d,
-		const struct polhemus_model *model, incise_scan_found *found,
-		void *context)
+static int show_polhemus_usb(libusb_device *device,
+			     const struct libusb_device_descriptor *d,
+			     const struct polhemus_model *model, incise_scan_found *found,
+			     void *context)
 {
 	char path[USB_PATH_MAX], serial[USB_SERIAL_MAX], id[12];
 	struct incise_scan_device seen = {.usable = model->ready};
@@ -392,8 +395,8 @@ static int usb_scan(const char *arguments, incise_scan_found *found, void *conte
 		if (libusb_get_device_descriptor(*at, &d))
 			continue;
 		model = polhemus_model_find(d.idVendor, d.idProduct);
-		if (model && (!*arguments || fits(*at, &wanted, &denied)))
-			rc = show(*at, &d, model, found, context);
+		if (model && (!*arguments || fits_polhemus_usb(*at, &wanted, &denied)))
+			rc = show_polhemus_usb(*at, &d, model, found, context);
 	}
 	if (list)
 		libusb_free_device_list(list, 1);
@@ -651,7 +654,7 @@ static int usb_attach(struct polhemus_usb *usb, const char *where,
 		return rc;
 	rc = take_device(usb, device);
 	if (rc)
-		refuse(rc, usb->line.name, where, err);
+		refuse_polhemus_usb(rc, usb->line.name, where, err);
 	else
 		path_of(device, usb->path);
 	libusb_unref_device(device);
@@ -761,7 +764,7 @@ static struct polhemus_line *usb_open(const char *arguments, const char *where,
 	int rc;
 
 	if (!usb) {
-		refuse(-ENOMEM, arguments, where, err);
+		refuse_polhemus_usb(-ENOMEM, arguments, where, err);
 		return NULL;
 	}
 	usb->line.ops = &ops;

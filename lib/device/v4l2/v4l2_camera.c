@@ -46,7 +46,7 @@ struct v4l2_camera {
 	struct incise_error cause;
 };
 
-static const struct v4l2_camera *of(const struct incise_camera *camera)
+static const struct v4l2_camera *v4l2_camera_of(const struct incise_camera *camera)
 {
 	return (const struct v4l2_camera *)camera;
 }
@@ -86,7 +86,7 @@ static int camera_read(struct incise_camera *camera, struct incise_camera_frame 
 static void camera_info(const struct incise_camera *camera,
 			struct incise_camera_info *info)
 {
-	const struct v4l2_camera *c = of(camera);
+	const struct v4l2_camera *c = v4l2_camera_of(camera);
 
 	*info = (struct incise_camera_info){
 		.rate_hz = c->stream.shape.rate_hz,
@@ -101,12 +101,13 @@ static void camera_info(const struct incise_camera *camera,
 
 static uint64_t camera_lost(const struct incise_camera *camera)
 {
-	return atomic_load_explicit(&of(camera)->stream.lost, memory_order_relaxed);
+	return atomic_load_explicit(&v4l2_camera_of(camera)->stream.lost,
+				    memory_order_relaxed);
 }
 
 static int camera_cause(struct incise_camera *camera, char *text, size_t size)
 {
-	const struct v4l2_camera *c = of(camera);
+	const struct v4l2_camera *c = v4l2_camera_of(camera);
 	int end = atomic_load_explicit(&c->end, memory_order_acquire);
 
 	return snprintf(text, size, "%s", end ? c->cause.text : "");
@@ -134,7 +135,8 @@ static const struct incise_camera_ops ops = {
 	.cause = camera_cause,
 };
 
-static int open_file(struct v4l2_camera *c, const char *path, struct incise_error *err)
+static int open_v4l2_camera_file(struct v4l2_camera *c, const char *path,
+				 struct incise_error *err)
 {
 	const char *todo;
 	int rc = *path == '/' ? v4l2_open(path) : -EINVAL;
@@ -181,15 +183,16 @@ static int open_file(struct v4l2_camera *c, const char *path, struct incise_erro
 	return 0;
 }
 
-static int set_up(struct v4l2_camera *c, const struct incise_backend_request *asked,
-		  struct incise_error *err)
+static int set_up_v4l2_camera(struct v4l2_camera *c,
+			      const struct incise_backend_request *asked,
+			      struct incise_error *err)
 {
 	static const struct incise_camera_setup plain = {.pixels = INCISE_PIXELS_YUYV};
 	const struct incise_camera_setup *setup = asked->camera ? asked->camera : &plain;
 	uint32_t priority = V4L2_PRIORITY_RECORD;
 	struct v4l2_shape shape;
 	bool real_time;
-	int rc = open_file(c, asked->arguments, err);
+	int rc = open_v4l2_camera_file(c, asked->arguments, err);
 
 	if (rc)
 		return rc;
@@ -231,7 +234,7 @@ static void *camera_open(const struct incise_backend_request *asked,
 	c->camera.ops = &ops;
 	c->fd = -1;
 	snprintf(c->where, sizeof(c->where), "%s", asked->where);
-	rc = set_up(c, asked, err);
+	rc = set_up_v4l2_camera(c, asked, err);
 	if (!rc)
 		return &c->camera;
 	camera_close(&c->camera);
@@ -251,8 +254,9 @@ struct search {
 	int answer; /* last return of @found */
 };
 
-static void describe(int fd, const char *path, const struct v4l2_identity *identity,
-		     struct incise_scan_device *device)
+static void describe_v4l2_camera(int fd, const char *path,
+				 const struct v4l2_identity *identity,
+				 struct incise_scan_device *device)
 {
 	char stable[sizeof(device->device) - 5], formats[60];
 
@@ -289,7 +293,7 @@ static int look_at(struct search *s, const char *path)
 	if (!rc && !(identity.capabilities & V4L2_CAP_VIDEO_CAPTURE))
 		rc = -ENOTTY;
 	if (!rc)
-		describe(fd, path, &identity, &device);
+		describe_v4l2_camera(fd, path, &identity, &device);
 	close(fd);
 	if (rc)
 		return rc;

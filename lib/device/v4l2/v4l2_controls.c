@@ -86,7 +86,7 @@ static int get(int fd, uint32_t id, int32_t *value)
 	return rc;
 }
 
-static int set(int fd, uint32_t id, int32_t value)
+static int set_v4l2_controls(int fd, uint32_t id, int32_t value)
 {
 	struct v4l2_control control = {.id = id, .value = value};
 
@@ -94,14 +94,14 @@ static int set(int fd, uint32_t id, int32_t value)
 }
 
 /* Whether the camera has a control that can be read. */
-static bool has(int fd, uint32_t id, struct v4l2_queryctrl *range)
+static bool has_v4l2_control(int fd, uint32_t id, struct v4l2_queryctrl *range)
 {
 	*range = (struct v4l2_queryctrl){.id = id};
 	return id && !v4l2_ask(fd, VIDIOC_QUERYCTRL, range) &&
 	       !(range->flags & (V4L2_CTRL_FLAG_DISABLED | V4L2_CTRL_FLAG_WRITE_ONLY));
 }
 
-static int refuse(struct locking *l, int rc, const char *name)
+static int refuse_v4l2_controls(struct locking *l, int rc, const char *name)
 {
 	if (rc == -ENODEV)
 		return incise_error_set(l->err, ENODEV, "%s: the camera was unplugged",
@@ -116,16 +116,17 @@ static int refuse(struct locking *l, int rc, const char *name)
 }
 
 /* Set a control; it is read back after all are set. */
-static int hold(struct locking *l, uint32_t id, const char *name, int32_t value)
+static int hold_v4l2_controls(struct locking *l, uint32_t id, const char *name,
+			      int32_t value)
 {
 	struct v4l2_controls *c = l->controls;
 	int32_t is = 0;
 	int rc = get(c->fd, id, &is);
 
 	if (!rc && is != value)
-		rc = set(c->fd, id, value);
+		rc = set_v4l2_controls(c->fd, id, value);
 	if (rc)
-		return refuse(l, rc, name);
+		return refuse_v4l2_controls(l, rc, name);
 	c->lock[c->n++] = (struct v4l2_lock){id, value, name};
 	return 0;
 }
@@ -137,20 +138,22 @@ static int lock_automatic(struct locking *l, const struct pair *pair)
 	int32_t is;
 	int rc;
 
-	if (!has(c->fd, pair->automatic, &range))
+	if (!has_v4l2_control(c->fd, pair->automatic, &range))
 		return 0;
 	rc = get(c->fd, pair->automatic, &is);
 	if (rc)
-		return refuse(l, rc, pair->automatic_name);
+		return refuse_v4l2_controls(l, rc, pair->automatic_name);
 	for (int i = 0; i < 2; i++) {
-		rc = is == pair->off[i] ? 0 : set(c->fd, pair->automatic, pair->off[i]);
+		rc = is == pair->off[i]
+			     ? 0
+			     : set_v4l2_controls(c->fd, pair->automatic, pair->off[i]);
 		if (!rc) {
 			c->lock[c->n++] = (struct v4l2_lock){
 				pair->automatic, pair->off[i], pair->automatic_name};
 			return 0;
 		}
 	}
-	return refuse(l, rc, pair->automatic_name);
+	return refuse_v4l2_controls(l, rc, pair->automatic_name);
 }
 
 /* A value in the units and steps of the driver. */
@@ -179,7 +182,7 @@ static int lock_pair(struct locking *l, const struct pair *pair,
 {
 	struct v4l2_controls *c = l->controls;
 	struct v4l2_queryctrl range;
-	bool there = has(c->fd, pair->value, &range);
+	bool there = has_v4l2_control(c->fd, pair->value, &range);
 	double asked = 0;
 	int32_t value = 0;
 	int rc = 0;
@@ -199,14 +202,14 @@ static int lock_pair(struct locking *l, const struct pair *pair,
 	if (there && !(asked > 0))
 		rc = get(c->fd, pair->value, &value);
 	if (rc)
-		return refuse(l, rc, pair->name);
+		return refuse_v4l2_controls(l, rc, pair->name);
 	if (asked > 0)
 		rc = value_of(l, pair, asked, &range, &value);
 	if (!rc)
 		rc = lock_automatic(l, pair);
 	if (rc || !there || range.flags & V4L2_CTRL_FLAG_READ_ONLY)
 		return rc;
-	return hold(l, pair->value, pair->name, value);
+	return hold_v4l2_controls(l, pair->value, pair->name, value);
 }
 
 static int check_exposure(const struct incise_camera_setup *setup, double rate_hz,
@@ -231,7 +234,7 @@ static int read_back(struct locking *l)
 		int rc = get(c->fd, lock->id, &is);
 
 		if (rc)
-			return refuse(l, rc, lock->name);
+			return refuse_v4l2_controls(l, rc, lock->name);
 		if (is != lock->value)
 			return incise_error_set(
 				l->err, EIO,

@@ -34,7 +34,8 @@ int v4l2_ask(int fd, unsigned long request, void *argument)
 }
 
 /* Text of a driver may be unterminated or unprintable. */
-static void text_of(char *text, size_t size, const unsigned char *from, size_t length)
+static void text_of_v4l2_file(char *text, size_t size, const unsigned char *from,
+			      size_t length)
 {
 	size_t i;
 
@@ -50,12 +51,12 @@ int v4l2_identify(int fd, struct v4l2_identity *identity)
 
 	if (rc)
 		return rc == -EINVAL ? -ENOTTY : rc;
-	text_of(identity->card, sizeof(identity->card), reported.card,
-		sizeof(reported.card));
-	text_of(identity->driver, sizeof(identity->driver), reported.driver,
-		sizeof(reported.driver));
-	text_of(identity->bus, sizeof(identity->bus), reported.bus_info,
-		sizeof(reported.bus_info));
+	text_of_v4l2_file(identity->card, sizeof(identity->card), reported.card,
+			  sizeof(reported.card));
+	text_of_v4l2_file(identity->driver, sizeof(identity->driver), reported.driver,
+			  sizeof(reported.driver));
+	text_of_v4l2_file(identity->bus, sizeof(identity->bus), reported.bus_info,
+			  sizeof(reported.bus_info));
 	identity->version = reported.version;
 	/* A device may have several files with different capabilities. */
 	identity->capabilities = reported.capabilities & V4L2_CAP_DEVICE_CAPS

@@ -67,7 +67,7 @@ void v4l2_format_list(int fd, char *text, size_t size)
 }
 
 /* Index into known; KNOWN: the camera has no such pixels. */
-static size_t find(int fd, enum incise_pixels pixels)
+static size_t find_v4l2_format(int fd, enum incise_pixels pixels)
 {
 	size_t best = KNOWN;
 	uint32_t fourcc;
@@ -230,8 +230,8 @@ static const char *wrong(const struct v4l2_pix_format *reported, size_t kind,
 						  : NULL;
 }
 
-static int check_setup(const struct incise_camera_setup *setup, const char *where,
-		       struct incise_error *err)
+static int check_v4l2_format_setup(const struct incise_camera_setup *setup,
+				   const char *where, struct incise_error *err)
 {
 	if (setup->width < 0 || setup->width > V4L2_SIDE_MAX || setup->height < 0 ||
 	    setup->height > V4L2_SIDE_MAX)
@@ -253,12 +253,12 @@ int v4l2_format_set(int fd, const struct incise_camera_setup *setup, const char 
 {
 	struct v4l2_format set = {.type = V4L2_BUF_TYPE_VIDEO_CAPTURE};
 	struct v4l2_format reported = {.type = V4L2_BUF_TYPE_VIDEO_CAPTURE};
-	size_t kind = find(fd, setup->pixels);
+	size_t kind = find_v4l2_format(fd, setup->pixels);
 	int width, height, rc;
 	const char *why;
 	char list[120];
 
-	rc = check_setup(setup, where, err);
+	rc = check_v4l2_format_setup(setup, where, err);
 	if (rc)
 		return rc;
 	rc = v4l2_ask(fd, VIDIOC_G_FMT, &set);

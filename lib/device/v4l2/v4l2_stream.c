@@ -242,8 +242,8 @@ static bool is_whole(const struct v4l2_stream *s, const struct v4l2_buffer *buff
 }
 
 /* Advance the counts; frames in a gap are lost. */
-static int count(struct v4l2_stream *s, uint32_t sequence, bool whole,
-		 struct incise_error *err)
+static int count_v4l2_stream(struct v4l2_stream *s, uint32_t sequence, bool whole,
+			     struct incise_error *err)
 {
 	uint32_t step = s->any ? sequence - s->sequence : 1;
 
@@ -329,8 +329,8 @@ static int publish(struct v4l2_stream *s, int i, struct incise_error *err)
 	return queue(s, old, err);
 }
 
-static int take(struct v4l2_stream *s, const struct v4l2_buffer *buffer, int64_t now,
-		struct incise_error *err)
+static int take_v4l2_stream(struct v4l2_stream *s, const struct v4l2_buffer *buffer,
+			    int64_t now, struct incise_error *err)
 {
 	struct v4l2_slot *slot;
 	int64_t timestamp;
@@ -349,7 +349,7 @@ static int take(struct v4l2_stream *s, const struct v4l2_buffer *buffer, int64_t
 		return other_clock(s, EIO, err);
 	timestamp = timestamp_of(s, buffer, now);
 	whole = timestamp >= 0 && is_whole(s, buffer, slot);
-	rc = count(s, buffer->sequence, whole, err);
+	rc = count_v4l2_stream(s, buffer->sequence, whole, err);
 	if (rc)
 		return rc;
 	if (!whole)
@@ -430,7 +430,7 @@ int v4l2_stream_step(struct v4l2_stream *s, int timeout_ms, struct incise_error 
 		return no_frame(s, rc, ready.revents, err);
 	s->errors = 0;
 	s->seen_ns = incise_monotonic_ns();
-	rc = take(s, &buffer, s->seen_ns, err);
+	rc = take_v4l2_stream(s, &buffer, s->seen_ns, err);
 	return rc ? rc : 1;
 }
 

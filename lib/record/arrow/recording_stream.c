@@ -240,8 +240,9 @@ static bool mark_missing(struct ArrowArray *child, double *values, uint8_t **bit
 	return !child->null_count || *bits;
 }
 
-static const char *text_of(const struct incise_table *table, enum incise_column_type type,
-			   const union incise_cell *cell)
+static const char *text_of_recording_stream(const struct incise_table *table,
+					    enum incise_column_type type,
+					    const union incise_cell *cell)
 {
 	return type == INCISE_COLUMN_NAME ? table->names[cell->integer - 1]
 					  : table->texts + cell->integer;
@@ -256,14 +257,15 @@ static bool copy_texts(const struct incise_table *table, enum incise_column_type
 	char *to;
 
 	for (size_t i = 0; i < table->filled; i++)
-		size += strlen(text_of(table, type, &cells[i]));
+		size += strlen(text_of_recording_stream(table, type, &cells[i]));
 	to = size < INT32_MAX ? malloc(size + 1) : NULL;
 	buffers[0] = offsets;
 	buffers[1] = to;
 	for (size_t i = 0; offsets && to && i < table->filled; i++)
 		offsets[i + 1] =
 			(int32_t)(utf8_copy_printable(to + offsets[i],
-						      text_of(table, type, &cells[i]),
+						      text_of_recording_stream(
+							      table, type, &cells[i]),
 						      "") -
 				  to);
 	return offsets && to;

@@ -200,9 +200,9 @@ static int read_own(struct incise_recording *recording, struct history *history,
 }
 
 /* The calibration that has set a key to this value; *index: of the value in it. NULL: none. */
-static const struct incise_calibration_record *find(const struct history *history,
-						    const char *key, double value,
-						    int *index)
+static const struct incise_calibration_record *find_budget(const struct history *history,
+							   const char *key, double value,
+							   int *index)
 {
 	for (int i = history->n - 1; i >= 0; i--) {
 		const struct incise_calibration_record *record = &history->records[i];
@@ -230,7 +230,8 @@ static double covariance(const struct incise_calibration_record *record, int i, 
 	return i == k ? record->values[i].u * record->values[i].u : 0;
 }
 
-static void set(struct incise_budget *budget, enum incise_budget_source source, double u)
+static void set_budget(struct incise_budget *budget, enum incise_budget_source source,
+		       double u)
 {
 	budget->u[source] = u;
 	budget->covariance[source][source] = u * u;
@@ -378,7 +379,7 @@ static int measure_zero(struct incise_budget *budget, struct incise_recording *f
 	if (sd_mV < step_mV / 2)
 		u_mV = hypot(u_mV, step_mV / sqrt(12));
 	if (used)
-		set(budget, INCISE_BUDGET_ZERO, u_mV);
+		set_budget(budget, INCISE_BUDGET_ZERO, u_mV);
 	return 0;
 }
 
@@ -421,15 +422,17 @@ static int find_force(struct incise_budget *budget, const struct use *use,
 	budget->mV_N =
 		use->given && !meta->newtons ? use->given->force_mV_N : meta->force_mV_N;
 	gain = meta->newtons ? NULL
-			     : find(stating(use, &use->of_force, 0), "force_mV_N",
-				    budget->mV_N, &at_gain);
+			     : find_budget(stating(use, &use->of_force, 0), "force_mV_N",
+					   budget->mV_N, &at_gain);
 	if (!isnan(zero_mV) && !meta->newtons)
-		zero = find(of_zero, "force_zero_mV", zero_mV, &at_zero);
+		zero = find_budget(of_zero, "force_zero_mV", zero_mV, &at_zero);
 	rc = measure_force(budget, use, isnan(zero_mV) || meta->newtons, err);
 	if (gain)
-		set(budget, INCISE_BUDGET_GAIN, sqrt(covariance(gain, at_gain, at_gain)));
+		set_budget(budget, INCISE_BUDGET_GAIN,
+			   sqrt(covariance(gain, at_gain, at_gain)));
 	if (zero)
-		set(budget, INCISE_BUDGET_ZERO, sqrt(covariance(zero, at_zero, at_zero)));
+		set_budget(budget, INCISE_BUDGET_ZERO,
+			   sqrt(covariance(zero, at_zero, at_zero)));
 	if (gain && zero)
 		set_both(budget, INCISE_BUDGET_GAIN, INCISE_BUDGET_ZERO,
 			 gain == zero ? covariance(gain, at_gain, at_zero) : 0);
@@ -480,7 +483,7 @@ static void find_tip(struct incise_budget *budget, const struct use *use)
 
 	for (int i = 0; i < 3; i++) {
 		const struct incise_calibration_record *found =
-			find(&use->of_tracker, keys[i], tip_mm[i], &at[i]);
+			find_budget(&use->of_tracker, keys[i], tip_mm[i], &at[i]);
 
 		if (i && found != record)
 			found = NULL;
@@ -501,7 +504,7 @@ static void find_tip(struct incise_budget *budget, const struct use *use)
 		return;
 	}
 	for (int i = 0; i < 3; i++) {
-		set(budget, INCISE_BUDGET_TIP_X + i, sqrt(fmax(c[i][i], 0)));
+		set_budget(budget, INCISE_BUDGET_TIP_X + i, sqrt(fmax(c[i][i], 0)));
 		for (int k = 0; k < i; k++)
 			set_both(budget, INCISE_BUDGET_TIP_X + i, INCISE_BUDGET_TIP_X + k,
 				 c[i][k]);
@@ -515,7 +518,8 @@ static bool against(const struct history *history, const char *key, const char *
 {
 	const double value = incise_calibration_get(&history->calibration, key);
 	int at;
-	const struct incise_calibration_record *record = find(history, key, value, &at);
+	const struct incise_calibration_record *record =
+		find_budget(history, key, value, &at);
 
 	for (int i = 0; record && i < record->n; i++)
 		if (!strcmp(record->values[i].key, other))
@@ -570,10 +574,11 @@ static int find_times(struct incise_budget *budget, const struct use *use,
 		budget->shared = alignment_s > 0 ? -pow(force_s / alignment_s, 2) : 0;
 		budget->delay_s = force_s * sqrt(fmax(0, 1 + budget->shared));
 	}
-	set(budget, INCISE_BUDGET_ALIGNMENT, alignment_s);
-	set(budget, INCISE_BUDGET_DELAY,
-	    budget->shared == 0 ? budget->delay_s
-				: hypot(budget->shared * alignment_s, budget->delay_s));
+	set_budget(budget, INCISE_BUDGET_ALIGNMENT, alignment_s);
+	set_budget(budget, INCISE_BUDGET_DELAY,
+		   budget->shared == 0
+			   ? budget->delay_s
+			   : hypot(budget->shared * alignment_s, budget->delay_s));
 	set_both(budget, INCISE_BUDGET_ALIGNMENT, INCISE_BUDGET_DELAY,
 		 budget->shared == 0 ? 0 : budget->shared * alignment_s * alignment_s);
 	if (isnan(alignment_s)) {
@@ -719,8 +724,8 @@ static void keep_tracker(struct incise_budget *budget, const struct tracker_sums
 	/* Two filters of one motion differ by noise, and by what one of them flattens. */
 	off -= noise * pow(incise_smooth_line_noise(&sums->smooth, INCISE_DEPTH_HALF), 2);
 	budget->smoothing_mm_s = sqrt(fmax(off, 0));
-	set(budget, INCISE_BUDGET_LINE,
-	    sqrt(sums->line_s2 / sums->lines + clock_s * clock_s));
+	set_budget(budget, INCISE_BUDGET_LINE,
+		   sqrt(sums->line_s2 / sums->lines + clock_s * clock_s));
 }
 
 static int measure_tracker(struct incise_budget *budget, const struct use *use,
@@ -766,7 +771,7 @@ static int find_all(struct incise_budget *budget, const struct use *use,
 	if (incise_recording_has_force(recording))
 		rc = find_force(budget, use, err);
 	find_tip(budget, use);
-	set(budget, INCISE_BUDGET_SURFACE, surface_u_mm);
+	set_budget(budget, INCISE_BUDGET_SURFACE, surface_u_mm);
 	if (isnan(surface_u_mm))
 		miss(budget, INCISE_BUDGET_DEPTH,
 		     "the surface has no uncertainty (surface_u_mm in calibration.conf)");

@@ -97,7 +97,7 @@ static int cut_name(struct pass *pass)
 }
 
 /* Add a row, with the uncertainties of bin number @at, which is emptied. */
-static int add_row(struct pass *pass, struct row *row, size_t at)
+static int add_export_row(struct pass *pass, struct row *row, size_t at)
 {
 	double part[INCISE_BUDGET_PARTS];
 	int rc;
@@ -297,7 +297,7 @@ static int put_row(struct pass *pass)
 	struct row row = {.bin = raw->bin};
 
 	raw->bin = (struct bin){0};
-	return row.bin.n ? add_row(pass, &row, 0) : 0;
+	return row.bin.n ? add_export_row(pass, &row, 0) : 0;
 }
 
 static int add_to_row(struct pass *pass, const struct incise_cut_sample *sample)
@@ -394,7 +394,7 @@ static int put_bins(struct pass *pass)
 
 		row.sd_N = row.bin.n > 1 ? sqrt(row.bin.m2 / (row.bin.n - 1)) : 0.0;
 		if (row.bin.n >= enough && !rc)
-			rc = add_row(pass, &row, i);
+			rc = add_export_row(pass, &row, i);
 		if (pass->means && row.bin.n)
 			pass->means[i] = (struct incise_budget_mean){0};
 		bins[i] = (struct bin){0};

@@ -9,7 +9,7 @@
 #include "decimal.h"
 #include "writers.h"
 
-static void put_name(const struct incise_table *table, int64_t number)
+static void put_export_csv_name(const struct incise_table *table, int64_t number)
 {
 	const char *name = table->names[number - 1];
 	bool quote = strpbrk(name, ",\" ;#") != NULL;
@@ -57,7 +57,7 @@ static void put_cell(struct incise_table *table, const struct incise_table_colum
 
 	switch (column->type) {
 	case INCISE_COLUMN_NAME:
-		put_name(table, cell->integer);
+		put_export_csv_name(table, cell->integer);
 		break;
 	case INCISE_COLUMN_INTEGER:
 	case INCISE_COLUMN_SHORT:

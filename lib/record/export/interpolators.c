@@ -264,7 +264,7 @@ static void measure_noise(struct incise_smooth *smooth, size_t i)
 }
 
 /* Filter forward to the last record, and smooth back to the unfinished ones. */
-static void run(struct incise_smooth *smooth)
+static void run_interpolators(struct incise_smooth *smooth)
 {
 	size_t end = smooth->ended ? smooth->n : smooth->n - AHEAD;
 	size_t sure = smooth->ended ? end : end - smooth->lag;
@@ -313,7 +313,7 @@ void incise_smooth_push(struct incise_smooth *smooth,
 	}
 	smooth->records[smooth->n++] = *record;
 	if (smooth->n == smooth->capacity)
-		run(smooth);
+		run_interpolators(smooth);
 }
 
 void incise_smooth_end(struct incise_smooth *smooth)
@@ -321,7 +321,7 @@ void incise_smooth_end(struct incise_smooth *smooth)
 	if (smooth->ended)
 		return;
 	smooth->ended = true;
-	run(smooth);
+	run_interpolators(smooth);
 }
 
 const struct incise_smooth_record *incise_smooth_take(struct incise_smooth *smooth)
@@ -623,7 +623,7 @@ void incise_go_to_tip(const double tip_mm[3], const double q[4], double position
 }
 
 /* Compute the values that are the same for all rows between two poses. */
-static void between(struct incise_blade_pose *blade)
+static void between_interpolators(struct incise_blade_pose *blade)
 {
 	const struct incise_blade_record *a = &blade->pose[0], *b = &blade->pose[1];
 	double dot = dot4(a->q, b->q), sum = 0;
@@ -661,12 +661,12 @@ static int more_pose(struct incise_blade_pose *blade, struct incise_error *err)
 	pose->station = (int)incise_rows_int(rows, 10);
 	pose->button = incise_rows_int(rows, 11) != 0;
 	if (blade->pose[0].t_ns != INCISE_TIME_NONE)
-		between(blade);
+		between_interpolators(blade);
 	return 1;
 }
 
 /* Add a row to the smoother; 0 at the end. */
-static int feed(struct incise_blade_pose *blade, struct incise_error *err)
+static int feed_interpolators(struct incise_blade_pose *blade, struct incise_error *err)
 {
 	const struct incise_rows *rows = &blade->depth;
 	int rc = incise_rows_next(&blade->depth, err);
@@ -741,7 +741,7 @@ static int more_depth(struct incise_blade_pose *blade, struct incise_error *err)
 	int rc = 1;
 
 	while (!(record = incise_smooth_take(&blade->smooth)) && rc > 0 && !blade->ended)
-		rc = feed(blade, err);
+		rc = feed_interpolators(blade, err);
 	blade->ended = blade->ended || !rc;
 	if (rc < 0)
 		return rc;
@@ -875,7 +875,7 @@ static double uncertainty(double noise, double share, double time_s, double spee
 	return sqrt(noise * noise * line + time_s * time_s * speed * speed);
 }
 
-static double mix(double a, double b, double share)
+static double mix_interpolators(double a, double b, double share)
 {
 	return a + share * (b - a);
 }
@@ -898,10 +898,11 @@ int incise_blade_pose_at(struct incise_blade_pose *blade, int64_t t_ns, double t
 	e = incise_row_share(c->t_ns, d->t_ns, t_ns);
 	time_s = sqrt(d->t_sd_s * d->t_sd_s + t_sd_s * t_sd_s);
 	for (int i = 0; i < 3; i++)
-		value->position_mm[i] = mix(a->position_mm[i], b->position_mm[i], s);
+		value->position_mm[i] =
+			mix_interpolators(a->position_mm[i], b->position_mm[i], s);
 	slerp(blade, s, value->q);
-	value->depth_mm = mix(c->depth_mm, d->depth_mm, e);
-	value->velocity_mm_s = mix(c->velocity_mm_s, d->velocity_mm_s, e);
+	value->depth_mm = mix_interpolators(c->depth_mm, d->depth_mm, e);
+	value->velocity_mm_s = mix_interpolators(c->velocity_mm_s, d->velocity_mm_s, e);
 	value->acceleration_mm_s2 =
 		isnan(e) ? NAN : loop_acceleration(&blade->loop, t_ns);
 	/* A record without an orientation has none to take a part of. */
@@ -913,10 +914,11 @@ int incise_blade_pose_at(struct incise_blade_pose *blade, int64_t t_ns, double t
 						 (const double[3])INCISE_SCALPEL_AXIS,
 						 blade->progress.normal);
 	value->time_in_tissue_s = isnan(e) ? NAN : time_in_tissue(blade, t_ns);
-	value->position_u_mm = uncertainty(mix(c->noise_mm, d->noise_mm, e), s, time_s,
-					   blade->speed_mm_s);
-	value->depth_u_mm = uncertainty(mix(c->depth_noise_mm, d->depth_noise_mm, e), e,
-					time_s, blade->rate_mm_s);
+	value->position_u_mm = uncertainty(mix_interpolators(c->noise_mm, d->noise_mm, e),
+					   s, time_s, blade->speed_mm_s);
+	value->depth_u_mm =
+		uncertainty(mix_interpolators(c->depth_noise_mm, d->depth_noise_mm, e), e,
+			    time_s, blade->rate_mm_s);
 	value->cut = !isnan(e) && incise_cut_step(&blade->cut, value->depth_mm)
 			     ? blade->cut.count
 			     : 0;
@@ -950,7 +952,8 @@ void incise_blade_pose_budget(const struct incise_blade_pose *blade, int64_t t_n
 	row->acceleration_mm_s2 =
 		isnan(e) ? NAN : (d->velocity_mm_s - c->velocity_mm_s) / step_s;
 	for (int i = 0; i < 3; i++)
-		row->direction[i] = mix(c->vector_mm_s[i], d->vector_mm_s[i], e);
+		row->direction[i] =
+			mix_interpolators(c->vector_mm_s[i], d->vector_mm_s[i], e);
 	speed = v3_length(row->direction);
 	for (int i = 0; i < 3; i++)
 		row->direction[i] /= speed;

@@ -36,7 +36,7 @@ enum opcode {
 
 static const unsigned char magic[8] = {0x89, 'M', 'C', 'A', 'P', '0', '\r', '\n'};
 
-static unsigned char *grow(struct incise_mcap_bytes *bytes, size_t n)
+static unsigned char *grow_mcap(struct incise_mcap_bytes *bytes, size_t n)
 {
 	unsigned char *at;
 
@@ -56,26 +56,26 @@ static unsigned char *grow(struct incise_mcap_bytes *bytes, size_t n)
 	return at;
 }
 
-static void put(struct incise_mcap_bytes *bytes, const void *data, size_t n)
+static void put_mcap(struct incise_mcap_bytes *bytes, const void *data, size_t n)
 {
-	unsigned char *at = n ? grow(bytes, n) : NULL;
+	unsigned char *at = n ? grow_mcap(bytes, n) : NULL;
 
 	if (at)
 		memcpy(at, data, n);
 }
 
-static void put_number(struct incise_mcap_bytes *bytes, uint64_t value, int size)
+static void put_mcap_number(struct incise_mcap_bytes *bytes, uint64_t value, int size)
 {
-	unsigned char *at = grow(bytes, size);
+	unsigned char *at = grow_mcap(bytes, size);
 
 	for (int i = 0; at && i < size; i++)
 		at[i] = value >> (8 * i);
 }
 
-static void put_text(struct incise_mcap_bytes *bytes, const char *text)
+static void put_mcap_text(struct incise_mcap_bytes *bytes, const char *text)
 {
-	put_number(bytes, strlen(text), 4);
-	put(bytes, text, strlen(text));
+	put_mcap_number(bytes, strlen(text), 4);
+	put_mcap(bytes, text, strlen(text));
 }
 
 /* Fill in a length, now that its end is written. */
@@ -92,10 +92,10 @@ static void put_pairs(struct incise_mcap_bytes *bytes,
 {
 	size_t at = bytes->n;
 
-	put_number(bytes, 0, 4);
+	put_mcap_number(bytes, 0, 4);
 	for (int i = 0; i < provenance->n; i++) {
-		put_text(bytes, provenance->items[i].key);
-		put_text(bytes, provenance->items[i].value);
+		put_mcap_text(bytes, provenance->items[i].key);
+		put_mcap_text(bytes, provenance->items[i].value);
 	}
 	close_length(bytes, at, 4);
 }
@@ -111,16 +111,16 @@ static void write_bytes(struct incise_mcap *mcap, const void *data, size_t n)
 	mcap->at += n;
 }
 
-static struct incise_mcap_bytes *begin(struct incise_mcap *mcap, enum opcode opcode)
+static struct incise_mcap_bytes *begin_mcap(struct incise_mcap *mcap, enum opcode opcode)
 {
 	mcap->record.n = 0;
-	put_number(&mcap->record, opcode, 1);
-	put_number(&mcap->record, 0, 8);
+	put_mcap_number(&mcap->record, opcode, 1);
+	put_mcap_number(&mcap->record, 0, 8);
 	return &mcap->record;
 }
 
 /* Write the record, or add it to @summary if that is not NULL. */
-static void end(struct incise_mcap *mcap, struct incise_mcap_bytes *summary)
+static void end_mcap(struct incise_mcap *mcap, struct incise_mcap_bytes *summary)
 {
 	close_length(&mcap->record, 1, 8);
 	if (mcap->record.failed && !mcap->rc)
@@ -128,39 +128,39 @@ static void end(struct incise_mcap *mcap, struct incise_mcap_bytes *summary)
 	if (!summary)
 		write_bytes(mcap, mcap->record.data, mcap->record.n);
 	else
-		put(summary, mcap->record.data, mcap->record.n);
+		put_mcap(summary, mcap->record.data, mcap->record.n);
 	if (summary && summary->failed && !mcap->rc)
 		mcap->rc = -ENOMEM;
 }
 
 static void write_schema(struct incise_mcap *mcap, int i)
 {
-	struct incise_mcap_bytes *to = begin(mcap, SCHEMA);
+	struct incise_mcap_bytes *to = begin_mcap(mcap, SCHEMA);
 
-	put_number(to, i + 1, 2); /* 0 would be none */
-	put_text(to, mcap->channels[i].schema_name);
-	put_text(to, mcap->channels[i].schema_encoding);
-	put_text(to, mcap->channels[i].schema);
-	end(mcap, NULL);
+	put_mcap_number(to, i + 1, 2); /* 0 would be none */
+	put_mcap_text(to, mcap->channels[i].schema_name);
+	put_mcap_text(to, mcap->channels[i].schema_encoding);
+	put_mcap_text(to, mcap->channels[i].schema);
+	end_mcap(mcap, NULL);
 }
 
 static void write_channel(struct incise_mcap *mcap, int i)
 {
-	struct incise_mcap_bytes *to = begin(mcap, CHANNEL);
+	struct incise_mcap_bytes *to = begin_mcap(mcap, CHANNEL);
 	size_t at;
 
-	put_number(to, i, 2);
-	put_number(to, i + 1, 2);
-	put_text(to, mcap->channels[i].topic);
-	put_text(to, mcap->channels[i].encoding);
+	put_mcap_number(to, i, 2);
+	put_mcap_number(to, i + 1, 2);
+	put_mcap_text(to, mcap->channels[i].topic);
+	put_mcap_text(to, mcap->channels[i].encoding);
 	at = to->n;
-	put_number(to, 0, 4);
+	put_mcap_number(to, 0, 4);
 	if (mcap->channels[i].qos) {
-		put_text(to, "offered_qos_profiles");
-		put_text(to, mcap->channels[i].qos);
+		put_mcap_text(to, "offered_qos_profiles");
+		put_mcap_text(to, mcap->channels[i].qos);
 	}
 	close_length(to, at, 4);
-	end(mcap, NULL);
+	end_mcap(mcap, NULL);
 }
 
 /* A map from the channels to a number each; those of 0 may be left out. */
@@ -169,11 +169,11 @@ static void put_channels(struct incise_mcap_bytes *to, const struct incise_mcap 
 {
 	size_t at = to->n;
 
-	put_number(to, 0, 4);
+	put_mcap_number(to, 0, 4);
 	for (int i = 0; i < mcap->n_channels; i++)
 		if (zeros || numbers[i]) {
-			put_number(to, i, 2);
-			put_number(to, numbers[i], 8);
+			put_mcap_number(to, i, 2);
+			put_mcap_number(to, numbers[i], 8);
 		}
 	close_length(to, at, 4);
 }
@@ -183,16 +183,16 @@ static void write_chunk(struct incise_mcap *mcap)
 {
 	uint64_t start = mcap->at, length, indexes;
 	uint64_t offsets[INCISE_MCAP_CHANNELS_MAX];
-	struct incise_mcap_bytes *to = begin(mcap, CHUNK);
+	struct incise_mcap_bytes *to = begin_mcap(mcap, CHUNK);
 
-	put_number(to, mcap->chunk_first_ns, 8);
-	put_number(to, mcap->chunk_last_ns, 8);
-	put_number(to, mcap->chunk.n, 8);
-	put_number(to, (uint32_t)crc32_z(0, mcap->chunk.data, mcap->chunk.n), 4);
-	put_text(to, ""); /* not compressed */
-	put_number(to, mcap->chunk.n, 8);
-	put(to, mcap->chunk.data, mcap->chunk.n);
-	end(mcap, NULL);
+	put_mcap_number(to, mcap->chunk_first_ns, 8);
+	put_mcap_number(to, mcap->chunk_last_ns, 8);
+	put_mcap_number(to, mcap->chunk.n, 8);
+	put_mcap_number(to, (uint32_t)crc32_z(0, mcap->chunk.data, mcap->chunk.n), 4);
+	put_mcap_text(to, ""); /* not compressed */
+	put_mcap_number(to, mcap->chunk.n, 8);
+	put_mcap(to, mcap->chunk.data, mcap->chunk.n);
+	end_mcap(mcap, NULL);
 	length = mcap->at - start;
 	indexes = mcap->at;
 	for (int i = 0; i < mcap->n_channels; i++) {
@@ -201,24 +201,24 @@ static void write_chunk(struct incise_mcap *mcap)
 		offsets[i] = index->n ? mcap->at : 0;
 		if (!index->n)
 			continue;
-		to = begin(mcap, MESSAGE_INDEX);
-		put_number(to, i, 2);
-		put_number(to, index->n, 4);
-		put(to, index->data, index->n);
-		end(mcap, NULL);
+		to = begin_mcap(mcap, MESSAGE_INDEX);
+		put_mcap_number(to, i, 2);
+		put_mcap_number(to, index->n, 4);
+		put_mcap(to, index->data, index->n);
+		end_mcap(mcap, NULL);
 		index->n = 0;
 	}
-	to = begin(mcap, CHUNK_INDEX);
-	put_number(to, mcap->chunk_first_ns, 8);
-	put_number(to, mcap->chunk_last_ns, 8);
-	put_number(to, start, 8);
-	put_number(to, length, 8);
+	to = begin_mcap(mcap, CHUNK_INDEX);
+	put_mcap_number(to, mcap->chunk_first_ns, 8);
+	put_mcap_number(to, mcap->chunk_last_ns, 8);
+	put_mcap_number(to, start, 8);
+	put_mcap_number(to, length, 8);
 	put_channels(to, mcap, offsets, false);
-	put_number(to, mcap->at - indexes, 8);
-	put_text(to, "");
-	put_number(to, mcap->chunk.n, 8);
-	put_number(to, mcap->chunk.n, 8);
-	end(mcap, &mcap->chunk_indexes);
+	put_mcap_number(to, mcap->at - indexes, 8);
+	put_mcap_text(to, "");
+	put_mcap_number(to, mcap->chunk.n, 8);
+	put_mcap_number(to, mcap->chunk.n, 8);
+	end_mcap(mcap, &mcap->chunk_indexes);
 	mcap->chunks++;
 	mcap->chunk.n = 0;
 }
@@ -229,8 +229,8 @@ int incise_mcap_message(struct incise_mcap *mcap, int channel, uint64_t t_ns,
 	struct incise_mcap_channel *of = &mcap->channels[channel];
 	struct incise_mcap_bytes *to = &mcap->chunk;
 
-	put_number(&of->index, t_ns, 8);
-	put_number(&of->index, to->n, 8);
+	put_mcap_number(&of->index, t_ns, 8);
+	put_mcap_number(&of->index, to->n, 8);
 	if (!to->n || t_ns < mcap->chunk_first_ns)
 		mcap->chunk_first_ns = t_ns;
 	if (!to->n || t_ns > mcap->chunk_last_ns)
@@ -239,13 +239,13 @@ int incise_mcap_message(struct incise_mcap *mcap, int channel, uint64_t t_ns,
 		mcap->first_ns = t_ns;
 	if ((!to->n && !mcap->chunks) || t_ns > mcap->last_ns)
 		mcap->last_ns = t_ns;
-	put_number(to, MESSAGE, 1);
-	put_number(to, 22 + length, 8);
-	put_number(to, channel, 2);
-	put_number(to, of->messages++, 4); /* modulo 2^32, which readers accept */
-	put_number(to, t_ns, 8);	   /* log_time */
-	put_number(to, t_ns, 8);	   /* publish_time */
-	put(to, data, length);
+	put_mcap_number(to, MESSAGE, 1);
+	put_mcap_number(to, 22 + length, 8);
+	put_mcap_number(to, channel, 2);
+	put_mcap_number(to, of->messages++, 4); /* modulo 2^32, which readers accept */
+	put_mcap_number(to, t_ns, 8);		/* log_time */
+	put_mcap_number(to, t_ns, 8);		/* publish_time */
+	put_mcap(to, data, length);
 	if ((to->failed || of->index.failed) && !mcap->rc)
 		mcap->rc = -ENOMEM;
 	if (to->n >= CHUNK_SIZE && !mcap->rc)
@@ -259,10 +259,10 @@ void incise_mcap_begin(struct incise_mcap *mcap, FILE *out, const char *profile)
 
 	*mcap = (struct incise_mcap){.out = out};
 	write_bytes(mcap, magic, sizeof(magic));
-	to = begin(mcap, HEADER);
-	put_text(to, profile);
-	put_text(to, "incise " INCISE_VERSION);
-	end(mcap, NULL);
+	to = begin_mcap(mcap, HEADER);
+	put_mcap_text(to, profile);
+	put_mcap_text(to, "incise " INCISE_VERSION);
+	end_mcap(mcap, NULL);
 }
 
 int incise_mcap_channel(struct incise_mcap *mcap,
@@ -280,36 +280,36 @@ void incise_mcap_metadata(struct incise_mcap *mcap, const char *name,
 			  const struct incise_provenance *provenance)
 {
 	uint64_t start = mcap->at;
-	struct incise_mcap_bytes *to = begin(mcap, METADATA);
+	struct incise_mcap_bytes *to = begin_mcap(mcap, METADATA);
 
-	put_text(to, name);
+	put_mcap_text(to, name);
 	put_pairs(to, provenance);
-	end(mcap, NULL);
-	to = begin(mcap, METADATA_INDEX);
-	put_number(to, start, 8);
-	put_number(to, mcap->at - start, 8);
-	put_text(to, name);
-	end(mcap, &mcap->metadata_index);
+	end_mcap(mcap, NULL);
+	to = begin_mcap(mcap, METADATA_INDEX);
+	put_mcap_number(to, start, 8);
+	put_mcap_number(to, mcap->at - start, 8);
+	put_mcap_text(to, name);
+	end_mcap(mcap, &mcap->metadata_index);
 	mcap->metadata++;
 }
 
 static void write_statistics(struct incise_mcap *mcap)
 {
-	struct incise_mcap_bytes *to = begin(mcap, STATISTICS);
+	struct incise_mcap_bytes *to = begin_mcap(mcap, STATISTICS);
 	uint64_t counts[INCISE_MCAP_CHANNELS_MAX], messages = 0;
 
 	for (int i = 0; i < mcap->n_channels; i++)
 		messages += counts[i] = mcap->channels[i].messages;
-	put_number(to, messages, 8);
-	put_number(to, mcap->n_channels, 2);
-	put_number(to, mcap->n_channels, 4);
-	put_number(to, 0, 4); /* attachments */
-	put_number(to, mcap->metadata, 4);
-	put_number(to, mcap->chunks, 4);
-	put_number(to, mcap->first_ns, 8);
-	put_number(to, mcap->last_ns, 8);
+	put_mcap_number(to, messages, 8);
+	put_mcap_number(to, mcap->n_channels, 2);
+	put_mcap_number(to, mcap->n_channels, 4);
+	put_mcap_number(to, 0, 4); /* attachments */
+	put_mcap_number(to, mcap->metadata, 4);
+	put_mcap_number(to, mcap->chunks, 4);
+	put_mcap_number(to, mcap->first_ns, 8);
+	put_mcap_number(to, mcap->last_ns, 8);
 	put_channels(to, mcap, counts, true);
-	end(mcap, NULL);
+	end_mcap(mcap, NULL);
 }
 
 /* The records of each kind, and behind them where those of a kind are. */
@@ -337,23 +337,23 @@ static void write_summary(struct incise_mcap *mcap)
 	for (int k = 0; k < 5; k++) {
 		if (starts[k] == starts[k + 1])
 			continue;
-		to = begin(mcap, SUMMARY_OFFSET);
-		put_number(to, order[k], 1);
-		put_number(to, starts[k], 8);
-		put_number(to, starts[k + 1] - starts[k], 8);
-		end(mcap, NULL);
+		to = begin_mcap(mcap, SUMMARY_OFFSET);
+		put_mcap_number(to, order[k], 1);
+		put_mcap_number(to, starts[k], 8);
+		put_mcap_number(to, starts[k + 1] - starts[k], 8);
+		end_mcap(mcap, NULL);
 	}
-	to = begin(mcap, FOOTER);
-	put_number(to, starts[0], 8);
-	put_number(to, starts[5], 8);
-	put_number(to, 0, 4);
+	to = begin_mcap(mcap, FOOTER);
+	put_mcap_number(to, starts[0], 8);
+	put_mcap_number(to, starts[5], 8);
+	put_mcap_number(to, 0, 4);
 	close_length(to, 1, 8);
 	if (to->failed)
 		return;
 	/* The checksum is over the whole summary but itself. */
 	mcap->crc = (uint32_t)crc32_z(mcap->crc, to->data, to->n - 4);
 	to->n -= 4;
-	put_number(to, mcap->crc, 4);
+	put_mcap_number(to, mcap->crc, 4);
 	write_bytes(mcap, to->data, to->n);
 }
 
@@ -365,9 +365,9 @@ int incise_mcap_finish(struct incise_mcap *mcap)
 	if (mcap->chunk.n)
 		write_chunk(mcap);
 	crc = mcap->crc;
-	to = begin(mcap, DATA_END);
-	put_number(to, crc, 4);
-	end(mcap, NULL);
+	to = begin_mcap(mcap, DATA_END);
+	put_mcap_number(to, crc, 4);
+	end_mcap(mcap, NULL);
 	write_summary(mcap);
 	write_bytes(mcap, magic, sizeof(magic));
 	errno = 0;

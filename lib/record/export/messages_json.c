@@ -17,7 +17,7 @@ struct incise_json_member {
 	int cell;
 };
 
-static char *add(char *to, const char *text)
+static char *add_messages_json(char *to, const char *text)
 {
 	return stpcpy(to, text);
 }
@@ -30,9 +30,11 @@ static char *add_value(char *to, const struct incise_table_column *column,
 	case INCISE_COLUMN_REAL:
 		return incise_decimal_real(to, cell->real, column->decimals);
 	case INCISE_COLUMN_FLAG:
-		return add(to, cell->flag ? "true" : "false");
+		return add_messages_json(to, cell->flag ? "true" : "false");
 	case INCISE_COLUMN_TEXT:
-		return add(utf8_copy_printable(add(to, "\""), cell->text, "\"\\"), "\"");
+		return add_messages_json(utf8_copy_printable(add_messages_json(to, "\""),
+							     cell->text, "\"\\"),
+					 "\"");
 	default:
 		return incise_decimal_integer(to, cell->integer);
 	}
@@ -51,12 +53,14 @@ static char *add_uncertainties(char *to, const struct incise_messages *messages,
 		double u = i < 0 ? incise_budget_total(quantity, part)
 				 : part[value->first + i];
 
-		to = add(to, ",\"");
-		to = add(to, i < 0 ? value->total
-				   : incise_budget_parts()[value->first + i].column);
-		to = add(to, "\":");
+		to = add_messages_json(to, ",\"");
+		to = add_messages_json(
+			to, i < 0 ? value->total
+				  : incise_budget_parts()[value->first + i].column);
+		to = add_messages_json(to, "\":");
 		/* JSON has no NaN. */
-		to = isfinite(u) ? incise_decimal_real(to, u, 7) : add(to, "null");
+		to = isfinite(u) ? incise_decimal_real(to, u, 7)
+				 : add_messages_json(to, "null");
 	}
 	return to;
 }
@@ -95,8 +99,8 @@ static int64_t encode_members(struct incise_messages *messages,
 	char *to = messages->text;
 
 	for (const struct incise_json_member *m = kind->members; m->before; m++)
-		to = add_value(add(to, m->before), &stream->columns[m->cell],
-			       &stream->cells[m->cell]);
+		to = add_value(add_messages_json(to, m->before),
+			       &stream->columns[m->cell], &stream->cells[m->cell]);
 	if (messages->pass->budgets && (in_force || in_depth)) {
 		int rc = find_parts(messages, stream, in_depth, part);
 
@@ -106,7 +110,7 @@ static int64_t encode_members(struct incise_messages *messages,
 		     q <= (in_depth ? INCISE_BUDGET_VELOCITY : INCISE_BUDGET_FORCE); q++)
 			to = add_uncertainties(to, messages, q, part);
 	}
-	return add(to, "}") - messages->text;
+	return add_messages_json(to, "}") - messages->text;
 }
 
 static const struct incise_json_member force[] = {

@@ -79,7 +79,7 @@ static void put_data(struct cdr *cdr, const void *data, size_t n)
 	cdr->at += n;
 }
 
-static void put_text(struct cdr *cdr, const char *text)
+static void put_messages_ros2_text(struct cdr *cdr, const char *text)
 {
 	put_u32(cdr, (uint32_t)strlen(text) + 1);
 	cdr->at = utf8_copy_printable(cdr->at, text, "");
@@ -101,7 +101,7 @@ static struct cdr header_begin(struct incise_messages *messages,
 	struct cdr cdr = cdr_begin(messages);
 
 	put_time(&cdr, incise_message_ns(messages, stream->rows.t_ns));
-	put_text(&cdr, frame);
+	put_messages_ros2_text(&cdr, frame);
 	return cdr;
 }
 
@@ -147,10 +147,10 @@ static int64_t event_message(struct incise_messages *messages,
 
 	put_time(&cdr, incise_message_ns(messages, stream->rows.t_ns));
 	put_u8(&cdr, 20); /* INFO */
-	put_text(&cdr, stream->cells[INCISE_CELL_KIND].text);
-	put_text(&cdr, stream->cells[INCISE_CELL_TEXT].text);
-	put_text(&cdr, "");
-	put_text(&cdr, "");
+	put_messages_ros2_text(&cdr, stream->cells[INCISE_CELL_KIND].text);
+	put_messages_ros2_text(&cdr, stream->cells[INCISE_CELL_TEXT].text);
+	put_messages_ros2_text(&cdr, "");
+	put_messages_ros2_text(&cdr, "");
 	put_u32(&cdr, 0);
 	return cdr_end(&cdr, messages);
 }
@@ -204,7 +204,7 @@ static int64_t frame_message(struct incise_messages *messages,
 		put_u32(&cdr, (uint32_t)frame->height);
 		put_u32(&cdr, (uint32_t)frame->width);
 	}
-	put_text(&cdr, encoding_of(frame->pixels));
+	put_messages_ros2_text(&cdr, encoding_of(frame->pixels));
 	if (frame->pixels != INCISE_PIXELS_MJPEG) {
 		put_u8(&cdr, 0); /* big-endian: no */
 		put_u32(&cdr, (uint32_t)frame->stride);

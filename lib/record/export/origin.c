@@ -66,7 +66,7 @@ static void field(struct reader *in, const char *set, char stop, char *to, size_
 		in->at++;
 }
 
-static void number(struct reader *in, uint64_t *value)
+static void read_origin_number(struct reader *in, uint64_t *value)
 {
 	char text[21];
 
@@ -107,15 +107,15 @@ static void name(struct reader *in, char *to, size_t size)
 	in->at += !in->bad;
 }
 
-static bool parse(struct reader *in, struct incise_origin *origin)
+static bool parse_origin(struct reader *in, struct incise_origin *origin)
 {
 	uint64_t depth;
 
-	number(in, &depth);
+	read_origin_number(in, &depth);
 	origin->depth = depth <= INCISE_ORIGIN_DEPTH_MAX ? (int)depth : 0;
 	field(in, LOWER, ':', origin->kind, sizeof(origin->kind));
 	field(in, DIGITS "abcdef", ':', origin->sha256, sizeof(origin->sha256));
-	number(in, &origin->commit);
+	read_origin_number(in, &origin->commit);
 	field(in, PLAIN, ':', origin->identity, sizeof(origin->identity));
 	if (!strcmp(origin->identity, "-"))
 		*origin->identity = 0;
@@ -136,7 +136,7 @@ bool incise_origin_next(const char *bytes, size_t n, size_t *at,
 			break;
 		in = (struct reader){start + length, bytes + n, false};
 		*at = (size_t)(start - bytes) + length;
-		if (!parse(&in, origin))
+		if (!parse_origin(&in, origin))
 			continue;
 		*at = (size_t)(in.at - bytes);
 		return true;

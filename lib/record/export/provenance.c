@@ -445,8 +445,8 @@ static int add_budget(struct incise_provenance *provenance,
 }
 
 /* Seconds from the first sample; no end: to that of the recording. */
-static void add_part(struct incise_provenance *provenance,
-		     const struct incise_export_options *o)
+static void add_provenance_part(struct incise_provenance *provenance,
+				const struct incise_export_options *o)
 {
 	char end[40] = "", cut[40] = "";
 
@@ -464,7 +464,7 @@ static void add_options(struct incise_provenance *provenance,
 {
 	const char *rows = o->resample ? "resampled" : "raw";
 
-	add_part(provenance, o);
+	add_provenance_part(provenance, o);
 	if (o->depth_bins)
 		incise_provenance_add(provenance, "options",
 				      "averaged in %dx%d bins, at least %d samples%s",

@@ -126,7 +126,7 @@ static void report_camera(const struct resample *r)
 	report->camera_off_mm = fabs(report->camera_ratio - 1) * span_mm;
 }
 
-static double least(double a, double b)
+static double least_resample(double a, double b)
 {
 	return isnan(b) ? a : fmax(a, b);
 }
@@ -157,9 +157,9 @@ static void report_row(struct resample *r, const struct row *row)
 	report->cuts += row->blade.cut && row->blade.cut != r->cut;
 	r->cut = row->blade.cut ? (int)row->blade.cut : r->cut;
 	report->clipped += row->force.clipped;
-	report->depth_max_mm = least(report->depth_max_mm, row->blade.depth_mm);
+	report->depth_max_mm = least_resample(report->depth_max_mm, row->blade.depth_mm);
 	report->velocity_max_mm_s =
-		least(report->velocity_max_mm_s, row->blade.velocity_mm_s);
+		least_resample(report->velocity_max_mm_s, row->blade.velocity_mm_s);
 	report->rows++;
 }
 

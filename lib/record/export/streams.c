@@ -177,7 +177,7 @@ static void fill_cell(struct incise_stream_rows *stream, int i)
 }
 
 /* Go to the next row: 1, 0 at the end, -errno. */
-static int next_row(struct incise_stream_rows *stream, struct incise_error *err)
+static int next_streams_row(struct incise_stream_rows *stream, struct incise_error *err)
 {
 	const struct incise_stream_kind *kind = stream->kind;
 	int rc = incise_rows_next(&stream->rows, err);
@@ -210,7 +210,7 @@ int incise_export_stream(struct incise_stream_rows *stream,
 
 	if (rc)
 		return rc;
-	while ((rc = next_row(stream, err)) > 0) {
+	while ((rc = next_streams_row(stream, err)) > 0) {
 		rc = incise_table_add(&table, stream, err);
 		if (rc)
 			break;
@@ -266,7 +266,7 @@ static int write_messages(struct incise_export_pass *pass, struct incise_table *
 	int rc = 1;
 
 	for (int i = 0; i < table->n_streams && rc >= 0; i++)
-		rc = next_row(&table->streams[i], pass->err);
+		rc = next_streams_row(&table->streams[i], pass->err);
 	while (rc >= 0 && (table->stream = find_earliest(table))) {
 		rc = incise_range_has(&recording->range,
 				      table->stream->rows.t_ns - pass->first_ns, 0)
@@ -276,7 +276,7 @@ static int write_messages(struct incise_export_pass *pass, struct incise_table *
 			rc = incise_export_progress(
 				pass, n, meta->force + meta->tracker + meta->depth);
 		if (!rc)
-			rc = next_row(table->stream, pass->err);
+			rc = next_streams_row(table->stream, pass->err);
 	}
 	return rc < 0 ? rc : 0;
 }

@@ -276,8 +276,8 @@ static int partner(const struct incise_mark *a, int n_a, const struct incise_mar
 }
 
 /* Count the marks of b with a partner; @inside: all between a's first and last mark. */
-static int count(const struct incise_mark *a, int n_a, const struct incise_mark *b,
-		 int n_b, int64_t offset_ns, int64_t from_ns, int *inside)
+static int count_align(const struct incise_mark *a, int n_a, const struct incise_mark *b,
+		       int n_b, int64_t offset_ns, int64_t from_ns, int *inside)
 {
 	int n = 0;
 
@@ -312,7 +312,7 @@ static void match(const struct incise_mark *a, int n_a, const struct incise_mark
 		for (int k = 0; k < n_b; k++) {
 			int64_t offset = a[i].t_ns - b[k].t_ns;
 
-			n = count(a, n_a, b, n_b, offset, b[k].t_ns, &in);
+			n = count_align(a, n_a, b, n_b, offset, b[k].t_ns, &in);
 			if (n <= found->n)
 				continue;
 			*found = (struct found){offset, b[k].t_ns, n, in, 0, 0};
@@ -325,7 +325,7 @@ static void match(const struct incise_mark *a, int n_a, const struct incise_mark
 
 			if (fabs((double)(offset - found->offset_ns)) <= 2 * wide)
 				continue;
-			n = count(a, n_a, b, n_b, offset, b[k].t_ns, &in);
+			n = count_align(a, n_a, b, n_b, offset, b[k].t_ns, &in);
 			found->second = n > found->second ? n : found->second;
 			/* Without the pair that makes the offset. */
 			matched += n - 1;
@@ -368,9 +368,9 @@ static double by_chance(const struct incise_mark *a, int n_a, const struct incis
 }
 
 /* Weighted straight line through the matched marks. */
-static void fit_line(const struct incise_mark *a, int n_a, const struct incise_mark *b,
-		     int n_b, int64_t offset_ns, int64_t from_ns,
-		     struct incise_align_fit *fit)
+static void fit_align_line(const struct incise_mark *a, int n_a,
+			   const struct incise_mark *b, int n_b, int64_t offset_ns,
+			   int64_t from_ns, struct incise_align_fit *fit)
 {
 	double w = 0, x = 0, y = 0, xx = 0, xy = 0, residual = 0, mean_x, mean_y;
 	int n = 0;
@@ -455,8 +455,8 @@ int incise_align_fit(const struct incise_mark *a, int n_a, const struct incise_m
 			err, EDOM,
 			"%d and %d marks match at more than one offset; " TAP_AGAIN, n_a,
 			n_b);
-	back = count(b, n_b, a, n_a, -found.offset_ns, found.from_ns + found.offset_ns,
-		     &inside);
+	back = count_align(b, n_b, a, n_a, -found.offset_ns,
+			   found.from_ns + found.offset_ns, &inside);
 	if (2 * found.n <= found.inside || 2 * back <= inside)
 		return incise_error_set(
 			err, EDOM,
@@ -471,7 +471,7 @@ int incise_align_fit(const struct incise_mark *a, int n_a, const struct incise_m
 			"%d marks match, and would by chance with a probability of up to "
 			"%.2g; tap more often, in an irregular rhythm",
 			found.n, fmin(1, expected));
-	fit_line(a, n_a, b, n_b, found.offset_ns, found.from_ns, fit);
+	fit_align_line(a, n_a, b, n_b, found.offset_ns, found.from_ns, fit);
 	if (fabs(fit->rate) > INCISE_ALIGN_RATE_MAX)
 		return incise_error_set(
 			err, EDOM,

@@ -57,8 +57,8 @@ struct join {
 	struct incise_error *err;
 };
 
-static void note(struct join *join, const char *fmt, ...) INCISE_PRINTF(2, 3);
-static void note(struct join *join, const char *fmt, ...)
+static void note_join(struct join *join, const char *fmt, ...) INCISE_PRINTF(2, 3);
+static void note_join(struct join *join, const char *fmt, ...)
 {
 	char text[300];
 	va_list args;
@@ -161,8 +161,8 @@ static int open_member(struct join *join, const char *path)
 						join->members[i].recording->path,
 						recording->path);
 	if (!recording->meta.complete)
-		note(join, "%s: was interrupted; it is joined up to its last commit",
-		     recording->path);
+		note_join(join, "%s: was interrupted; it is joined up to its last commit",
+			  recording->path);
 	name_member(join, join->n - 1);
 	read_text(member, "host", member->host, sizeof(member->host));
 	read_text(member, "boot", member->boot, sizeof(member->boot));

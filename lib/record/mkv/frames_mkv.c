@@ -234,7 +234,8 @@ static int write_bytes(void *opaque, uint8_t *bytes, int n)
 }
 
 /* Report @rc of libav, and end the file behind its last frame. */
-static int fail(struct writer *w, int rc, const char *what, struct incise_error *err)
+static int fail_frames_mkv(struct writer *w, int rc, const char *what,
+			   struct incise_error *err)
 {
 	int code = w->io_errno ? w->io_errno : AVUNERROR(rc);
 
@@ -329,8 +330,8 @@ static int mux(struct writer *w)
 	return w->io_errno ? AVERROR(w->io_errno) : rc < 0 ? rc : 0;
 }
 
-static bool fits(const struct incise_frames_shape *shape,
-		 const struct incise_camera_frame *frame)
+static bool fits_frames_mkv(const struct incise_frames_shape *shape,
+			    const struct incise_camera_frame *frame)
 {
 	size_t row = incise_frames_row(shape->pixels, shape->width);
 
@@ -356,7 +357,7 @@ static int writer_put(struct incise_frames_writer *writer,
 		return incise_error_set(err, -w->failed,
 					"%.300s: the frames have ended: %s", w->path,
 					strerror(-w->failed));
-	if (!fits(&w->shape, frame))
+	if (!fits_frames_mkv(&w->shape, frame))
 		return incise_error_set(err, EINVAL,
 					"%.300s: a frame of %d × %d, %zu bytes, "
 					"differs from the format of the camera",
@@ -365,7 +366,7 @@ static int writer_put(struct incise_frames_writer *writer,
 	stored->pts_ms = pts_of(w, frame->t_ns);
 	rc = encode(w, frame);
 	if (rc)
-		return fail(w, rc, "a frame cannot be encoded", err);
+		return fail_frames_mkv(w, rc, "a frame cannot be encoded", err);
 	stored->bytes = (uint32_t)w->packet->size;
 	stored->crc = crc_of(w->packet->data, (size_t)w->packet->size);
 	w->packet->pts = w->packet->dts = stored->pts_ms;
@@ -376,12 +377,13 @@ static int writer_put(struct incise_frames_writer *writer,
 		rc = mux(w);
 	av_packet_unref(w->packet);
 	if (rc)
-		return fail(w, rc, "cannot be written", err);
+		return fail_frames_mkv(w, rc, "cannot be written", err);
 	w->good_size = w->size;
 	now = w->sync_ns ? clock_ns() : 0;
 	if (w->sync_ns && now - w->synced_ns >= w->sync_ns) {
 		if (fdatasync(w->fd) && errno != EINVAL)
-			return fail(w, AVERROR(errno), "cannot be synced", err);
+			return fail_frames_mkv(w, AVERROR(errno), "cannot be synced",
+					       err);
 		w->synced_ns = now;
 	}
 	return 0;
@@ -415,9 +417,9 @@ static int writer_close(struct incise_frames_writer *writer, struct incise_error
 	if (!w->failed) {
 		avio_flush(w->format->pb);
 		if (rc < 0 || w->io_errno)
-			fail(w, rc, "cannot be closed", err);
+			fail_frames_mkv(w, rc, "cannot be closed", err);
 		else if (fsync(w->fd) && errno != EINVAL)
-			fail(w, AVERROR(errno), "cannot be synced", err);
+			fail_frames_mkv(w, AVERROR(errno), "cannot be synced", err);
 	} else {
 		incise_error_set(err, -w->failed, "%.300s: the frames have ended: %s",
 				 w->path, strerror(-w->failed));
@@ -546,7 +548,7 @@ static struct incise_frames_writer *writer_new(
 		rc = write_header(w);
 		if (!rc)
 			return &w->writer;
-		rc = fail(w, rc, "cannot be started", err);
+		rc = fail_frames_mkv(w, rc, "cannot be started", err);
 		unlink(path);
 	}
 	writer_free(w);
@@ -620,7 +622,7 @@ static bool is_size(int width, int height)
 }
 
 /* The codec's pixels to the camera's pixels. 0, -EBADMSG, -ENOMEM; sets no error text. */
-static int decode(struct reader *r, struct incise_camera_frame *frame)
+static int decode_frames_mkv(struct reader *r, struct incise_camera_frame *frame)
 {
 	size_t row, size;
 	int rc = avcodec_send_packet(r->codec, r->packet);
@@ -723,7 +725,7 @@ static int reader_next(struct incise_frames_reader *reader,
 	}
 	if (reader->undecoded)
 		return 1;
-	rc = decode(r, frame);
+	rc = decode_frames_mkv(r, frame);
 	if (rc == -ENOMEM)
 		return incise_error_set(err, ENOMEM, "%.300s: out of memory", r->path);
 	return rc ? bad(r, &note, "cannot be decoded", err) : 1;
@@ -763,7 +765,7 @@ static int open_decoder(struct reader *r, const AVCodecParameters *parameters)
 }
 
 /* 0, or a code of libav. */
-static int open_file(struct reader *r)
+static int open_frames_mkv_file(struct reader *r)
 {
 	const AVCodecParameters *codec;
 	AVDictionary *options = NULL;
@@ -813,7 +815,7 @@ static struct incise_frames_reader *reader_new(const char *path, struct incise_e
 		r->reader.ops = &ops;
 		r->path = strdup(path);
 		if (r->path)
-			rc = open_file(r);
+			rc = open_frames_mkv_file(r);
 		if (!rc)
 			return &r->reader;
 		reader_close(&r->reader);

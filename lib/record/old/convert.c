@@ -48,7 +48,7 @@ struct conversion {
 	bool wrote;	     /* blocks, for it */
 };
 
-static int fail(struct conversion *c, struct incise_error *err)
+static int fail_convert(struct conversion *c, struct incise_error *err)
 {
 	const int code = incise_schema_errno(c->writer.db);
 
@@ -107,7 +107,7 @@ static int put_block(struct conversion *c, int stream, struct incise_ledger_bloc
 
 	if (incise_block_writer_put(&c->writer, stream, &s->source.batch, block) !=
 	    SQLITE_OK)
-		return fail(c, err);
+		return fail_convert(c, err);
 	if (c->old->form < 4 && block->last_ns > c->t_ns)
 		c->t_ns = block->last_ns;
 	c->wrote = true;
@@ -148,7 +148,7 @@ static void find_end(struct conversion *c, int stream)
 }
 
 /* Write the stream's next block. 1; 0: nothing is left; -errno. */
-static int advance(struct conversion *c, int stream, struct incise_error *err)
+static int advance_convert(struct conversion *c, int stream, struct incise_error *err)
 {
 	struct stream *s = &c->streams[stream];
 	struct incise_batch *batch = &s->source.batch;
@@ -213,7 +213,7 @@ static int end_commit(struct conversion *c, struct incise_error *err)
 	c->wrote = false;
 	return incise_block_writer_commit(&c->writer, c->t_ns) == SQLITE_OK
 		       ? 0
-		       : fail(c, err);
+		       : fail_convert(c, err);
 }
 
 /* Commits as table seal has them, but for the one that seals the tables. */
@@ -238,7 +238,7 @@ static int write_sealed(struct conversion *c, struct incise_error *err)
 			     k < 2 && rc >= 0 &&
 			     c->streams[i].taken < sqlite3_column_int64(stmt, 2 + i);
 			     k++)
-				rc = advance(c, i, err);
+				rc = advance_convert(c, i, err);
 		if (rc >= 0)
 			rc = end_commit(c, err);
 	}
@@ -257,7 +257,7 @@ static int write_rest(struct conversion *c, struct incise_error *err)
 	while (more && rc >= 0) {
 		more = false;
 		for (int i = 0; i < INCISE_LEDGER_FORMS && rc >= 0; i++) {
-			rc = advance(c, i, err);
+			rc = advance_convert(c, i, err);
 			more |= rc > 0;
 		}
 		if (rc >= 0 && (c->wrote || (!more && !c->writer.seal.next)))
@@ -320,7 +320,7 @@ static int write_summary(struct conversion *c, struct incise_error *err)
 		 "INSERT OR REPLACE INTO meta VALUES('cuts', %d), ('depth_max_mm', "
 		 "%.17e), ('force_max_N', %.17e)",
 		 info.cuts, info.depth_max_mm, info.force_max_N);
-	return run_bound(c, sql, NULL) == SQLITE_OK ? 0 : fail(c, err);
+	return run_bound(c, sql, NULL) == SQLITE_OK ? 0 : fail_convert(c, err);
 }
 
 /* Before format 4 a recording has no identity, which a seal needs. */
@@ -421,13 +421,13 @@ static int open_database(struct conversion *c, const char *file, const char *old
 	}
 	if (rc == SQLITE_OK)
 		rc = sqlite3_exec(db, "BEGIN", NULL, NULL, NULL);
-	return rc == SQLITE_OK ? 0 : fail(c, err);
+	return rc == SQLITE_OK ? 0 : fail_convert(c, err);
 }
 
 static int write_all(struct conversion *c, struct incise_error *err)
 {
 	sqlite3 *db = c->writer.db;
-	int rc = copy_tables(c) == SQLITE_OK ? 0 : fail(c, err), folder;
+	int rc = copy_tables(c) == SQLITE_OK ? 0 : fail_convert(c, err), folder;
 
 	if (!rc)
 		rc = write_summary(c, err);
@@ -437,7 +437,7 @@ static int write_all(struct conversion *c, struct incise_error *err)
 				      "openssl.cnf",
 				      c->folder);
 	if (!rc && incise_block_writer_start(&c->writer, db) != SQLITE_OK)
-		rc = fail(c, err);
+		rc = fail_convert(c, err);
 	if (!rc)
 		rc = open_frames(c, err);
 	for (int i = 0; i < INCISE_LEDGER_FORMS && !rc; i++)
@@ -450,12 +450,12 @@ static int write_all(struct conversion *c, struct incise_error *err)
 		folder = open(c->folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
 		if (folder < 0 || incise_block_writer_seal(&c->writer, folder, true,
 							   c->t_ns) != SQLITE_OK)
-			rc = fail(c, err);
+			rc = fail_convert(c, err);
 		if (folder >= 0)
 			close(folder);
 	}
 	if (!rc && sqlite3_exec(db, "COMMIT", NULL, NULL, NULL) != SQLITE_OK)
-		rc = fail(c, err);
+		rc = fail_convert(c, err);
 	return rc;
 }
 
@@ -503,8 +503,8 @@ static void keep_first(void *user, const struct incise_verify_finding *finding)
 }
 
 /* By its ledger, and its seal. Of format 1 there is none. */
-static int check(struct incise_recording *recording, struct incise_recovered *made,
-		 struct incise_error *err)
+static int check_convert(struct incise_recording *recording,
+			 struct incise_recovered *made, struct incise_error *err)
 {
 	const struct incise_verify_watch watch = {.found = keep_first, .user = made};
 	struct incise_verify_report report;
@@ -520,7 +520,7 @@ static int check_new(const char *folder, struct incise_recovered *made,
 {
 	struct incise_recording *recording =
 		incise_recording_open_as(folder, INCISE_RECORDING_ORIGINAL, err);
-	int rc = recording ? check(recording, made, err) : -errno;
+	int rc = recording ? check_convert(recording, made, err) : -errno;
 
 	incise_recording_close(recording);
 	return rc;
@@ -542,7 +542,7 @@ int incise_recording_convert(const char *folder, const char *path, bool damaged,
 		incise_recording_close(c.old);
 		return 0;
 	}
-	rc = check(c.old, made, err);
+	rc = check_convert(c.old, made, err);
 	/* Messages name the recording that was given. */
 	free(c.old->path);
 	c.old->path = strdup(path);

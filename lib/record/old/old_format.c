@@ -155,7 +155,7 @@ static bool take_value(sqlite3_stmt *stmt, int at, char type, union incise_colum
 	}
 }
 
-static bool take_row(struct incise_source *source)
+static bool take_old_format_row(struct incise_source *source)
 {
 	struct incise_batch *batch = &source->batch;
 	bool good = true;
@@ -178,7 +178,7 @@ static int next_rows(struct incise_source *source, struct incise_error *err)
 	while (batch->n < source->rows_max &&
 	       (source->held || (rc = incise_source_step(source)) == SQLITE_ROW)) {
 		source->held = false;
-		if (take_row(source)) {
+		if (take_old_format_row(source)) {
 			batch->n++;
 			continue;
 		}

@@ -36,7 +36,8 @@ static void put_digest(struct incise_old_rows *row, const uint8_t *bytes)
 	row->n += INCISE_FRAMES_DIGEST;
 }
 
-static void put_text(struct incise_old_rows *row, const char *text, size_t length)
+static void put_old_ledger_text(struct incise_old_rows *row, const char *text,
+				size_t length)
 {
 	memset(row->bytes + row->n, 0, INCISE_LEDGER_TEXT + 1);
 	memcpy(row->bytes + row->n, text, length);
@@ -89,8 +90,9 @@ static bool read_row(struct incise_old_rows *row)
 			if (type != SQLITE_TEXT || !sqlite3_column_text(stmt, i) ||
 			    sqlite3_column_bytes(stmt, i) > INCISE_LEDGER_TEXT)
 				return false;
-			put_text(row, (const char *)sqlite3_column_text(stmt, i),
-				 sqlite3_column_bytes(stmt, i));
+			put_old_ledger_text(row,
+					    (const char *)sqlite3_column_text(stmt, i),
+					    sqlite3_column_bytes(stmt, i));
 			break;
 		}
 	}

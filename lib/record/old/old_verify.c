@@ -26,7 +26,7 @@ struct walk {
 };
 
 /* Read the next row into walk->row. Returns 0; -EIO: SQLite cannot, -ECANCELED. */
-static int next_row(struct walk *walk)
+static int next_old_verify_row(struct walk *walk)
 {
 	struct incise_verify_walk *w = walk->of;
 	struct incise_verification *verify = w->verify;
@@ -41,7 +41,7 @@ static int next_row(struct walk *walk)
 }
 
 /* Add the row to the chains, and read the next. Returns as next_row(). */
-static int take_row(struct walk *walk, bool *good)
+static int take_old_verify_row(struct walk *walk, bool *good)
 {
 	struct incise_verify_walk *w = walk->of;
 
@@ -55,7 +55,7 @@ static int take_row(struct walk *walk, bool *good)
 	*good &= walk->rows.good;
 	for (int i = 0; i < walk->chains; i++)
 		incise_old_ledger_add(&walk->chain[i], &walk->rows);
-	return next_row(walk);
+	return next_old_verify_row(walk);
 }
 
 /*
@@ -78,7 +78,7 @@ static int skip_blocks(struct walk *walk, const struct incise_ledger_block *bloc
 			found.first_seq = walk->rows.seq;
 			found.first_ns = walk->rows.t_ns;
 		}
-		rc = take_row(walk, &good);
+		rc = take_old_verify_row(walk, &good);
 		found.last_seq = w->last_seq;
 		found.last_ns = w->last_ns;
 	}
@@ -112,7 +112,7 @@ static int take_block(struct walk *walk, const struct incise_ledger_block *block
 	int match = -1, rc = 0;
 
 	while (!rc && walk->rows.has_row && walk->rows.seq <= block->last_seq)
-		rc = take_row(walk, &good);
+		rc = take_old_verify_row(walk, &good);
 	if (rc == -ECANCELED)
 		return rc;
 	for (int i = 0; i < walk->chains; i++) {
@@ -163,7 +163,7 @@ static int take_extra(struct walk *walk)
 	found.first_seq = walk->rows.seq;
 	found.first_ns = walk->rows.t_ns;
 	while (!rc && walk->rows.has_row) {
-		rc = take_row(walk, &good);
+		rc = take_old_verify_row(walk, &good);
 		found.count++;
 	}
 	if (rc == -ECANCELED)
@@ -185,7 +185,7 @@ static int walk_through(struct walk *walk)
 	struct incise_ledger_block block;
 	int64_t end_seq = INT64_MIN;
 	bool ended = false;
-	int rc = next_row(walk), step;
+	int rc = next_old_verify_row(walk), step;
 
 	while (!rc && (rc = step = incise_verify_step_block(w)) > 0) {
 		bool good = incise_verify_read_block(w, &block);

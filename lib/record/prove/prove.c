@@ -94,7 +94,7 @@ static void report_difference(struct prove *prove, const char *fmt, ...)
 }
 
 /* The line behind this one; "" behind the last, which may end without a newline in a forgery. */
-static const char *next_line(const char *line)
+static const char *next_prove_line(const char *line)
 {
 	line = strchrnul(line, '\n');
 	return line + (*line != 0);
@@ -104,7 +104,7 @@ static const char *next_line(const char *line)
 static void find_active(const char *list, char sha256[65])
 {
 	*sha256 = 0;
-	for (const char *line = list; *line; line = next_line(line))
+	for (const char *line = list; *line; line = next_prove_line(line))
 		if (sscanf(line, "calibration %*s %64[0-9a-f]", sha256) != 1)
 			*sha256 = 0;
 }
@@ -115,7 +115,7 @@ static bool compare_calibration(const char *now, const char *then, struct prove 
 	bool kept = !strncmp(now, then, strlen(then)), known;
 	char read_by[65], signed_as[65], name[200] = "";
 
-	for (const char *line = now; *line; line = next_line(line))
+	for (const char *line = now; *line; line = next_prove_line(line))
 		sscanf(line, "calibration %199s", name);
 	find_active(now, read_by);
 	find_active(then, signed_as);

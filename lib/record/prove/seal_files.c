@@ -51,7 +51,7 @@ static bool parse_name(const char *name, struct incise_seal_file *file)
 }
 
 /* Read it, or say why not. Returns 0 or -ENOMEM. */
-static int read_file(int folder, struct incise_seal_file *file)
+static int read_seal_files_file(int folder, struct incise_seal_file *file)
 {
 	size_t most = kinds[file->kind].size_max;
 	/* A pipe that nobody writes is not waited for. */
@@ -107,7 +107,7 @@ static int add_file(struct incise_seal_files *files, int folder, const char *nam
 					"%s: more than %d files; keep those of "
 					"signers that count",
 					path, FILES_MAX);
-	if (read_file(folder, &file))
+	if (read_seal_files_file(folder, &file))
 		return incise_error_set(err, ENOMEM, "%s: out of memory", path);
 	files->all[files->n++] = file;
 	return 0;

@@ -23,7 +23,8 @@ struct incise_frame_reader {
 	uint64_t passed; /* frames of the file */
 };
 
-static int open_file(struct incise_frame_reader *reader, struct incise_error *err)
+static int open_frame_reader_file(struct incise_frame_reader *reader,
+				  struct incise_error *err)
 {
 	char *path;
 
@@ -53,7 +54,7 @@ struct incise_frame_reader *incise_frame_reader_new(struct incise_recording *rec
 			reader->recording = camera->file;
 			reader->map = camera->map;
 		}
-		rc = reader->recording ? open_file(reader, err) : -errno;
+		rc = reader->recording ? open_frame_reader_file(reader, err) : -errno;
 	}
 	if (!rc)
 		return reader;
@@ -122,7 +123,7 @@ int incise_frame_reader_at(struct incise_frame_reader *reader, int64_t t_ns,
 			  &seq, &row_ns, &number, err);
 
 	if (!rc && number < reader->passed)
-		rc = open_file(reader, err);
+		rc = open_frame_reader_file(reader, err);
 	if (rc)
 		return rc;
 	do {

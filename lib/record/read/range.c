@@ -39,7 +39,7 @@ struct walk {
  * Note a place outside, where the blade has been clear of the tissue for a while, so that its smoothed depth is,
  * too; in a cut the one before it stays.
  */
-static void note(struct walk *walk, int64_t t_ns, double depth_mm)
+static void note_range(struct walk *walk, int64_t t_ns, double depth_mm)
 {
 	const int64_t apart_ns = walk->settled_ns / (PLACES / 4);
 
@@ -68,14 +68,14 @@ static void init_walk(struct walk *walk, double tracker_hz)
 }
 
 /* Add a depth. Returns whether the range begins there, or the cut that is asked for has ended. */
-static bool step(struct walk *walk, struct incise_recording_range *range, int64_t from_ns,
-		 int64_t t_ns, double depth_mm)
+static bool step_range(struct walk *walk, struct incise_recording_range *range,
+		       int64_t from_ns, int64_t t_ns, double depth_mm)
 {
 	const bool inside = walk->cut.inside;
 
 	incise_cut_step(&walk->cut, depth_mm);
 	if (!inside)
-		note(walk, t_ns, depth_mm);
+		note_range(walk, t_ns, depth_mm);
 	else
 		walk->clear_ns = t_ns;
 	if (!range->cut)
@@ -85,9 +85,9 @@ static bool step(struct walk *walk, struct incise_recording_range *range, int64_
 }
 
 /* Follow the depths behind a time, when the blade was outside, to where the range begins. */
-static int follow(struct incise_recording *recording, struct walk *walk,
-		  int64_t behind_ns, struct incise_recording_range *range,
-		  int64_t from_ns, struct incise_error *err)
+static int follow_range(struct incise_recording *recording, struct walk *walk,
+			int64_t behind_ns, struct incise_recording_range *range,
+			int64_t from_ns, struct incise_error *err)
 {
 	struct incise_source source;
 	bool found = false;
@@ -101,8 +101,9 @@ static int follow(struct incise_recording *recording, struct walk *walk,
 		for (size_t k = 0; k < source.batch.n && !found; k++) {
 			const int64_t t_ns = source.batch.column[1].i[k];
 
-			found = t_ns > behind_ns && step(walk, range, from_ns, t_ns,
-							 source.batch.column[2].r[k]);
+			found = t_ns > behind_ns &&
+				step_range(walk, range, from_ns, t_ns,
+					   source.batch.column[2].r[k]);
 		}
 	incise_source_close(&source);
 	return rc < 0 ? rc : 0;
@@ -150,8 +151,8 @@ static int find_begin(struct incise_recording *recording,
 		init_walk(&walk, recording->numbers.tracker_hz);
 		walk.cut.count = (int)at;
 		walk.clear_ns = at ? ends_ns[at - 1] : 0;
-		rc = follow(recording, &walk, at ? ends_ns[at - 1] : INT64_MIN, range,
-			    from_ns, err);
+		rc = follow_range(recording, &walk, at ? ends_ns[at - 1] : INT64_MIN,
+				  range, from_ns, err);
 		if (!at || walk.begin.t_ns != INT64_MIN)
 			break;
 	}

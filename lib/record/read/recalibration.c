@@ -52,7 +52,7 @@ bool incise_recalibration_parse(const char *name, struct incise_recalibration *e
 	return true;
 }
 
-static int compare(const void *a, const void *b)
+static int compare_recalibration(const void *a, const void *b)
 {
 	return strcmp(((const struct incise_recalibration *)a)->file,
 		      ((const struct incise_recalibration *)b)->file);
@@ -109,7 +109,7 @@ int incise_recalibration_list(const char *folder, struct incise_recalibration **
 	if (n <= 0)
 		return n;
 	/* The name of the first one is empty. */
-	qsort(*list, (size_t)n, sizeof(**list), compare);
+	qsort(*list, (size_t)n, sizeof(**list), compare_recalibration);
 	(*list)[(*list)[n - 1].original ? 0 : n - 1].active = true;
 	return n;
 }
@@ -165,7 +165,8 @@ int incise_recalibrations(const char *path, struct incise_recalibration **list,
 /* --- reading by the active one -------------------------------------------------------- */
 
 /* Returns 0 or -errno. */
-static int run(struct incise_recording *rec, char *sql, struct incise_error *err)
+static int run_recalibration(struct incise_recording *rec, char *sql,
+			     struct incise_error *err)
 {
 	int rc = SQLITE_NOMEM;
 
@@ -178,15 +179,16 @@ static int run(struct incise_recording *rec, char *sql, struct incise_error *err
 		   : incise_schema_no_memory(rec->path, err);
 }
 
-static int put_number(struct incise_recording *rec, const char *key, double value,
-		      struct incise_error *err)
+static int put_recalibration_number(struct incise_recording *rec, const char *key,
+				    double value, struct incise_error *err)
 {
 	if (isnan(value))
 		return 0;
-	return run(rec,
-		   sqlite3_mprintf("INSERT OR REPLACE INTO temp.meta VALUES(%Q, %!.17g)",
-				   key, value),
-		   err);
+	return run_recalibration(
+		rec,
+		sqlite3_mprintf("INSERT OR REPLACE INTO temp.meta VALUES(%Q, %!.17g)",
+				key, value),
+		err);
 }
 
 /* Make table meta of this connection, which comes before that of recording.db. */
@@ -205,18 +207,19 @@ static int put_meta(struct incise_recording *rec,
 		{"tip_y_mm", calibration->tip_mm[1]},
 		{"tip_z_mm", calibration->tip_mm[2]},
 	};
-	int rc = run(rec,
-		     sqlite3_mprintf("CREATE TEMP TABLE meta(key TEXT PRIMARY KEY NOT "
-				     "NULL, value); "
-				     "INSERT INTO temp.meta SELECT key, value FROM "
-				     "main.meta; "
-				     "INSERT OR REPLACE INTO temp.meta "
-				     "VALUES('calibration_conf', %Q)",
-				     text),
-		     err);
+	int rc = run_recalibration(
+		rec,
+		sqlite3_mprintf("CREATE TEMP TABLE meta(key TEXT PRIMARY KEY NOT "
+				"NULL, value); "
+				"INSERT INTO temp.meta SELECT key, value FROM "
+				"main.meta; "
+				"INSERT OR REPLACE INTO temp.meta "
+				"VALUES('calibration_conf', %Q)",
+				text),
+		err);
 
 	for (size_t i = 0; i < sizeof(numbers) / sizeof(*numbers) && !rc; i++)
-		rc = put_number(rec, numbers[i].key, numbers[i].value, err);
+		rc = put_recalibration_number(rec, numbers[i].key, numbers[i].value, err);
 	return rc;
 }
 
@@ -234,8 +237,8 @@ static struct incise_calibration own_calibration(const struct incise_recording_i
 }
 
 /* The values of a calibration in the folder, over those of the capture. */
-static int load(struct incise_recording *rec, struct incise_recalibrated *to,
-		struct incise_error *err)
+static int load_recalibration(struct incise_recording *rec,
+			      struct incise_recalibrated *to, struct incise_error *err)
 {
 	struct incise_error why = {0};
 	char *path;
@@ -279,7 +282,7 @@ int incise_recalibration_apply(struct incise_recording *rec, struct incise_error
 	}
 	rec->recalibrated->entry = list[n - 1];
 	text = read_text(rec->path, &rec->recalibrated->entry, err);
-	rc = text ? load(rec, rec->recalibrated, err) : -errno;
+	rc = text ? load_recalibration(rec, rec->recalibrated, err) : -errno;
 	if (!rc)
 		rc = put_meta(rec, &rec->recalibrated->calibration, text, err);
 out:

@@ -26,16 +26,16 @@
 
 /* --- values of a row ---------------------------------------------------------------- */
 
-static int damaged(struct incise_recording *rec, const char *table, const char *what,
-		   struct incise_error *err)
+static int damaged_recording(struct incise_recording *rec, const char *table,
+			     const char *what, struct incise_error *err)
 {
 	return incise_error_set(err, EINVAL, "%s: damaged: table %s: %s", rec->path,
 				table, what);
 }
 
 /* A text without control characters, which a terminal would obey. */
-static bool take_text(sqlite3_stmt *stmt, int column, bool optional, char *to,
-		      size_t size)
+static bool take_recording_text(sqlite3_stmt *stmt, int column, bool optional, char *to,
+				size_t size)
 {
 	/* The type first: sqlite3_column_text() converts any value. */
 	int type = sqlite3_column_type(stmt, column);
@@ -85,7 +85,7 @@ static bool take_item(sqlite3_stmt *stmt, const struct item *item)
 {
 	switch (item->type) {
 	case TEXT:
-		return take_text(stmt, 0, false, item->to, item->size);
+		return take_recording_text(stmt, 0, false, item->to, item->size);
 	case COUNT:
 		return take_count(stmt, 0, item->to);
 	case REAL_OR_NAN:
@@ -265,8 +265,8 @@ int incise_recording_need_zero(const struct incise_recording *rec,
 static bool take_stream(sqlite3_stmt *stmt, struct incise_stream *s)
 {
 	s->timestamped = sqlite3_column_int(stmt, 2);
-	return take_text(stmt, 0, true, s->name, sizeof(s->name)) && *s->name &&
-	       take_text(stmt, 1, true, s->device, sizeof(s->device)) &&
+	return take_recording_text(stmt, 0, true, s->name, sizeof(s->name)) && *s->name &&
+	       take_recording_text(stmt, 1, true, s->device, sizeof(s->device)) &&
 	       take_known(stmt, 3, 1, &s->nominal_hz) &&
 	       take_known(stmt, 4, 1e-6, &s->delay_ms) &&
 	       take_known(stmt, 5, 1e-6, &s->delay_sd_ms) &&
@@ -278,7 +278,7 @@ static bool take_stream(sqlite3_stmt *stmt, struct incise_stream *s)
 	       take_known(stmt, 13, 1e-6, &s->jitter_max_ms) &&
 	       take_known(stmt, 14, 1e-6, &s->offset_ms) &&
 	       take_known(stmt, 15, 1e-6, &s->offset_sd_ms) &&
-	       take_text(stmt, 16, true, s->ended, sizeof(s->ended));
+	       take_recording_text(stmt, 16, true, s->ended, sizeof(s->ended));
 }
 
 /* Table streams, and what the sources need of it. Returns the number of its rows, or -errno. */
@@ -299,7 +299,8 @@ static int read_table(struct incise_recording *rec, struct incise_error *err)
 		struct incise_stream *s = &rec->table[n++];
 
 		if (!take_stream(stmt, s)) {
-			n = damaged(rec, "streams", "a value is out of range", err);
+			n = damaged_recording(rec, "streams", "a value is out of range",
+					      err);
 			sqlite3_finalize(stmt);
 			return n;
 		}
@@ -308,7 +309,7 @@ static int read_table(struct incise_recording *rec, struct incise_error *err)
 				sqlite3_column_double(stmt, 17);
 	}
 	if (rc == SQLITE_ROW)
-		n = damaged(rec, "streams", "more rows than streams", err);
+		n = damaged_recording(rec, "streams", "more rows than streams", err);
 	else if (rc != SQLITE_DONE)
 		n = incise_schema_fail(rec->db, rec->path, err);
 	sqlite3_finalize(stmt);
@@ -383,7 +384,7 @@ static int read_knots(struct incise_stream_source *to, const char *stream,
 		if (n == INCISE_TIMELINE_KNOTS_MAX ||
 		    !take_knot(stmt, n ? &to->knots[n - 1] : NULL, &to->knots[n])) {
 			sqlite3_finalize(stmt);
-			return damaged(rec, "knots", "a row is invalid", err);
+			return damaged_recording(rec, "knots", "a row is invalid", err);
 		}
 		n++;
 	}

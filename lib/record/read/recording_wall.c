@@ -14,8 +14,8 @@
 
 #define POINTS_MAX 10000000 /* one a second for 115 days */
 
-static void take_text(const union incise_column *column, size_t i,
-		      char to[INCISE_LEDGER_TEXT + 1])
+static void take_recording_wall_text(const union incise_column *column, size_t i,
+				     char to[INCISE_LEDGER_TEXT + 1])
 {
 	memcpy(to, column->s[i], INCISE_LEDGER_TEXT + 1);
 	/* A terminal would obey control characters. */
@@ -42,10 +42,10 @@ static void take_point(const union incise_column *column, size_t i,
 					: (int)offset_s,
 		.held = (int)column[7].i[i],
 	};
-	take_text(&column[8], i, point->source);
-	take_text(&column[9], i, point->reference);
-	take_text(&column[10], i, point->leap);
-	take_text(&column[11], i, point->restart);
+	take_recording_wall_text(&column[8], i, point->source);
+	take_recording_wall_text(&column[9], i, point->reference);
+	take_recording_wall_text(&column[10], i, point->leap);
+	take_recording_wall_text(&column[11], i, point->restart);
 }
 
 /* *@points is to be freed. Returns 0 or -errno. */

@@ -440,7 +440,7 @@ int incise_rows_open(struct incise_rows *rows, struct incise_recording *recordin
 }
 
 /* To the next row of the batch, of the next batch, or of events: 1, 0, -errno. */
-static int step(struct incise_rows *rows, struct incise_error *err)
+static int step_rows(struct incise_rows *rows, struct incise_error *err)
 {
 	int rc;
 
@@ -477,7 +477,7 @@ int incise_rows_first(const struct incise_rows *rows, int64_t *first_ns,
 }
 
 /* Of events no other than these types; of a stream the batch has checked them. */
-static bool take(struct incise_rows *rows)
+static bool take_rows(struct incise_rows *rows)
 {
 	if (rows->stmt && (sqlite3_column_type(rows->stmt, 1) != SQLITE_INTEGER ||
 			   sqlite3_column_type(rows->stmt, 2) != SQLITE_TEXT ||
@@ -495,12 +495,12 @@ int incise_rows_next(struct incise_rows *rows, struct incise_error *err)
 	/* Behind the end another step would begin anew, or go on behind a range. */
 	rows->ended |= rows->live && own_ns(rows) > rows->end_ns;
 	if (!rows->ended)
-		rc = step(rows, err);
+		rc = step_rows(rows, err);
 
 	/* Of the first block, or of what a filter needs. */
 	while (rc > 0 && own_ns(rows) < rows->begin_ns) {
 		rows->live = true;
-		rc = step(rows, err);
+		rc = step_rows(rows, err);
 	}
 	rows->live = false;
 	rows->ended |= !rc;
@@ -516,7 +516,7 @@ int incise_rows_next(struct incise_rows *rows, struct incise_error *err)
 	}
 	/* A row that cannot be is passed, as a block is. */
 	rows->live = true;
-	if (!take(rows))
+	if (!take_rows(rows))
 		return incise_error_set(
 			err, EINVAL,
 			"%s: damaged: table %s, row %lld: its time is "

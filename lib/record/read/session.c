@@ -83,7 +83,7 @@ int incise_session_seal(sqlite3 *db, uint32_t *crc)
 
 /* --- members ------------------------------------------------------------------------- */
 
-static int damaged(const char *folder, const char *what, struct incise_error *err)
+static int damaged_session(const char *folder, const char *what, struct incise_error *err)
 {
 	return incise_error_set(
 		err, EINVAL, "%s: damaged joined recording: %s; join its members again",
@@ -119,7 +119,7 @@ static double real_or_nan(sqlite3_stmt *stmt, int column)
 }
 
 /* Version, tables and checksum. */
-static int check(sqlite3 *db, const char *folder, struct incise_error *err)
+static int check_session(sqlite3 *db, const char *folder, struct incise_error *err)
 {
 	const int64_t version = incise_schema_ask(db, 0, "PRAGMA user_version");
 	uint32_t crc = 0;
@@ -135,13 +135,15 @@ static int check(sqlite3 *db, const char *folder, struct incise_error *err)
 				       "SELECT 1 FROM sqlite_master WHERE type = 'table' "
 				       "AND sql = %Q",
 				       incise_session_tables[i]))
-			return damaged(folder, "a table is missing or altered", err);
+			return damaged_session(folder, "a table is missing or altered",
+					       err);
 	if (incise_session_seal(db, &crc) != SQLITE_OK)
 		return incise_schema_fail(db, folder, err);
 	return incise_schema_ask(db, -1,
 				 "SELECT value FROM session WHERE key = 'seal'") == crc
 		       ? 0
-		       : damaged(folder, "its tables are not as they were written", err);
+		       : damaged_session(folder,
+					 "its tables are not as they were written", err);
 }
 
 /* Open a member, and see that it is the one that was joined. */
@@ -169,7 +171,8 @@ static int open_member(struct incise_session *session, const char *folder,
 		rc = incise_recording_read(session->members[at], INCISE_RECORDING_ACTIVE,
 					   err);
 	if (rc == 1)
-		rc = damaged(folder, "a member is a joined recording itself", err);
+		rc = damaged_session(folder, "a member is a joined recording itself",
+				     err);
 	if (!rc) {
 		identity = incise_session_identity(session->members[at]);
 		if (!identity || strcmp(identity, ledger))
@@ -205,7 +208,8 @@ static int read_members(struct incise_session *session, sqlite3 *db, const char 
 		    !is_name(info->name) ||
 		    !take(stmt, 1, info->host, sizeof(info->host)) ||
 		    !take(stmt, 2, info->method, sizeof(info->method)) || !ledger) {
-			rc = damaged(folder, "a row of table members is invalid", err);
+			rc = damaged_session(folder, "a row of table members is invalid",
+					     err);
 			break;
 		}
 		info->matches = sqlite3_column_int(stmt, 4);
@@ -215,7 +219,7 @@ static int read_members(struct incise_session *session, sqlite3 *db, const char 
 	}
 	sqlite3_finalize(stmt);
 	if (!rc && session->n < 2)
-		rc = damaged(folder, "it has less than two members", err);
+		rc = damaged_session(folder, "it has less than two members", err);
 	return rc;
 }
 
@@ -269,12 +273,13 @@ static int read_map(struct incise_session *session, int member, sqlite3 *db,
 		};
 		if (map->n == INCISE_SESSION_KNOTS_MAX ||
 		    !good_knot(&knots[map->n], map->n))
-			rc = damaged(folder, "a row of table maps is invalid", err);
+			rc = damaged_session(folder, "a row of table maps is invalid",
+					     err);
 		map->n++;
 	}
 	sqlite3_finalize(stmt);
 	if (!rc && map->n < 2)
-		rc = damaged(folder, "the map of a clock is missing", err);
+		rc = damaged_session(folder, "the map of a clock is missing", err);
 	for (int i = 0; i < INCISE_LEDGER_FORMS; i++)
 		session->members[member]->own[i].map = map;
 	return rc;
@@ -283,7 +288,7 @@ static int read_map(struct incise_session *session, int member, sqlite3 *db,
 /* --- what they have ------------------------------------------------------------------ */
 
 /* Describe a member; the ones before it are described. */
-static void describe(struct incise_session *session, int at)
+static void describe_session(struct incise_session *session, int at)
 {
 	struct incise_session_info *info = &session->info[at];
 	struct incise_recording *member = session->members[at];
@@ -333,7 +338,7 @@ static void describe(struct incise_session *session, int at)
 		(info->first_ns > others_first ? info->first_ns : others_first);
 }
 
-static bool has(const struct incise_session_info *info, int stream)
+static bool has_session_stream(const struct incise_session_info *info, int stream)
 {
 	return strstr(info->streams, incise_ledger_forms[stream].stream) != NULL;
 }
@@ -360,14 +365,15 @@ static int find_stream(const char *name, size_t length)
 }
 
 /* "a, b": the members with a stream, or all with -1; to be freed. */
-static char *list(const struct incise_session *session, int stream, const char *between)
+static char *list_session(const struct incise_session *session, int stream,
+			  const char *between)
 {
 	char *text = strdup("");
 
 	for (int i = 0; i < session->n && text; i++) {
 		char *before = text;
 
-		if (stream >= 0 && !has(&session->info[i], stream))
+		if (stream >= 0 && !has_session_stream(&session->info[i], stream))
 			continue;
 		if (asprintf(&text, "%s%s%s", before, *before ? between : "",
 			     session->info[i].name) < 0)
@@ -394,13 +400,13 @@ static int take_part(struct incise_session *session, const char *part, size_t le
 			"%s: no stream '%.*s'; there are: force, tracker, "
 			"camera",
 			folder, (int)(equals - part), part);
-	if (member >= 0 && equals && !has(&session->info[member], stream))
+	if (member >= 0 && equals && !has_session_stream(&session->info[member], stream))
 		return incise_error_set(err, EINVAL,
 					"%s: member %.*s has no %s; it has: %s", folder,
 					(int)n, name, incise_ledger_forms[stream].stream,
 					session->info[member].streams);
 	if (member < 0) {
-		names = list(session, -1, ", ");
+		names = list_session(session, -1, ", ");
 		incise_error_set(err, EINVAL, "%s: no member '%.*s'; there are: %s",
 				 folder, (int)n, name, names ? names : "");
 		free(names);
@@ -408,14 +414,14 @@ static int take_part(struct incise_session *session, const char *part, size_t le
 	}
 	for (int i = 0; i < INCISE_STREAMS_MAX; i++)
 		if ((i == stream || (stream < 0 && session->of[i] < 0)) &&
-		    has(&session->info[member], i))
+		    has_session_stream(&session->info[member], i))
 			session->of[i] = member;
 	return 0;
 }
 
 /* Choose the member of each stream: by the choice, else the only one that has it. */
-static int choose(struct incise_session *session, const char *folder, const char *choice,
-		  struct incise_error *err)
+static int choose_session(struct incise_session *session, const char *folder,
+			  const char *choice, struct incise_error *err)
 {
 	bool any = false;
 	int rc = 0;
@@ -436,12 +442,12 @@ static int choose(struct incise_session *session, const char *folder, const char
 		char *names;
 
 		for (int k = session->n - 1; k >= 0; k--)
-			if (has(&session->info[k], i)) {
+			if (has_session_stream(&session->info[k], i)) {
 				n++;
 				first = k;
 			}
 		if (session->of[i] < 0 && n > 1 && !any) {
-			names = list(session, i, " and ");
+			names = list_session(session, i, " and ");
 			rc = incise_error_set(
 				err, EINVAL,
 				"%s: %s was recorded by %s; choose one: %s:%s for all "
@@ -463,7 +469,8 @@ static int choose(struct incise_session *session, const char *folder, const char
 static bool is_chosen(const struct incise_session *session, int member)
 {
 	for (int i = 0; i < INCISE_STREAMS_MAX; i++)
-		if (session->of[i] == member && has(&session->info[member], i))
+		if (session->of[i] == member &&
+		    has_session_stream(&session->info[member], i))
 			return true;
 	return false;
 }
@@ -586,7 +593,7 @@ int incise_session_open(struct incise_recording *rec, const char *folder,
 			const char *choice, struct incise_error *err)
 {
 	struct incise_session *session = calloc(1, sizeof(*session));
-	int rc = check(rec->db, folder, err);
+	int rc = check_session(rec->db, folder, err);
 
 	rec->session = session;
 	if (session) {
@@ -604,10 +611,10 @@ int incise_session_open(struct incise_recording *rec, const char *folder,
 	for (int i = 0; i < session->n && !rc; i++) {
 		rc = read_map(session, i, rec->db, folder, err);
 		if (!rc)
-			describe(session, i);
+			describe_session(session, i);
 	}
 	if (!rc)
-		rc = choose(session, folder, choice, err);
+		rc = choose_session(session, folder, choice, err);
 	if (!rc)
 		rc = merge_events(rec, strchr(choice, '*') != NULL, err);
 	if (rc)

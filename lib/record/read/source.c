@@ -41,12 +41,12 @@ struct incise_stream_source *incise_source_stream(
 		->streams[stream == INCISE_SOURCE_DEPTH ? INCISE_LEDGER_TRACKER : stream];
 }
 
-static int fail(struct incise_source *source, struct incise_error *err)
+static int fail_source(struct incise_source *source, struct incise_error *err)
 {
 	return incise_schema_fail(source->recording->db, source->recording->path, err);
 }
 
-static int no_memory(struct incise_source *source, struct incise_error *err)
+static int no_source_memory(struct incise_source *source, struct incise_error *err)
 {
 	return incise_schema_no_memory(source->recording->path, err);
 }
@@ -110,7 +110,7 @@ static int next_block(struct incise_source *source, struct incise_error *err)
 		if (rc == SQLITE_DONE)
 			return 0;
 		if (rc != SQLITE_ROW)
-			return fail(source, err);
+			return fail_source(source, err);
 		why = NULL;
 		if (!incise_ledger_block_read(&block, source->stmt))
 			why = "a field has another type";
@@ -125,7 +125,7 @@ static int next_block(struct incise_source *source, struct incise_error *err)
 		} else if (block.count) {
 			if (block.count > 0 && block.count <= INCISE_BATCH_ROWS_MAX &&
 			    !incise_batch_reserve(&source->batch, (size_t)block.count))
-				return no_memory(source, err);
+				return no_source_memory(source, err);
 			why = take_block(source, &block, data, size);
 		} else if (block.block == source->next) {
 			source->next++;
@@ -208,7 +208,7 @@ static int next_depth(struct incise_source *source, struct incise_error *err)
 		depth->rows += rc ? depth->tracker.batch.n : 0;
 		if (!incise_batch_reserve(batch,
 					  depth->tracker.batch.n + INCISE_DEPTH_WINDOW))
-			return no_memory(source, err);
+			return no_source_memory(source, err);
 		for (size_t k = 0; rc && k < depth->tracker.batch.n; k++)
 			push_record(source, k);
 		while (!rc && incise_depth_flush(&depth->window, &row))
@@ -224,7 +224,7 @@ static int open_depth(struct incise_source *source, int64_t from_seq,
 
 	source->depth = calloc(1, sizeof(*source->depth));
 	if (!source->depth)
-		return no_memory(source, err);
+		return no_source_memory(source, err);
 	incise_depth_init(&source->depth->window, meta->surface_point_mm,
 			  meta->surface_normal);
 	source->depth->part = from_seq != INT64_MIN;
@@ -250,7 +250,7 @@ static int open_table(struct incise_source *source, int64_t from_seq, bool from_
 								false, from_seq),
 				   from_end, &source->stmt);
 
-	return rc == SQLITE_OK ? 0 : fail(source, err);
+	return rc == SQLITE_OK ? 0 : fail_source(source, err);
 }
 
 int incise_source_open(struct incise_source *source, struct incise_recording *recording,

@@ -33,7 +33,7 @@ struct replay {
 };
 
 /* Feed the plan the poses up to the next tick. */
-static int feed(struct replay *replay, int64_t t_ns)
+static int feed_replay(struct replay *replay, int64_t t_ns)
 {
 	struct incise_tracker_sample poses[POSES];
 	int n = incise_replay_source_poses(&replay->source, t_ns, poses, POSES,
@@ -61,7 +61,7 @@ static uint32_t add_force(uint32_t crc, const double force_N[3])
 	return incise_crc32c(crc, bytes, sizeof(bytes));
 }
 
-static void compare(struct replay *replay, const struct incise_replay_tick *at)
+static void compare_replay(struct replay *replay, const struct incise_replay_tick *at)
 {
 	struct incise_replay_report *report = replay->report;
 	double error_N = at->predicted_N - at->measured_N;
@@ -77,7 +77,7 @@ static void compare(struct replay *replay, const struct incise_replay_tick *at)
 	}
 }
 
-static int ticked(void *context, const struct incise_tick *tick)
+static int ticked_replay(void *context, const struct incise_tick *tick)
 {
 	struct replay *replay = context;
 	struct incise_replay_source *source = &replay->source;
@@ -108,7 +108,7 @@ static int ticked(void *context, const struct incise_tick *tick)
 		.measured_N = measure.force_N,
 		.clipped = measure.clipped,
 	};
-	compare(replay, &at);
+	compare_replay(replay, &at);
 	if (replay->options->ticked) {
 		rc = replay->options->ticked(replay->options->context, &at, replay->err);
 		if (rc)
@@ -117,17 +117,18 @@ static int ticked(void *context, const struct incise_tick *tick)
 	/* At once: there is no force to release first. */
 	if (replay->options->stop && *replay->options->stop)
 		return STOPPED;
-	return feed(replay, tick->t_ns + replay->period_ns);
+	return feed_replay(replay, tick->t_ns + replay->period_ns);
 }
 
-static int run(struct replay *replay, double rate_hz, struct incise_loop_stats *stats)
+static int run_replay(struct replay *replay, double rate_hz,
+		      struct incise_loop_stats *stats)
 {
 	const struct incise_replay_options *options = replay->options;
 	int64_t start_ns = replay->first_ns - replay->period_ns;
 	struct incise_loop_options loop = {
 		.rate_hz = rate_hz,
 		.duration_ns = replay->source.last_ns - replay->first_ns + 1,
-		.ticked = ticked,
+		.ticked = ticked_replay,
 		.context = replay,
 	};
 	struct incise_clock *clock = options->real_time
@@ -138,7 +139,7 @@ static int run(struct replay *replay, double rate_hz, struct incise_loop_stats *
 	if (!clock)
 		return incise_error_set(replay->err, ENOMEM, "out of memory");
 	replay->clock = clock;
-	rc = feed(replay, replay->first_ns);
+	rc = feed_replay(replay, replay->first_ns);
 	if (!rc)
 		rc = incise_loop_run(replay->plan, clock, &loop, stats, replay->err);
 	if (rc == STOPPED)
@@ -150,7 +151,7 @@ static int run(struct replay *replay, double rate_hz, struct incise_loop_stats *
 	return rc;
 }
 
-static int begin(struct replay *replay, const struct incise_scene *scene)
+static int begin_replay(struct replay *replay, const struct incise_scene *scene)
 {
 	const struct incise_replay_source *source = &replay->source;
 	const struct incise_recording_info *meta = &source->recording->meta;
@@ -194,9 +195,9 @@ int incise_replay(struct incise_recording *recording, const struct incise_scene 
 				       options->calibration, err);
 	if (rc)
 		return rc;
-	rc = begin(&replay, scene);
+	rc = begin_replay(&replay, scene);
 	if (!rc)
-		rc = run(&replay, incise_scene_rate_hz(scene), stats);
+		rc = run_replay(&replay, incise_scene_rate_hz(scene), stats);
 	report->cuts = replay.source.cut.count;
 	if (report->compared) {
 		report->rms_N = sqrt(replay.squares_N2 / report->compared);

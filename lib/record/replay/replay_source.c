@@ -20,8 +20,8 @@
 #define STATION 11
 #define BUTTON 12
 
-static int damaged(const struct incise_replay_stream *s, const char *what,
-		   struct incise_error *err)
+static int damaged_replay_source(const struct incise_replay_stream *s, const char *what,
+				 struct incise_error *err)
 {
 	return incise_error_set(err, EINVAL,
 				"%s: damaged: table %s, row %lld: %s; `incise verify "
@@ -32,7 +32,7 @@ static int damaged(const struct incise_replay_stream *s, const char *what,
 }
 
 /* Go to the next row: 1, 0 at the end, -errno. */
-static int step(struct incise_replay_stream *s, struct incise_error *err)
+static int step_replay_source(struct incise_replay_stream *s, struct incise_error *err)
 {
 	int rc = incise_rows_next(&s->rows, err);
 	int64_t seq;
@@ -41,7 +41,7 @@ static int step(struct incise_replay_stream *s, struct incise_error *err)
 		return rc;
 	seq = incise_rows_seq(&s->rows);
 	if (seq < 0 || seq > COUNT_MAX)
-		return damaged(s, "seq is not a count", err);
+		return damaged_replay_source(s, "seq is not a count", err);
 	s->t_ns = s->rows.t_ns;
 	return 1;
 }
@@ -49,14 +49,15 @@ static int step(struct incise_replay_stream *s, struct incise_error *err)
 static int step_force(struct incise_replay_source *source, struct incise_error *err)
 {
 	struct incise_replay_stream *s = &source->force;
-	int rc = step(s, err);
+	int rc = step_replay_source(s, err);
 	int64_t code;
 
 	if (rc <= 0)
 		return rc;
 	code = incise_rows_int(&s->rows, 2);
 	if (code < 0 || code > source->scale.top)
-		return damaged(s, "code is out of the converter's range", err);
+		return damaged_replay_source(s, "code is out of the converter's range",
+					     err);
 	return 1;
 }
 
@@ -76,7 +77,7 @@ static int step_pose(struct incise_replay_source *source, struct incise_error *e
 {
 	struct incise_replay_stream *s = &source->tracker;
 	int64_t before_ns = s->rows.live ? s->t_ns : 0;
-	int rc = step(s, err);
+	int rc = step_replay_source(s, err);
 
 	if (rc <= 0)
 		return rc;
@@ -85,14 +86,14 @@ static int step_pose(struct incise_replay_source *source, struct incise_error *e
 	s->t_ns = on_clock(s, incise_rows_int(&s->rows, ARRIVAL));
 	/* The clock does not run back; a pose from far ahead would delay all behind it. */
 	if (s->t_ns < before_ns)
-		return damaged(s, "arrival_ns decreases", err);
+		return damaged_replay_source(s, "arrival_ns decreases", err);
 	return 1;
 }
 
 static int step_depth(struct incise_replay_source *source, struct incise_error *err)
 {
 	struct incise_replay_stream *s = &source->depth;
-	int rc = step(s, err);
+	int rc = step_replay_source(s, err);
 
 	source->deep[0] = source->deep[1];
 	source->deep[1].t_ns = INCISE_TIME_NONE;
@@ -252,8 +253,8 @@ void incise_replay_source_close(struct incise_replay_source *source)
 
 /* --- reading ------------------------------------------------------------------------- */
 
-static void take_pose(const struct incise_replay_stream *s,
-		      struct incise_tracker_sample *pose)
+static void take_replay_source_pose(const struct incise_replay_stream *s,
+				    struct incise_tracker_sample *pose)
 {
 	const struct incise_rows *rows = &s->rows;
 
@@ -279,7 +280,7 @@ int incise_replay_source_poses(struct incise_replay_source *source, int64_t t_ns
 	while (taken < n && source->tracker.rows.live && source->tracker.t_ns <= t_ns) {
 		int rc;
 
-		take_pose(&source->tracker, &poses[taken++]);
+		take_replay_source_pose(&source->tracker, &poses[taken++]);
 		rc = step_pose(source, err);
 		if (rc < 0)
 			return rc;

@@ -208,7 +208,7 @@ static void find_held(struct fit *fit, double *scratch)
 }
 
 /* Least lateness of the fresh rows from the @k-th to the @last-th. */
-static double least(const struct fit *fit, size_t k, size_t last)
+static double least_fit(const struct fit *fit, size_t k, size_t last)
 {
 	double found = INFINITY;
 
@@ -224,15 +224,16 @@ static double least(const struct fit *fit, size_t k, size_t last)
 /* Lateness of @rows rows behind or ahead of the @i-th fresh one; -INFINITY: there are fewer. */
 static double level_of(const struct fit *fit, size_t i, size_t rows)
 {
-	double before = i + 1 >= rows ? least(fit, i + 1 - rows, i) : -INFINITY;
-	double after = i + rows <= fit->n_fresh ? least(fit, i, i + rows - 1) : -INFINITY;
+	double before = i + 1 >= rows ? least_fit(fit, i + 1 - rows, i) : -INFINITY;
+	double after =
+		i + rows <= fit->n_fresh ? least_fit(fit, i, i + rows - 1) : -INFINITY;
 
 	return fmax(before, after);
 }
 
 static void find_levels(struct fit *fit, double *scratch)
 {
-	double lowest = fit->n_fresh ? least(fit, 0, fit->n_fresh - 1) : 0;
+	double lowest = fit->n_fresh ? least_fit(fit, 0, fit->n_fresh - 1) : 0;
 	size_t k = 0;
 
 	for (size_t i = 0; i < fit->n_fresh; i++) {
@@ -314,8 +315,8 @@ static void by_arrival(const struct fit *fit, size_t i, struct incise_fit_time *
 }
 
 /* True: the row is not simply on the line. */
-static bool judge(const struct fit *fit, size_t i, double tail,
-		  struct incise_fit_time *time)
+static bool judge_fit(const struct fit *fit, size_t i, double tail,
+		      struct incise_fit_time *time)
 {
 	const struct incise_fit_setup *setup = fit->setup;
 	double limit = fmax(setup->period_ns / 2, fit->noise), level = fit->level[i];
@@ -365,7 +366,7 @@ static size_t judge_all(const struct fit *fit, double *tail,
 	for (size_t i = fit->n; i-- > 0;)
 		tail[i] = fmin(fit->late[i], i + 1 < fit->n ? tail[i + 1] : INFINITY);
 	for (size_t i = 0; i < fit->n; i++)
-		if (judge(fit, i, tail[i], &time)) {
+		if (judge_fit(fit, i, tail[i], &time)) {
 			if (times)
 				times[found] = time;
 			found++;
@@ -373,7 +374,7 @@ static size_t judge_all(const struct fit *fit, double *tail,
 	return found;
 }
 
-static int64_t find(struct fit *fit, double *scratch, struct incise_fit_time **times)
+static int64_t find_fit(struct fit *fit, double *scratch, struct incise_fit_time **times)
 {
 	size_t found;
 
@@ -418,7 +419,7 @@ int64_t incise_fit(const struct incise_fit_setup *setup,
 						   incise_timeline_at(setup->knots,
 								      setup->n_knots,
 								      rows[i].seq));
-		found = find(&fit, fit.doubt + n, times);
+		found = find_fit(&fit, fit.doubt + n, times);
 	}
 	free(fit.odd);
 	free(fit.fresh);

@@ -153,8 +153,8 @@ static void close_block(struct incise_envelope *env)
 }
 
 /* Choose the blocks of this line: not those of another latency. */
-static int choose(struct incise_envelope *env,
-		  const struct incise_envelope_block **chosen)
+static int choose_timeline(struct incise_envelope *env,
+			   const struct incise_envelope_block **chosen)
 {
 	double limit =
 		RAISED_SCALES * env->scale_ns + fmax(RAISED_MIN_NS, 1.5 * env->grain_ns);
@@ -292,11 +292,11 @@ static void measure_grain(struct incise_envelope *env, double span_ns)
 	}
 }
 
-static void draw(struct incise_envelope *env)
+static void draw_timeline(struct incise_envelope *env)
 {
 	const struct incise_envelope_block *chosen[BLOCKS] = {NULL};
 	double excess[BLOCKS], x_ns = 0, y_ns = INFINITY, slope, span_ns;
-	int n = choose(env, chosen);
+	int n = choose_timeline(env, chosen);
 
 	for (int i = 0; i < n; i++)
 		x_ns += chosen[i]->x_ns / n;
@@ -347,7 +347,7 @@ bool incise_envelope_add(struct incise_envelope *env, double x_ns, double y_ns)
 
 	if (env->has_open && block.number != env->open.number) {
 		close_block(env);
-		draw(env);
+		draw_timeline(env);
 		drawn = true;
 		block.number = (int64_t)(x_ns / env->block_ns);
 		env->has_open = false;

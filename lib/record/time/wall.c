@@ -57,7 +57,7 @@ static bool is_valid(const struct incise_wall_point *p)
 }
 
 /* TAI at @t_ns by one point, less its own, and the growth of the bound since. */
-static double advance(const struct incise_wall_point *p, int64_t t_ns)
+static double advance_wall(const struct incise_wall_point *p, int64_t t_ns)
 {
 	double s_ns = (double)(t_ns - p->t_ns);
 
@@ -82,7 +82,7 @@ static bool restarts(const struct incise_wall *wall, size_t i)
 static double contradiction(const struct incise_wall_point *a,
 			    const struct incise_wall_point *b)
 {
-	double jump_ns = (double)(b->tai_ns - a->tai_ns) - advance(a, b->t_ns);
+	double jump_ns = (double)(b->tai_ns - a->tai_ns) - advance_wall(a, b->t_ns);
 	double bound_ns = a->uncertainty_ns + growth(a, (double)(b->t_ns - a->t_ns)) +
 			  b->uncertainty_ns;
 
@@ -176,7 +176,7 @@ static struct interval by_point(const struct incise_wall *wall, size_t i, int64_
 				int64_t base_ns)
 {
 	const struct incise_wall_point *p = &wall->points[i];
-	double tai = (double)(p->tai_ns - base_ns) + advance(p, t_ns);
+	double tai = (double)(p->tai_ns - base_ns) + advance_wall(p, t_ns);
 	double u = p->uncertainty_ns + growth(p, (double)(t_ns - p->t_ns)) +
 		   wall->widened_ns;
 
@@ -184,8 +184,8 @@ static struct interval by_point(const struct incise_wall *wall, size_t i, int64_
 }
 
 /* Interpolated between points i and i + 1 of one part. */
-static struct interval between(const struct incise_wall *wall, size_t i, int64_t t_ns,
-			       int64_t base_ns)
+static struct interval between_wall(const struct incise_wall *wall, size_t i,
+				    int64_t t_ns, int64_t base_ns)
 {
 	const struct incise_wall_point *a = &wall->points[i], *b = a + 1;
 	double span_ns = (double)(b->t_ns - a->t_ns);
@@ -230,7 +230,7 @@ static struct interval interval_at(const struct incise_wall *wall, size_t i, int
 	if (t_ns <= wall->points[i].t_ns || i + 1 == wall->n)
 		return by_point(wall, i, t_ns, base_ns);
 	if (!restarts(wall, i))
-		return between(wall, i, t_ns, base_ns);
+		return between_wall(wall, i, t_ns, base_ns);
 	return hull(by_point(wall, i, t_ns, base_ns),
 		    by_point(wall, i + 1, t_ns, base_ns));
 }
@@ -263,7 +263,7 @@ int incise_wall_tai(const struct incise_wall *wall, int64_t t_ns, int64_t *tai_n
 	p = &wall->points[i];
 	middle = t_ns > p->t_ns && i + 1 < wall->n && !restarts(wall, i)
 			 ? (double)(t_ns - p->t_ns) * (1 + rate_of(wall, i))
-			 : advance(p, t_ns);
+			 : advance_wall(p, t_ns);
 	settle(interval_at(wall, i, t_ns, p->tai_ns), middle, p->tai_ns, tai_ns,
 	       uncertainty_ns);
 	return 0;

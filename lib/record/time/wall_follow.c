@@ -45,8 +45,8 @@ static void say(struct incise_wall_result *result, const char *fmt, ...)
 }
 
 /* The first reading that continues the time of the last point, -1: none. */
-static int choose(const struct incise_wall_follow *follow,
-		  const struct incise_wall_reading *readings, int n)
+static int choose_wall_follow(const struct incise_wall_follow *follow,
+			      const struct incise_wall_reading *readings, int n)
 {
 	const struct incise_wall_point *last = &follow->last;
 	bool known = follow->started && isfinite(last->uncertainty_ns);
@@ -66,7 +66,7 @@ static int choose(const struct incise_wall_follow *follow,
 	return other;
 }
 
-static int plain(const struct incise_wall_reading *readings, int n)
+static int plain_wall_follow(const struct incise_wall_reading *readings, int n)
 {
 	for (int i = 0; i < n; i++)
 		if (!strcmp(readings[i].source, "plain"))
@@ -135,9 +135,9 @@ static void measure_rate(struct incise_wall_follow *follow, int64_t raw_ns,
 }
 
 /* The last point continued to @now; sleep_ns: of a suspend. */
-static void hold(const struct incise_wall_follow *follow,
-		 const struct incise_wall_clocks *now, int64_t sleep_ns,
-		 struct incise_wall_point *point)
+static void hold_wall_follow(const struct incise_wall_follow *follow,
+			     const struct incise_wall_clocks *now, int64_t sleep_ns,
+			     struct incise_wall_point *point)
 {
 	double raw_ns = (double)(now->raw_ns - follow->clocks.raw_ns);
 	double rate_ppb = fmax(HELD_PPB, follow->last.rate_uncertainty_ppb);
@@ -155,9 +155,9 @@ static void hold(const struct incise_wall_follow *follow,
 		point->utc_offset_s += now->utc_offset_s - follow->clocks.utc_offset_s;
 }
 
-static void take(const struct incise_wall_clocks *now,
-		 const struct incise_wall_reading *reading,
-		 struct incise_wall_point *point)
+static void take_wall_follow(const struct incise_wall_clocks *now,
+			     const struct incise_wall_reading *reading,
+			     struct incise_wall_point *point)
 {
 	*point = (struct incise_wall_point){
 		.t_ns = now->mono_ns,
@@ -259,13 +259,13 @@ void incise_wall_follow(struct incise_wall_follow *follow,
 	if (sleep_ns || step_ns)
 		distrust(follow, readings, n);
 	trust(follow, readings, n);
-	i = choose(follow, readings, n);
+	i = choose_wall_follow(follow, readings, n);
 	if (i < 0 && (!follow->started || !isfinite(follow->last.uncertainty_ns)))
-		i = plain(readings, n);
+		i = plain_wall_follow(readings, n);
 	if (i >= 0)
-		take(now, &readings[i], point);
+		take_wall_follow(now, &readings[i], point);
 	else
-		hold(follow, now, sleep_ns, point);
+		hold_wall_follow(follow, now, sleep_ns, point);
 	if (follow->started) {
 		int64_t passed_ns = now->mono_ns - before->mono_ns;
 

@@ -14,7 +14,7 @@
 #include "seal_walk.h"
 
 /* Unknown without a sign, which nan may have. */
-static double plain(double value)
+static double plain_seal_join(double value)
 {
 	return isnan(value) ? NAN : value;
 }
@@ -54,8 +54,8 @@ static int write_member(FILE *out, const struct incise_session *session, int at,
 		"member %s\nidentity %s\ncommit %" PRId64 " %" PRId64 " %s\nhost %s\n"
 		"method %s\nsignals %d %.17g %.17g\n",
 		info->name, identity, head.commit, head.t_ns, head.head, info->host,
-		info->method, info->matches, plain(info->agreement_ns),
-		plain(info->agreement_bound_ns));
+		info->method, info->matches, plain_seal_join(info->agreement_ns),
+		plain_seal_join(info->agreement_bound_ns));
 	rc = write_map(out, &session->maps[at]);
 	return rc ? incise_error_set(err, -rc, "%s: out of memory",
 				     session->members[at]->path)

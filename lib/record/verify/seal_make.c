@@ -16,7 +16,7 @@
 
 #define BLOCKS_MAX 1000 /* of a stream in a commit */
 
-static int fail(struct incise_seal_walk *walk, struct incise_error *err)
+static int fail_seal_make(struct incise_seal_walk *walk, struct incise_error *err)
 {
 	return incise_schema_fail(walk->recording->db, walk->recording->path, err);
 }
@@ -40,7 +40,7 @@ static int open_walk(struct incise_seal_walk *walk, struct incise_recording *rec
 			       "FROM seal ORDER BY number",
 			       -1, &walk->commits, NULL) != SQLITE_OK ||
 	    incise_seal_start(&walk->seal, db) != SQLITE_OK)
-		return fail(walk, err);
+		return fail_seal_make(walk, err);
 	for (int i = 0; i < INCISE_LEDGER_FORMS; i++) {
 		struct incise_seal_walk_stream *stream = &walk->streams[i];
 
@@ -51,7 +51,7 @@ static int open_walk(struct incise_seal_walk *walk, struct incise_recording *rec
 		if (rc == SQLITE_OK && recording->old)
 			rc = incise_old_rows_next(&stream->rows);
 		if (rc != SQLITE_OK)
-			return fail(walk, err);
+			return fail_seal_make(walk, err);
 	}
 	return 0;
 }
@@ -99,7 +99,7 @@ static int take_block(struct incise_seal_walk *walk, int i, struct incise_error 
 	if (stream->ended)
 		return 0;
 	if (rc != SQLITE_ROW)
-		return fail(walk, err);
+		return fail_seal_make(walk, err);
 	walk->good &= incise_ledger_block_read(&block, stream->blocks);
 	if (!walk->recording->old) {
 		take_data(walk, i, &block);
@@ -113,7 +113,7 @@ static int take_block(struct incise_seal_walk *walk, int i, struct incise_error 
 	}
 	walk->good &= rows == block.count;
 	incise_seal_block(&walk->seal, i, &block, digest);
-	return rc == SQLITE_OK ? 0 : fail(walk, err);
+	return rc == SQLITE_OK ? 0 : fail_seal_make(walk, err);
 }
 
 /* The length of camera.mkv as the ledger has it. */
@@ -131,7 +131,7 @@ static int64_t length_of(struct incise_seal_walk *walk)
 }
 
 /* camera.mkv; -1 with errno: there is none, or ENOMEM. */
-static int open_file(const struct incise_recording *recording)
+static int open_seal_make_file(const struct incise_recording *recording)
 {
 	char *path;
 	int fd;
@@ -153,7 +153,7 @@ static int next_commit(struct incise_seal_walk *walk, struct incise_error *err)
 	if (rc == SQLITE_DONE)
 		return 0;
 	if (rc != SQLITE_ROW)
-		return fail(walk, err);
+		return fail_seal_make(walk, err);
 	walk->number = sqlite3_column_int64(stmt, 0);
 	walk->t_ns = sqlite3_column_int64(stmt, 1);
 	walk->good = walk->number == seal->next;
@@ -176,13 +176,13 @@ static int next_commit(struct incise_seal_walk *walk, struct incise_error *err)
 		seal->blocks[i] = blocks;
 	}
 	if (walk->number == walk->last && walk->recording->meta.complete) {
-		int fd = open_file(walk->recording);
+		int fd = open_seal_make_file(walk->recording);
 
 		rc = incise_seal_tables(seal, walk->recording->db, fd, length_of(walk));
 		if (fd >= 0)
 			close(fd);
 		if (rc != SQLITE_OK)
-			return fail(walk, err);
+			return fail_seal_make(walk, err);
 	}
 	if (!incise_seal_commit(seal, walk->t_ns))
 		return incise_schema_no_memory(walk->recording->path, err);
@@ -221,7 +221,7 @@ uint64_t incise_seal_walk_behind(struct incise_seal_walk *walk, bool *blocks)
 static int make_file_part(struct incise_recording *recording, uint64_t *bytes,
 			  uint8_t digest[INCISE_SEAL_BYTES], struct incise_error *err)
 {
-	const int fd = open_file(recording);
+	const int fd = open_seal_make_file(recording);
 	struct stat st = {0};
 	int rc;
 

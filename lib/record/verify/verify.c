@@ -185,9 +185,9 @@ static int read_entry(struct incise_verification *verify, const char *stream,
 }
 
 /* @stream is the name in the ledger, @what that in the finding. */
-static void compare(struct incise_verification *verify, const char *stream,
-		    const char *what, const char *units,
-		    const struct incise_ledger_block *made)
+static void compare_verify(struct incise_verification *verify, const char *stream,
+			   const char *what, const char *units,
+			   const struct incise_ledger_block *made)
 {
 	struct incise_verify_finding found = incise_verify_finding(INCISE_VERIFY_ALTERED);
 	struct incise_ledger_block entry;
@@ -246,8 +246,8 @@ static void check_file(struct incise_verification *verify)
 				    strerror(-rc));
 		return;
 	}
-	compare(verify, INCISE_LEDGER_FILE, "the head of " INCISE_FRAMES_FILE, "bytes",
-		&made);
+	compare_verify(verify, INCISE_LEDGER_FILE, "the head of " INCISE_FRAMES_FILE,
+		       "bytes", &made);
 	/* 0: made before the length was noted, or on a disk that hung. */
 	if (n == 1 && entry.last_seq && entry.last_seq != st.st_size)
 		incise_verify_found(verify, found,
@@ -271,7 +271,7 @@ static int check_seals(struct incise_verification *verify)
 		if (incise_ledger_seal(verify->recording->db, table, &made) != SQLITE_OK)
 			incise_verify_unreadable(verify, "", table);
 		else
-			compare(verify, stream, what, "rows", &made);
+			compare_verify(verify, stream, what, "rows", &made);
 		rc = incise_verify_progress(verify, false);
 	}
 	if (!rc && verify->camera && verify->level == INCISE_VERIFY_ALL)

@@ -122,7 +122,7 @@ static struct row row_of(const struct incise_batch *batch, size_t at)
 }
 
 /* Returns 0 or -EIO, which verify_stream.c has reported; a block that it has reported is passed. */
-static int next_row(struct walk *walk)
+static int next_verify_camera_row(struct walk *walk)
 {
 	int rc = 1;
 
@@ -145,7 +145,7 @@ static int skip_row(struct walk *walk)
 	walk->out->missing++;
 	add_to_run(walk, MISSING, NULL, walk->row.seq, walk->row.t_ns);
 	walk->last_ns = walk->row.t_ns;
-	return next_row(walk);
+	return next_verify_camera_row(walk);
 }
 
 /* --- frames ----------------------------------------------------------------------- */
@@ -251,7 +251,7 @@ static int take_frame(struct walk *walk, const struct frame *frame)
 		walk->out->present++;
 	}
 	walk->last_ns = walk->row.t_ns;
-	return next_row(walk);
+	return next_verify_camera_row(walk);
 }
 
 /* Returns 0, -ECANCELED, -EIO. */
@@ -259,7 +259,7 @@ static int walk_through(struct walk *walk, struct incise_frames_reader *reader)
 {
 	struct incise_verification *verify = walk->verify;
 	struct incise_error err = {0};
-	int rc = next_row(walk), got = 1;
+	int rc = next_verify_camera_row(walk), got = 1;
 
 	while (!rc) {
 		struct frame frame;

@@ -52,7 +52,7 @@ static void flush_wrong(struct walk *walk)
 	*found = finding("");
 }
 
-static int step(void *user, struct incise_seal_walk *commit)
+static int step_verify_seal(void *user, struct incise_seal_walk *commit)
 {
 	struct walk *walk = user;
 	struct incise_verification *verify = walk->verify;
@@ -252,7 +252,8 @@ int incise_verify_seal(struct incise_verification *verify)
 	/* With rows that the ledger does not have, blocks are not those of the digests. */
 	const bool known = verify->hashed && !verify->rows_altered;
 	int rc = incise_statement_make(&is, verify->recording, known,
-				       was ? was->last.commit : -1, step, &walk, &err);
+				       was ? was->last.commit : -1, step_verify_seal,
+				       &walk, &err);
 
 	if (rc == -ECANCELED)
 		return rc;

@@ -13,9 +13,10 @@ static bool belongs(const struct incise_fit_time *a, const struct incise_fit_tim
 	return a->kind == b->kind && b->seq - a->seq <= 2 * INCISE_FIT_WINDOW;
 }
 
-static void report(struct incise_verification *verify,
-		   const struct incise_fit_time *first,
-		   const struct incise_fit_time *last, uint64_t count, double sd_ns)
+static void report_verify_times(struct incise_verification *verify,
+				const struct incise_fit_time *first,
+				const struct incise_fit_time *last, uint64_t count,
+				double sd_ns)
 {
 	struct incise_verify_finding found = incise_verify_finding(INCISE_VERIFY_TIMES);
 	const char *why = first->kind == INCISE_FIT_MOVED
@@ -59,7 +60,7 @@ void incise_verify_times(struct incise_verification *verify)
 		if (other->kind == INCISE_FIT_WIDER)
 			continue;
 		if (count && !belongs(&last, other)) {
-			report(verify, &first, &last, count, sd_ns);
+			report_verify_times(verify, &first, &last, count, sd_ns);
 			count = 0;
 		}
 		if (!count) {
@@ -71,6 +72,6 @@ void incise_verify_times(struct incise_verification *verify)
 		sd_ns = fmax(sd_ns, other->sd_ns);
 	}
 	if (count)
-		report(verify, &first, &last, count, sd_ns);
+		report_verify_times(verify, &first, &last, count, sd_ns);
 	incise_row_times_close(&times);
 }

@@ -21,14 +21,14 @@
 
 #define NUMBER_MAX 9999
 
-static int number_of(const struct incise_recalibration *entry)
+static int number_of_recalibrate(const struct incise_recalibration *entry)
 {
 	return *entry->file ? atoi(entry->file + strlen(INCISE_RECALIBRATION_FOLDER "/"))
 			    : 0;
 }
 
 /* A recording that can be recalibrated. Returns 0 or -errno. */
-static int check(const char *path, struct incise_error *err)
+static int check_recalibrate(const char *path, struct incise_error *err)
 {
 	struct incise_recording *rec =
 		incise_recording_open_as(path, INCISE_RECORDING_ORIGINAL, err);
@@ -57,7 +57,7 @@ static int next_name(const char *path, const struct incise_recalibration *last,
 	const time_t now = time(NULL);
 	char date[32], name[64];
 	struct tm utc;
-	int number = number_of(last) + 1;
+	int number = number_of_recalibrate(last) + 1;
 
 	if (number > NUMBER_MAX)
 		return incise_error_set(err, E2BIG,
@@ -109,8 +109,8 @@ static int lock_folder(const char *folder, bool make, struct incise_error *err)
 	return fd;
 }
 
-static int add(const char *folder, const char *calibration,
-	       struct incise_recalibration *made, struct incise_error *err)
+static int add_recalibrate(const char *folder, const char *calibration,
+			   struct incise_recalibration *made, struct incise_error *err)
 {
 	struct incise_recalibration *list = NULL;
 	size_t size = 0;
@@ -153,13 +153,13 @@ int incise_recalibrate(const char *path, const char *calibration,
 	int rc = calibration ? incise_calibration_load(calibration, &values, err) : 0;
 
 	if (!rc)
-		rc = check(path, err);
+		rc = check_recalibrate(path, err);
 	if (rc)
 		return rc;
 	folder = incise_recording_folder(path, err);
 	if (!folder)
 		return -errno;
-	rc = add(folder, calibration, &entry, err);
+	rc = add_recalibrate(folder, calibration, &entry, err);
 	free(folder);
 	if (!rc && made)
 		*made = entry;

@@ -100,7 +100,8 @@ static int put_records(struct incise_recorder *rec, struct incise_error *err)
 	return 0;
 }
 
-static void count(struct incise_recorder *rec, struct incise_frame_pump_stats *stats)
+static void count_recorder(struct incise_recorder *rec,
+			   struct incise_frame_pump_stats *stats)
 {
 	incise_frame_pump_stats(rec->camera.pump, stats);
 	rec->streams[INCISE_LEDGER_CAMERA].device_lost =
@@ -148,7 +149,7 @@ static int read_camera(struct incise_recorder *rec, struct incise_error *err)
 	while (!*stream->ended && incise_frame_pump_step(rec->camera.pump) > 0)
 		;
 	rc = put_records(rec, err);
-	count(rec, &stats);
+	count_recorder(rec, &stats);
 	if (!rc && !*stream->ended && (stats.camera.code || stats.file.code))
 		rc = incise_recorder_end_stream(
 			rec, INCISE_LEDGER_CAMERA,
@@ -173,7 +174,7 @@ static int end_camera(struct incise_recorder *rec, struct incise_error *err)
 	}
 	stopped = incise_frame_pump_stop(rec->camera.pump, PATIENCE_NS, &why);
 	rc = put_records(rec, err);
-	count(rec, &stats);
+	count_recorder(rec, &stats);
 	/* Frames that hang on a disk that does not answer are never reported: they have no row. */
 	rec->camera.given_up = stopped == -ETIMEDOUT;
 	if (rec->camera.given_up)
@@ -361,8 +362,9 @@ static void start_counts(struct incise_recorder *rec)
 }
 
 /* Make the files, and do all that may fail before the first sample is read. */
-static int start(struct incise_recorder *rec, const struct incise_recorder_setup *setup,
-		 struct incise_error *err)
+static int start_recorder(struct incise_recorder *rec,
+			  const struct incise_recorder_setup *setup,
+			  struct incise_error *err)
 {
 	int rc = incise_recorder_check_space(rec, setup->planned_s, err);
 
@@ -440,7 +442,7 @@ struct incise_recorder *incise_recorder_new(const char *path, struct incise_rig 
 	if (!rc)
 		rc = incise_recorder_make_folder(rec, err);
 	if (!rc)
-		rc = start(rec, setup, err);
+		rc = start_recorder(rec, setup, err);
 	if (rc) {
 		recorder_free(rec);
 		errno = -rc;
@@ -670,7 +672,7 @@ static int check_rows(struct incise_recorder *rec, struct incise_error *err)
 }
 
 /* Write the last rows, the end of the ledger and the seals. */
-static int complete(struct incise_recorder *rec, struct incise_error *err)
+static int complete_recorder(struct incise_recorder *rec, struct incise_error *err)
 {
 	int rc = incise_recorder_end(rec, err);
 
@@ -714,7 +716,7 @@ int incise_recorder_close(struct incise_recorder *rec, struct incise_error *err)
 						  "in ",
 				 rec->worthless ? "" : rec->part);
 	else
-		rc = complete(rec, err);
+		rc = complete_recorder(rec, err);
 	close_camera(rec);
 	incise_recorder_close_database(rec);
 	if (!rc)

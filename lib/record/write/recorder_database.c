@@ -122,8 +122,8 @@ static void end_whole(char *text, size_t size, int length)
 	text[n] = 0;
 }
 
-static int note(struct incise_recorder *rec, int64_t t_ns, const char *kind,
-		const char *fmt, va_list args)
+static int note_recorder_database(struct incise_recorder *rec, int64_t t_ns,
+				  const char *kind, const char *fmt, va_list args)
 {
 	sqlite3_stmt *stmt = rec->stmt[INSERT_EVENT];
 	char text[250];
@@ -142,7 +142,7 @@ int incise_recorder_note_at(struct incise_recorder *rec, int64_t t_ns, const cha
 	int rc;
 
 	va_start(args, fmt);
-	rc = note(rec, t_ns, kind, fmt, args);
+	rc = note_recorder_database(rec, t_ns, kind, fmt, args);
 	va_end(args);
 	return rc;
 }
@@ -154,7 +154,8 @@ int incise_recorder_note(struct incise_recorder *rec, const char *kind, const ch
 	int rc;
 
 	va_start(args, fmt);
-	rc = note(rec, incise_clock_now(incise_rig_clock(rec->rig)), kind, fmt, args);
+	rc = note_recorder_database(rec, incise_clock_now(incise_rig_clock(rec->rig)),
+				    kind, fmt, args);
 	va_end(args);
 	return rc;
 }

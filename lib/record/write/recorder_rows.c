@@ -190,7 +190,8 @@ int incise_recorder_find_silence(struct incise_recorder *rec, struct incise_erro
 	return rc == SQLITE_OK ? 0 : incise_recorder_fail(rec, err);
 }
 
-static void describe(const struct incise_recorder *rec, int i, struct incise_stream *out)
+static void describe_recorder_rows(const struct incise_recorder *rec, int i,
+				   struct incise_stream *out)
 {
 	const struct incise_recorder_stream *stream = &rec->streams[i];
 	struct incise_timeline_report report;
@@ -232,7 +233,7 @@ int incise_recorder_describe_streams(const struct incise_recorder *rec,
 
 	for (int i = 0; i < INCISE_LEDGER_STREAMS; i++)
 		if (rec->streams[i].exists)
-			describe(rec, i, &streams[n++]);
+			describe_recorder_rows(rec, i, &streams[n++]);
 	return n;
 }
 
@@ -603,7 +604,7 @@ void incise_recorder_disarm(struct incise_recorder *rec)
 }
 
 /* Add a row; the oldest is dropped when the ring is full. */
-static void keep(struct incise_ring *ring, const void *row)
+static void keep_recorder_rows(struct incise_ring *ring, const void *row)
 {
 	union {
 		struct force_row force;
@@ -764,7 +765,7 @@ int incise_recorder_put_force(struct incise_recorder *rec,
 		return incise_recorder_end_stream(rec, INCISE_LEDGER_FORCE, why.text,
 						  err);
 	if (rec->stats.armed)
-		keep(&rec->pretrigger.force, &row);
+		keep_recorder_rows(&rec->pretrigger.force, &row);
 	else
 		rc = write_force(rec, &row, err);
 	if (!isnan(rec->stats.zero_mV)) {
@@ -837,7 +838,7 @@ int incise_recorder_put_tracker(struct incise_recorder *rec,
 			return incise_recorder_fail(rec, err);
 	}
 	if (rec->stats.armed)
-		keep(&rec->pretrigger.tracker, &row);
+		keep_recorder_rows(&rec->pretrigger.tracker, &row);
 	else
 		rc = write_tracker(rec, &row, err);
 	return rc;
@@ -880,7 +881,7 @@ static int write_stream(struct incise_recorder *rec, int i)
 	sqlite3_stmt *stmt = rec->stmt[SET_STREAM];
 	struct incise_stream now;
 
-	describe(rec, i, &now);
+	describe_recorder_rows(rec, i, &now);
 	sqlite3_bind_text(stmt, 1, now.name, -1, SQLITE_TRANSIENT);
 	sqlite3_bind_text(stmt, 2, now.device, -1, SQLITE_TRANSIENT);
 	sqlite3_bind_int(stmt, 3, now.timestamped);

@@ -6,7 +6,7 @@
 #include <string.h>
 #include "wall_packets.h"
 
-static void put(uint8_t *to, uint64_t value, int n)
+static void put_wall_packets(uint8_t *to, uint64_t value, int n)
 {
 	while (n--) {
 		to[n] = value & 0xff;
@@ -41,8 +41,8 @@ void incise_chrony_request(uint8_t bytes[INCISE_CHRONY_BYTES], uint32_t sequence
 	memset(bytes, 0, INCISE_CHRONY_BYTES);
 	bytes[0] = CHRONY_VERSION;
 	bytes[1] = CHRONY_REQUEST;
-	put(bytes + 4, CHRONY_TRACKING, 2);
-	put(bytes + 8, sequence, 4);
+	put_wall_packets(bytes + 4, CHRONY_TRACKING, 2);
+	put_wall_packets(bytes + 8, sequence, 4);
 }
 
 /* 7 bits of exponent, 25 of coefficient, both in two's complement. */
@@ -121,17 +121,17 @@ void incise_ptp_request(uint8_t bytes[INCISE_PTP_REQUEST_BYTES], enum incise_ptp
 	memset(bytes, 0, INCISE_PTP_REQUEST_BYTES);
 	bytes[0] = PTP_MANAGEMENT;
 	bytes[1] = PTP_VERSION;
-	put(bytes + 2, INCISE_PTP_REQUEST_BYTES, 2);
+	put_wall_packets(bytes + 2, INCISE_PTP_REQUEST_BYTES, 2);
 	bytes[4] = domain;
-	put(bytes + 30, sequence, 2);
+	put_wall_packets(bytes + 30, sequence, 2);
 	bytes[32] = 4; /* control of management messages */
 	bytes[33] = 0x7f;
 	memset(bytes + PTP_HEADER, 0xff, 10); /* all ports */
 	/* No hops: the daemon sends the request no further. */
 	bytes[46] = PTP_GET;
-	put(bytes + PTP_TLV, PTP_TLV_MANAGEMENT, 2);
-	put(bytes + PTP_TLV + 2, 2, 2);
-	put(bytes + PTP_TLV + 4, (unsigned int)id, 2);
+	put_wall_packets(bytes + PTP_TLV, PTP_TLV_MANAGEMENT, 2);
+	put_wall_packets(bytes + PTP_TLV + 2, 2, 2);
+	put_wall_packets(bytes + PTP_TLV + 4, (unsigned int)id, 2);
 }
 
 static bool read_status(struct incise_ptp_state *state, const uint8_t *data)

@@ -82,7 +82,7 @@ static int open_ptp(const char *path)
 }
 
 /* Wait for a datagram until @until_ns. Returns its bytes, or -1. */
-static ssize_t receive(int fd, int64_t until_ns, uint8_t *bytes, size_t size)
+static ssize_t receive_wall_peers(int fd, int64_t until_ns, uint8_t *bytes, size_t size)
 {
 	struct pollfd wait = {.fd = fd, .events = POLLIN};
 	int64_t left_ns = until_ns - incise_monotonic_ns();
@@ -128,13 +128,13 @@ void incise_wall_chrony_read(struct incise_wall_peer *peer,
 	drain(peer->fd);
 	incise_chrony_request(request, ++peer->sequence);
 	n = send(peer->fd, request, sizeof(request), 0) == sizeof(request)
-		    ? receive(peer->fd, until_ns, reply, sizeof(reply))
+		    ? receive_wall_peers(peer->fd, until_ns, reply, sizeof(reply))
 		    : -1;
 	while (n >= 0 && !answered) {
 		answered =
 			incise_chrony_read(&tracking, reply, (size_t)n, peer->sequence);
 		if (!answered)
-			n = receive(peer->fd, until_ns, reply, sizeof(reply));
+			n = receive_wall_peers(peer->fd, until_ns, reply, sizeof(reply));
 	}
 	if (!answered)
 		return;
@@ -167,8 +167,9 @@ static bool ask(struct incise_wall_peer *peer, enum incise_ptp_id id,
 	/* Each port answers for itself; the others answer once. */
 	while ((!any || id == INCISE_PTP_PORT_DATA_SET ||
 		id == INCISE_PTP_PORT_PROPERTIES_NP) &&
-	       (n = receive(peer->fd, any ? incise_monotonic_ns() + PORTS_NS : until_ns,
-			    reply, sizeof(reply))) >= 0 &&
+	       (n = receive_wall_peers(peer->fd,
+				       any ? incise_monotonic_ns() + PORTS_NS : until_ns,
+				       reply, sizeof(reply))) >= 0 &&
 	       incise_monotonic_ns() < until_ns)
 		any |= incise_ptp_read(state, reply, (size_t)n, (uint8_t)peer->domain,
 				       sequence);

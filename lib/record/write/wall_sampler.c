@@ -49,8 +49,8 @@ struct incise_wall_sampler {
 /* --- points --------------------------------------------------------------------------- */
 
 /* Where there are too many, the newest takes the place of the one before, and its restart. */
-static void put(struct incise_wall_sampler *sampler,
-		const struct incise_wall_result *result)
+static void put_wall_sampler(struct incise_wall_sampler *sampler,
+			     const struct incise_wall_result *result)
 {
 	struct incise_wall_point *point;
 
@@ -103,7 +103,7 @@ static void sample(struct incise_wall_sampler *sampler)
 	}
 	readings[2].good &= sampler->use[KERNEL];
 	incise_wall_follow(&sampler->follow, &clocks, readings, n, &result);
-	put(sampler, &result);
+	put_wall_sampler(sampler, &result);
 }
 
 /* The time of a simulated clock is true within its bound, by its own statement. */
@@ -122,11 +122,11 @@ static void simulate(struct incise_wall_sampler *sampler, int64_t now_ns)
 			.leap = "assumed",
 		}};
 
-	put(sampler, &result);
+	put_wall_sampler(sampler, &result);
 	sampler->next_ns = now_ns + PERIOD_NS;
 }
 
-static void *run(void *argument)
+static void *run_wall_sampler(void *argument)
 {
 	struct incise_wall_sampler *sampler = argument;
 	bool last = false;
@@ -285,7 +285,7 @@ static int ask_named(struct incise_wall_sampler *sampler, const char *source,
 	return 0;
 }
 
-static int start_thread(struct incise_wall_sampler *sampler)
+static int start_wall_sampler_thread(struct incise_wall_sampler *sampler)
 {
 	pthread_condattr_t attributes;
 	int rc = -pthread_condattr_init(&attributes);
@@ -297,7 +297,7 @@ static int start_thread(struct incise_wall_sampler *sampler)
 	pthread_condattr_destroy(&attributes);
 	if (rc)
 		return rc;
-	rc = incise_thread_start(&sampler->thread, run, sampler, NULL);
+	rc = incise_thread_start(&sampler->thread, run_wall_sampler, sampler, NULL);
 	sampler->running = !rc;
 	if (rc)
 		pthread_cond_destroy(&sampler->changed);
@@ -349,7 +349,7 @@ int incise_wall_sampler_new(struct incise_wall_sampler **sampler, const char *so
 		rc = ask_named(made, source, err);
 	pthread_mutex_init(&made->lock, NULL);
 	if (!rc && wanted && real) {
-		rc = start_thread(made);
+		rc = start_wall_sampler_thread(made);
 		if (rc)
 			incise_error_set(err, -rc, "clock source: no thread: %s",
 					 strerror(-rc));

@@ -152,7 +152,7 @@ static int open_frame(struct incise_film_coder *coder)
 	return av_frame_get_buffer(coder->frame, 0);
 }
 
-static int open_file(struct incise_film_coder *coder)
+static int open_film_mkv_file(struct incise_film_coder *coder)
 {
 	AVStream *stream = avformat_new_stream(coder->format, NULL);
 	int rc;
@@ -192,7 +192,7 @@ static struct incise_film_coder *film_open(const char *path, int width, int heig
 	if (rc >= 0)
 		rc = open_frame(coder);
 	if (rc >= 0)
-		rc = open_file(coder);
+		rc = open_film_mkv_file(coder);
 	if (rc >= 0)
 		return coder;
 	rc = av_fail(coder, rc, "the film cannot be started", err);

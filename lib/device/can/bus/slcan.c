@@ -187,7 +187,7 @@ static void tty_close(struct slcan_tty *tty, const char *last, unsigned int n)
 	close(tty->fd);
 }
 
-static struct slcan *of(struct can_bus *bus)
+static struct slcan *slcan_of(struct can_bus *bus)
 {
 	return (struct slcan *)bus;
 }
@@ -200,7 +200,7 @@ static INCISE_REALTIME int64_t slcan_now(struct can_bus *bus)
 
 static int slcan_send(struct can_bus *bus, const struct can_frame *frame)
 {
-	struct slcan *s = of(bus);
+	struct slcan *s = slcan_of(bus);
 	char text[SEND_MAX];
 	size_t n = slcan_line_format(text, frame);
 	int64_t now = slcan_now(bus);
@@ -269,7 +269,7 @@ static bool receive_byte(struct slcan *s, unsigned char byte, struct can_frame *
 }
 
 /* Returns 1 (there are bytes), 0, -ENODEV or -EIO. */
-static int fill(struct slcan *s)
+static int fill_slcan(struct slcan *s)
 {
 	ssize_t n;
 
@@ -286,10 +286,10 @@ static int fill(struct slcan *s)
 
 static int slcan_receive(struct can_bus *bus, struct can_frame *frame, int64_t *t_ns)
 {
-	struct slcan *s = of(bus);
+	struct slcan *s = slcan_of(bus);
 
 	for (int i = 0; i < RECEIVE_BYTES_MAX; i++) {
-		int rc = fill(s);
+		int rc = fill_slcan(s);
 
 		if (rc <= 0)
 			return rc;
@@ -303,7 +303,7 @@ static int slcan_receive(struct can_bus *bus, struct can_frame *frame, int64_t *
 
 static int slcan_wait(struct can_bus *bus, int64_t until_ns)
 {
-	struct slcan *s = of(bus);
+	struct slcan *s = slcan_of(bus);
 
 	for (;;) {
 		struct pollfd poll = {.fd = s->tty.fd,
@@ -328,7 +328,7 @@ static int slcan_wait(struct can_bus *bus, int64_t until_ns)
 
 static int slcan_filter(struct can_bus *bus, const struct can_filter *filter, int n)
 {
-	struct slcan *s = of(bus);
+	struct slcan *s = slcan_of(bus);
 
 	if (n < 0 || n > CAN_BUS_FILTERS)
 		return -EINVAL;
@@ -340,12 +340,12 @@ static int slcan_filter(struct can_bus *bus, const struct can_filter *filter, in
 
 static int slcan_state(struct can_bus *bus)
 {
-	return of(bus)->status.state;
+	return slcan_of(bus)->status.state;
 }
 
 static void slcan_close(struct can_bus *bus)
 {
-	struct slcan *s = of(bus);
+	struct slcan *s = slcan_of(bus);
 
 	tty_close(&s->tty, "C\r", 2);
 	free(s);
@@ -416,8 +416,8 @@ static int parse_device(const struct can_bus_request *request, char path[PATH_MA
 }
 
 /* Go on the bus. */
-static int start(struct slcan *s, const struct can_bus_request *request,
-		 struct incise_error *err)
+static int start_slcan(struct slcan *s, const struct can_bus_request *request,
+		       struct incise_error *err)
 {
 	char text[] = "\rC\rS0\rO\r";
 	int rc;
@@ -457,7 +457,7 @@ static int slcan_open(struct can_bus **bus, const struct can_bus_request *reques
 	slcan_status_init(&s->status, START_COMMANDS, slcan_now(&s->bus));
 	rc = tty_open(&s->tty, path, request->where, err);
 	if (!rc)
-		rc = start(s, request, err);
+		rc = start_slcan(s, request, err);
 	if (rc) {
 		free(s);
 		return rc;

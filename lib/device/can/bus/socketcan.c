@@ -43,7 +43,7 @@ struct socketcan {
 	int64_t last_ns; /* timestamp of the last frame */
 };
 
-static struct socketcan *of(struct can_bus *bus)
+static struct socketcan *socketcan_of(struct can_bus *bus)
 {
 	return (struct socketcan *)bus;
 }
@@ -62,7 +62,7 @@ static INCISE_REALTIME int64_t socketcan_now(struct can_bus *bus)
 	return incise_monotonic_ns();
 }
 
-static int failed(struct socketcan *s, int code)
+static int failed_socketcan(struct socketcan *s, int code)
 {
 	/* A socket whose interface is gone is not bound any more: ENXIO. */
 	if (code == ENODEV || code == ENXIO)
@@ -76,7 +76,7 @@ static int failed(struct socketcan *s, int code)
 
 static int socketcan_send(struct can_bus *bus, const struct can_frame *frame)
 {
-	struct socketcan *s = of(bus);
+	struct socketcan *s = socketcan_of(bus);
 	ssize_t n;
 
 	if (s->gone)
@@ -97,7 +97,7 @@ static int socketcan_send(struct can_bus *bus, const struct can_frame *frame)
 		bus->counts.full++;
 		return -ENOBUFS;
 	}
-	return failed(s, errno);
+	return failed_socketcan(s, errno);
 }
 
 /* Timestamps are wall time, which may be set meanwhile: an impossible one counts as now. */
@@ -179,7 +179,7 @@ static ssize_t read_one(struct socketcan *s, struct can_frame *frame,
 
 static int socketcan_receive(struct can_bus *bus, struct can_frame *frame, int64_t *t_ns)
 {
-	struct socketcan *s = of(bus);
+	struct socketcan *s = socketcan_of(bus);
 
 	if (s->gone)
 		return s->gone;
@@ -188,7 +188,7 @@ static int socketcan_receive(struct can_bus *bus, struct can_frame *frame, int64
 		ssize_t n = read_one(s, frame, &wall);
 
 		if (n < 0)
-			return errno == EAGAIN ? 0 : failed(s, errno);
+			return errno == EAGAIN ? 0 : failed_socketcan(s, errno);
 		if (n != sizeof(*frame) || frame->can_dlc > CAN_MAX_DLEN) {
 			bus->counts.broken++;
 			continue;
@@ -207,7 +207,7 @@ static int socketcan_receive(struct can_bus *bus, struct can_frame *frame, int64
 
 static int socketcan_wait(struct can_bus *bus, int64_t until_ns)
 {
-	struct socketcan *s = of(bus);
+	struct socketcan *s = socketcan_of(bus);
 	struct pollfd poll = {.fd = s->fd, .events = POLLIN};
 	int64_t now = socketcan_now(bus), left = until_ns > now ? until_ns - now : 0;
 	struct timespec timeout = {left / NS_PER_S, left % NS_PER_S};
@@ -226,7 +226,7 @@ static int socketcan_filter(struct can_bus *bus, const struct can_filter *filter
 		return -EINVAL;
 	if (!n)
 		filter = &all;
-	return setsockopt(of(bus)->fd, SOL_CAN_RAW, CAN_RAW_FILTER, filter,
+	return setsockopt(socketcan_of(bus)->fd, SOL_CAN_RAW, CAN_RAW_FILTER, filter,
 			  (socklen_t)((n ? (size_t)n : 1) * sizeof(*filter))) < 0
 		       ? -errno
 		       : 0;
@@ -234,12 +234,12 @@ static int socketcan_filter(struct can_bus *bus, const struct can_filter *filter
 
 static int socketcan_state(struct can_bus *bus)
 {
-	return of(bus)->state;
+	return socketcan_of(bus)->state;
 }
 
 static void socketcan_close(struct can_bus *bus)
 {
-	struct socketcan *s = of(bus);
+	struct socketcan *s = socketcan_of(bus);
 
 	if (s->fd >= 0)
 		close(s->fd);
@@ -318,8 +318,8 @@ static int look_up(struct socketcan *s, const struct can_bus_request *request,
 	return rc ? rc : link.index;
 }
 
-static int set_up(struct socketcan *s, const struct can_bus_request *request, int index,
-		  struct incise_error *err)
+static int set_up_socketcan(struct socketcan *s, const struct can_bus_request *request,
+			    int index, struct incise_error *err)
 {
 	static const int on = 1, timestamps = SOF_TIMESTAMPING_RX_SOFTWARE |
 					      SOF_TIMESTAMPING_SOFTWARE;
@@ -418,7 +418,7 @@ static int socketcan_open(struct can_bus **bus, const struct can_bus_request *re
 		rc = s->owner < 0 ? s->owner : 0;
 	}
 	if (!rc)
-		rc = set_up(s, request, index, err);
+		rc = set_up_socketcan(s, request, index, err);
 	if (rc) {
 		socketcan_close(&s->bus);
 		errno = -rc;

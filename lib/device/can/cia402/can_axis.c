@@ -197,7 +197,7 @@ static void handle_status(struct can_axis *axis, const struct can_frame *frame)
 }
 
 /* Handle the frames since the last cycle. */
-static void receive(struct can_axis *axis)
+static void receive_can_axis(struct can_axis *axis)
 {
 	struct can_bus *bus = axis->master->bus;
 	struct can_frame frame;
@@ -584,7 +584,7 @@ void can_axis_cycle(struct can_axis *axis, int64_t now_ns, int64_t late_ns,
 	axis->now_ns = now_ns;
 	check_awake(axis, still_ns);
 	axis->setpoint_sent = axis->status_received = false;
-	receive(axis);
+	receive_can_axis(axis);
 	axis->answers += axis->status_received;
 	/* Only time in which the drive answers. */
 	axis->inputs_ns += axis->status_received ? axis->setup.config.tick_ns : 0;

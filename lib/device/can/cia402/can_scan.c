@@ -24,7 +24,7 @@ struct scan {
 };
 
 /* Note the nodes that answer. */
-static int receive(struct scan *scan, int64_t until_ns)
+static int receive_can_scan(struct scan *scan, int64_t until_ns)
 {
 	struct can_bus *bus = scan->bus;
 	struct can_frame frame;
@@ -62,14 +62,14 @@ static int request_all(struct scan *scan, unsigned int only)
 		rc = bus->ops->send(bus, &frame);
 		/* A full queue: no node acknowledges, or the bus is slow. */
 		for (int i = 0; rc == -ENOBUFS && i < 10; i++) {
-			rc = receive(scan, bus->ops->now(bus) + SPACING_NS);
+			rc = receive_can_scan(scan, bus->ops->now(bus) + SPACING_NS);
 			if (!rc)
 				rc = bus->ops->send(bus, &frame);
 		}
 		if (!rc)
-			rc = receive(scan, bus->ops->now(bus) + SPACING_NS);
+			rc = receive_can_scan(scan, bus->ops->now(bus) + SPACING_NS);
 	}
-	return rc ? rc : receive(scan, bus->ops->now(bus) + ANSWERS_NS);
+	return rc ? rc : receive_can_scan(scan, bus->ops->now(bus) + ANSWERS_NS);
 }
 
 struct node {
@@ -155,8 +155,8 @@ static void add_identity(struct node *n, char *name, size_t size)
 		incise_scan_tell(n->device, "error_register", "0x%02x", value);
 }
 
-static void describe(struct scan *scan, unsigned int node,
-		     struct incise_scan_device *device)
+static void describe_can_scan(struct scan *scan, unsigned int node,
+			      struct incise_scan_device *device)
 {
 	struct node n = {
 		.master = {.bus = scan->bus,
@@ -202,7 +202,7 @@ static int scan_bus(struct scan *scan, unsigned int only, incise_scan_found *fou
 
 	for (unsigned int node = 1; node < NODES && !rc; node++)
 		if (scan->there[node]) {
-			describe(scan, node, &device);
+			describe_can_scan(scan, node, &device);
 			rc = found(context, &device);
 		}
 	return rc;

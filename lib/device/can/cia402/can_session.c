@@ -23,7 +23,8 @@
 static const struct cia402_object digital_inputs = {0x60fd, 0, 4, "digital inputs"};
 
 /* The next messages begin with @where. */
-static void begin(struct can_session *s, const char *where, struct incise_error *err)
+static void begin_can_session(struct can_session *s, const char *where,
+			      struct incise_error *err)
 {
 	s->client = (struct cia402_client){&s->master, where, err};
 }
@@ -177,7 +178,7 @@ static void set_inputs(struct can_session *s, bool inputs)
 }
 
 /* Set the drive up, also after it restarted. */
-static int set_up(struct can_session *s)
+static int set_up_can_session(struct can_session *s)
 {
 	bool was_homed = s->is_homed, keep;
 	int rc = read_homed(s);
@@ -263,7 +264,7 @@ int can_session_open(struct can_session *s, const struct can_transport *transpor
 {
 	int rc;
 
-	begin(s, request->where, err);
+	begin_can_session(s, request->where, err);
 	s->actuator = *request->actuator;
 	rc = can_units_deadman(s);
 	if (!rc)
@@ -286,7 +287,7 @@ int can_session_open(struct can_session *s, const struct can_transport *transpor
 	if (!rc)
 		rc = cia402_power_off(&s->client);
 	if (!rc)
-		rc = set_up(s);
+		rc = set_up_can_session(s);
 	if (!rc)
 		adopt_fault(s);
 	return rc;
@@ -337,7 +338,7 @@ int can_session_watch(struct can_session *s, const struct can_transport *transpo
 {
 	int rc;
 
-	begin(s, request->where, err);
+	begin_can_session(s, request->where, err);
 	s->actuator = *request->actuator;
 	rc = watch_homed(s, transport, request);
 	if (rc && rc != -EBUSY)
@@ -376,9 +377,9 @@ int can_session_ready(struct can_session *s, bool homing, struct incise_error *e
 	int64_t now = s->bus->ops->now(s->bus);
 	int rc = 0;
 
-	begin(s, s->name, err);
+	begin_can_session(s, s->name, err);
 	if (!s->is_setup || s->boots != s->master.boots)
-		rc = set_up(s);
+		rc = set_up_can_session(s);
 	/* Unhomed until homing succeeds. */
 	s->is_homed = s->is_homed && (!homing || a->can.absolute);
 	if (!rc && homing)
@@ -407,7 +408,7 @@ int can_session_clear(struct can_session *s, struct incise_error *err)
 {
 	int state = s->bus->ops->state(s->bus), rc;
 
-	begin(s, s->name, err);
+	begin_can_session(s, s->name, err);
 	if (state == CAN_STATE_BUS_OFF)
 		return incise_error_set(err, EBUSY,
 					"%s: cannot be cleared: %s is still bus-off; "
@@ -418,7 +419,7 @@ int can_session_clear(struct can_session *s, struct incise_error *err)
 		rc = cia402_clear(&s->client);
 	/* After a fault its old setup is not trusted. */
 	if (!rc)
-		rc = set_up(s);
+		rc = set_up_can_session(s);
 	if (!rc)
 		rc = read_inputs(s);
 	if (!rc)
@@ -430,7 +431,7 @@ int can_session_homed(struct can_session *s, struct incise_error *err)
 {
 	int rc;
 
-	begin(s, s->name, err);
+	begin_can_session(s, s->name, err);
 	s->is_homed = true;
 	rc = read_position(s, false);
 	if (rc)
@@ -443,7 +444,7 @@ void can_session_close(struct can_session *s)
 {
 	if (!s->bus)
 		return;
-	begin(s, s->name, NULL);
+	begin_can_session(s, s->name, NULL);
 	/*
 	 * Only a drive that reports to have no power may stop watching this side: else only its
 	 * deadman stops it now.
@@ -458,7 +459,7 @@ void can_session_close(struct can_session *s)
 
 /* --- watching --- */
 
-static void receive(struct can_session *s, int64_t now)
+static void receive_can_session(struct can_session *s, int64_t now)
 {
 	struct can_axis *axis = &s->axis;
 	struct can_frame frame;
@@ -542,7 +543,7 @@ void can_session_watch_cycle(struct can_session *s)
 	int64_t now = s->bus->ops->now(s->bus);
 	int rc = 0;
 
-	receive(s, now);
+	receive_can_session(s, now);
 	if (!s->watch.tpdo_ns || now - s->watch.tpdo_ns > WATCH_NS)
 		rc = read_status(s);
 	if (!rc && cia402_state(s->axis.statusword) == CIA402_FAULT)

@@ -62,7 +62,7 @@ struct can_stepper {
 	_Alignas(64) struct can_session session;
 };
 
-static struct can_stepper *of(struct incise_motor *motor)
+static struct can_stepper *can_stepper_of(struct incise_motor *motor)
 {
 	return (struct can_stepper *)motor;
 }
@@ -120,7 +120,7 @@ static int64_t idle(struct can_stepper *c)
  * Run the cycle that is due; returns the time of the next call. Cycles are due at start + n
  * periods; those that are late by a period or more are left out.
  */
-static int64_t step(struct can_stepper *c)
+static int64_t step_can_stepper(struct can_stepper *c)
 {
 	struct can_axis *axis = &c->session.axis;
 	int64_t cycle = axis->setup.config.tick_ns, now;
@@ -144,7 +144,7 @@ static void *thread_run(void *argument)
 	struct can_stepper *c = argument;
 
 	while (!c->ended)
-		incise_monotonic_sleep_until(step(c));
+		incise_monotonic_sleep_until(step_can_stepper(c));
 	return NULL;
 }
 
@@ -158,7 +158,7 @@ static void nap(struct can_stepper *c, int64_t ns)
 		return;
 	}
 	do {
-		due = step(c);
+		due = step_can_stepper(c);
 		c->sleep_until(c->session.bus, due < end ? due : end);
 	} while (now_of(c) < end);
 }
@@ -193,7 +193,7 @@ static void give_back(struct can_stepper *c)
 	post(c, RETURN);
 }
 
-static int start_thread(struct can_stepper *c, bool *real_time)
+static int start_can_stepper_thread(struct can_stepper *c, bool *real_time)
 {
 	int rc = 0;
 
@@ -286,7 +286,7 @@ static enum incise_stepper_state state_of(struct can_stepper *c)
 
 static int can_enable(struct incise_motor *motor, struct incise_error *err)
 {
-	struct can_stepper *c = of(motor);
+	struct can_stepper *c = can_stepper_of(motor);
 
 	switch (state_of(c)) {
 	case INCISE_STEPPER_STATE_READY:
@@ -304,12 +304,12 @@ static int can_enable(struct incise_motor *motor, struct incise_error *err)
 
 static int can_disable(struct incise_motor *motor)
 {
-	return post(of(motor), DISABLE);
+	return post(can_stepper_of(motor), DISABLE);
 }
 
 static int can_clear(struct incise_motor *motor, struct incise_error *err)
 {
-	struct can_stepper *c = of(motor);
+	struct can_stepper *c = can_stepper_of(motor);
 	int rc;
 
 	if (state_of(c) != INCISE_STEPPER_STATE_FAULT)
@@ -327,12 +327,12 @@ static int can_clear(struct incise_motor *motor, struct incise_error *err)
 
 static INCISE_REALTIME int64_t can_now(struct incise_motor *motor)
 {
-	return now_of(of(motor));
+	return now_of(can_stepper_of(motor));
 }
 
 static void can_close(struct incise_motor *motor)
 {
-	struct can_stepper *c = of(motor);
+	struct can_stepper *c = can_stepper_of(motor);
 
 	if (c->runs && !motor->watches)
 		motor->stepper.ops->disable(&motor->stepper, NULL);
@@ -485,7 +485,7 @@ static int stepper_home(struct incise_stepper *stepper, const volatile int *stop
 
 static int can_wait(struct incise_motor *motor, int64_t ns)
 {
-	nap(of(motor), ns);
+	nap(can_stepper_of(motor), ns);
 	return 0;
 }
 
@@ -505,8 +505,10 @@ static void set_ops(struct can_stepper *c)
 	c->motor.stepper.ops = &c->ops;
 }
 
-static int set_up(struct can_stepper *c, const struct can_transport *transport,
-		  const struct incise_backend_request *request, struct incise_error *err)
+static int set_up_can_stepper(struct can_stepper *c,
+			      const struct can_transport *transport,
+			      const struct incise_backend_request *request,
+			      struct incise_error *err)
 {
 	struct can_session *session = &c->session;
 	bool real_time;
@@ -528,7 +530,7 @@ static int set_up(struct can_stepper *c, const struct can_transport *transport,
 		incise_motion_publish(&session->axis.motion, now_of(c));
 	/* No page fault in a cycle; mlock() may be refused. */
 	mlock(c, sizeof(*c));
-	rc = start_thread(c, &real_time);
+	rc = start_can_stepper_thread(c, &real_time);
 	if (!real_time)
 		snprintf(c->motor.name, sizeof(c->motor.name), "%.45s, not real-time",
 			 session->name);
@@ -565,7 +567,7 @@ void *can_stepper_open(const struct can_transport *transport,
 	c->motor.slot = &c->status;
 	incise_motor_init(&c->motor);
 	set_ops(c);
-	rc = set_up(c, transport, request, err);
+	rc = set_up_can_stepper(c, transport, request, err);
 	if (!rc)
 		return &c->motor.stepper;
 	can_close(&c->motor);

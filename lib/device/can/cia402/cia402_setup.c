@@ -93,7 +93,7 @@ static int switch_off(const struct cia402_client *client, uint16_t index, uint32
 	return cia402_write_verified(client, &object, *id | OFF);
 }
 
-static int fill(const struct cia402_client *client, const struct pdo *pdo)
+static int fill_cia402_setup(const struct cia402_client *client, const struct pdo *pdo)
 {
 	const struct cia402_object type = {pdo->index, 2, 1, "PDO transmission type"};
 	const struct cia402_object count = mapping(pdo->index, 0);
@@ -128,7 +128,7 @@ static int set_pdo(const struct cia402_client *client, const struct pdo *pdo)
 		return rc;
 	if (!has)
 		return cia402_fail(client, &object, "read", -EREMOTEIO);
-	rc = fill(client, pdo);
+	rc = fill_cia402_setup(client, pdo);
 	return rc ? rc : switch_on(client, pdo, id);
 }
 
@@ -184,7 +184,7 @@ static int set_inputs(const struct cia402_client *client, uint32_t id, bool *map
 		return 0;
 	if (rc)
 		return cia402_fail(client, &entry, "written", rc);
-	rc = fill(client, &pdo);
+	rc = fill_cia402_setup(client, &pdo);
 	if (!rc)
 		rc = switch_on(client, &pdo, id);
 	*mapped = !rc;
@@ -322,8 +322,8 @@ static int set_limits(const struct cia402_client *client,
 
 /* --- the whole --- */
 
-static int check_setup(const struct cia402_client *client,
-		       const struct cia402_setup *setup)
+static int check_cia402_setup(const struct cia402_client *client,
+			      const struct cia402_setup *setup)
 {
 	const char *problem = NULL;
 
@@ -452,7 +452,8 @@ static int set_watch(const struct cia402_client *client, const struct cia402_set
 }
 
 /* The drive's heartbeat reports the new state. */
-static int start(const struct cia402_client *client, const struct cia402_setup *setup)
+static int start_cia402_setup(const struct cia402_client *client,
+			      const struct cia402_setup *setup)
 {
 	struct canopen *master = client->master;
 	struct can_bus *bus = master->bus;
@@ -484,7 +485,7 @@ int cia402_configure(const struct cia402_client *client, const struct cia402_set
 	int rc;
 
 	*supported = found;
-	rc = check_setup(client, setup);
+	rc = check_cia402_setup(client, setup);
 	if (!rc)
 		rc = check_power(client);
 	if (!rc)
@@ -498,7 +499,7 @@ int cia402_configure(const struct cia402_client *client, const struct cia402_set
 	if (!rc)
 		rc = set_watch(client, setup);
 	if (!rc)
-		rc = start(client, setup);
+		rc = start_cia402_setup(client, setup);
 	if (!rc)
 		*supported = found;
 	return rc;

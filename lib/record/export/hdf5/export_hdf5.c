@@ -38,7 +38,7 @@ struct hdf5 {
 };
 
 /* The file stays open and without a name, until the process ends. */
-static int fail(struct hdf5 *hdf5, const char *what, struct incise_error *err)
+static int fail_export_hdf5(struct hdf5 *hdf5, const char *what, struct incise_error *err)
 {
 	int code = errno ? errno : EIO;
 
@@ -49,7 +49,7 @@ static int fail(struct hdf5 *hdf5, const char *what, struct incise_error *err)
 				what, strerror(code));
 }
 
-static int put_text(hid_t at, const char *key, const char *value)
+static int put_export_hdf5_text(hid_t at, const char *key, const char *value)
 {
 	hid_t type = H5Tcopy(H5T_C_S1), space = H5Screate(H5S_SCALAR);
 	hid_t attribute;
@@ -93,14 +93,14 @@ static int put_uncertainties(hid_t set, const struct incise_table *table, int i)
 	int rc = 0;
 
 	if (names)
-		rc = put_text(set, "uncertainty_variables", names);
+		rc = put_export_hdf5_text(set, "uncertainty_variables", names);
 	if (names && !rc)
-		rc = put_text(set, "ancillary_variables", names);
+		rc = put_export_hdf5_text(set, "ancillary_variables", names);
 	free(names);
 	if (!rc && column->of)
-		rc = put_text(set, "uncertainty_of", column->of);
+		rc = put_export_hdf5_text(set, "uncertainty_of", column->of);
 	if (!rc && column->of)
-		rc = put_text(set, "correlation", column->correlation);
+		rc = put_export_hdf5_text(set, "correlation", column->correlation);
 	return rc;
 }
 
@@ -119,8 +119,8 @@ static hid_t make_column(hid_t file, const struct incise_table *table, int i)
 				 H5P_DEFAULT, how, H5P_DEFAULT);
 	H5Pclose(how);
 	H5Sclose(space);
-	if (set >= 0 && !put_text(set, "units", column->unit) &&
-	    !put_text(set, "description", column->about) &&
+	if (set >= 0 && !put_export_hdf5_text(set, "units", column->unit) &&
+	    !put_export_hdf5_text(set, "description", column->about) &&
 	    !put_uncertainties(set, table, i))
 		return set;
 	if (set >= 0)
@@ -147,7 +147,7 @@ static void hdf5_close(struct incise_table *table)
 	table->state = NULL;
 }
 
-static int open_file(struct incise_table *table, struct hdf5 *hdf5)
+static int open_export_hdf5_file(struct incise_table *table, struct hdf5 *hdf5)
 {
 	hid_t access = H5Pcreate(H5P_FILE_ACCESS);
 	char path[40];
@@ -200,15 +200,15 @@ static int hdf5_open(struct incise_table *table, struct incise_error *err)
 		hdf5->columns[i] = -1;
 	if (!hdf5->columns || !hdf5->narrow || begin_deflate(hdf5))
 		return incise_error_set(err, ENOMEM, "HDF5: out of memory");
-	bad = open_file(table, hdf5);
+	bad = open_export_hdf5_file(table, hdf5);
 	for (int i = 0; i < table->n_columns && !bad; i++) {
 		hdf5->columns[i] = make_column(hdf5->file, table, i);
 		bad = hdf5->columns[i] < 0;
 	}
 	for (int i = 0; table->provenance && i < table->provenance->n && !bad; i++)
-		bad = put_text(hdf5->file, table->provenance->items[i].key,
-			       table->provenance->items[i].value);
-	return bad ? fail(hdf5, "the file cannot be started", err) : 0;
+		bad = put_export_hdf5_text(hdf5->file, table->provenance->items[i].key,
+					   table->provenance->items[i].value);
+	return bad ? fail_export_hdf5(hdf5, "the file cannot be started", err) : 0;
 }
 
 /* A column of the block as it is stored. */
@@ -282,7 +282,7 @@ static int hdf5_put(struct incise_table *table, struct incise_error *err)
 				table->block + (size_t)i * INCISE_TABLE_STRIDE,
 				table->filled, from, type);
 	}
-	return bad ? fail(hdf5, "rows cannot be written", err) : 0;
+	return bad ? fail_export_hdf5(hdf5, "rows cannot be written", err) : 0;
 }
 
 /* Write the texts of a column of names. */
@@ -335,7 +335,7 @@ static int hdf5_end(struct incise_table *table, struct incise_error *err)
 		bad = 1;
 	else if (!bad)
 		hdf5->file = -1;
-	return bad ? fail(hdf5, "the file cannot be closed", err) : 0;
+	return bad ? fail_export_hdf5(hdf5, "the file cannot be closed", err) : 0;
 }
 
 const struct incise_table_format incise_table_hdf5 = {
