@@ -18,7 +18,7 @@
 #include "cli/report_script.h"
 #include "session/session.h"
 
-struct job {
+struct assess_job {
 	const char *reference_path, *page, *csv;
 	bool json;
 
@@ -37,13 +37,13 @@ struct assessed {
 
 static const struct cli_option options[] = {
 	{0, "reference", "FILE", "session to compare with, for example of an expert",
-	 CLI_INPUT(struct job, reference_path)},
+	 CLI_INPUT(struct assess_job, reference_path)},
 	{'o', "output", "FILE.html",
 	 "write a page with figures of the path and the force",
-	 CLI_OUTPUT(struct job, page), .extensions = ".html"},
+	 CLI_OUTPUT(struct assess_job, page), .extensions = ".html"},
 	{0, "csv", "FILE", "write one row per session as CSV",
-	 CLI_OUTPUT(struct job, csv)},
-	{0, "json", NULL, "report as JSON", CLI_FLAG(struct job, json)},
+	 CLI_OUTPUT(struct assess_job, csv)},
+	{0, "json", NULL, "report as JSON", CLI_FLAG(struct assess_job, json)},
 	{0},
 };
 
@@ -95,7 +95,7 @@ static void number_text(double value, int digits, char *text, size_t size)
 
 /* --- reading --------------------------------------------------------------------------- */
 
-static void parse_assess(struct job *job, int argc, char **argv)
+static void parse_assess(struct assess_job *job, int argc, char **argv)
 {
 	cli_parse(&command, argc, argv, job);
 	job->n = argc - optind;
@@ -124,7 +124,7 @@ static void load_assess(struct assessed *a, const char *path)
 	}
 }
 
-static void load_all(struct job *job, char **paths)
+static void load_all(struct assess_job *job, char **paths)
 {
 	job->session = cli_alloc((size_t)job->n + 1, sizeof(*job->session));
 	for (int i = 0; i < job->n; i++)
@@ -142,7 +142,7 @@ static void load_all(struct job *job, char **paths)
 }
 
 /* Sessions, and the reference if there is one. */
-static int rows(const struct job *job)
+static int rows(const struct assess_job *job)
 {
 	return job->n + !!job->reference;
 }
@@ -160,7 +160,7 @@ static const char *met_text(const struct session_verdict *verdict)
 }
 
 /* Value, asked, met, and of a reference its value and the difference. */
-struct line {
+struct assess_line {
 	char value[32], asked[48], reference[32], difference[32];
 	const char *label, *unit, *met;
 };
@@ -176,14 +176,14 @@ static void sign(char *text, size_t size)
 	*text = '+';
 }
 
-static struct line criterion_line(const struct assessed *a,
-				  const struct assessed *reference, int i)
+static struct assess_line criterion_line(const struct assessed *a,
+					 const struct assessed *reference, int i)
 {
 	const struct session_verdict *verdict = &a->verdict[i];
-	struct line line = {.label = session_criterion_label(i),
-			    .unit = isnan(verdict->value) ? ""
-							  : session_criterion_unit(i),
-			    .met = met_text(verdict)};
+	struct assess_line line = {
+		.label = session_criterion_label(i),
+		.unit = isnan(verdict->value) ? "" : session_criterion_unit(i),
+		.met = met_text(verdict)};
 	double difference;
 
 	session_criterion_value(i, verdict->value, line.value, sizeof(line.value));
@@ -200,13 +200,13 @@ static struct line criterion_line(const struct assessed *a,
 	return line;
 }
 
-static struct line metric_line(const struct assessed *a, const struct assessed *reference,
-			       int i)
+static struct assess_line metric_line(const struct assessed *a,
+				      const struct assessed *reference, int i)
 {
-	struct line line = {.label = metrics[i].label,
-			    .unit = isnan(metric_of(a, i)) ? "" : metrics[i].unit,
-			    .asked = "-",
-			    .met = "-"};
+	struct assess_line line = {.label = metrics[i].label,
+				   .unit = isnan(metric_of(a, i)) ? "" : metrics[i].unit,
+				   .asked = "-",
+				   .met = "-"};
 
 	number_text(metric_of(a, i), metrics[i].digits, line.value, sizeof(line.value));
 	if (!reference)
@@ -219,8 +219,8 @@ static struct line metric_line(const struct assessed *a, const struct assessed *
 	return line;
 }
 
-static struct line line_of(const struct assessed *a, const struct assessed *reference,
-			   int i)
+static struct assess_line line_of(const struct assessed *a,
+				  const struct assessed *reference, int i)
 {
 	return i < INCISE_CRITERIA ? criterion_line(a, reference, i)
 				   : metric_line(a, reference, i - INCISE_CRITERIA);
@@ -292,7 +292,7 @@ static void print_lines(const struct assessed *a, const struct assessed *referen
 	printf("\n%-34s %8s %-3s %-12s met", "", "value", "", "asked");
 	printf(reference ? "  %10s %10s\n" : "\n", "reference", "difference");
 	for (int i = 0; i < LINES; i++) {
-		struct line line = line_of(a, reference, i);
+		struct assess_line line = line_of(a, reference, i);
 
 		printf("%-34s %8s %-3s %-12s %-3s", line.label, line.value, line.unit,
 		       line.asked, line.met);
@@ -351,7 +351,7 @@ static void cell_text(const struct assessed *a, int criterion, char *text, size_
 		snprintf(text + n, size - n, "!");
 }
 
-static void print_table(const struct job *job)
+static void print_table(const struct assess_job *job)
 {
 	int width = (int)strlen("session");
 	char text[40];
@@ -446,7 +446,7 @@ static json_t *session_report(const struct assessed *a, const struct assessed *r
 			 reference ? difference_json(a, reference) : json_null());
 }
 
-static void print_assess_json(const struct job *job)
+static void print_assess_json(const struct assess_job *job)
 {
 	json_t *list = json_array();
 
@@ -493,7 +493,7 @@ static void put_csv_row(FILE *out, const struct assessed *a, bool reference)
 	fputc('\n', out);
 }
 
-static void write_csv(const struct job *job)
+static void write_csv(const struct assess_job *job)
 {
 	struct incise_outfile *file;
 	FILE *out = whole_file_begin(job->csv, &file);
@@ -559,7 +559,7 @@ static json_t *lines_json(const struct assessed *a, const struct assessed *refer
 	json_t *list = json_array();
 
 	for (int i = 0; i < LINES; i++) {
-		struct line line = line_of(a, reference, i);
+		struct assess_line line = line_of(a, reference, i);
 
 		json_array_append_new(
 			list, json_pack("{ss ss ss ss ss ss ss sb}", "label", line.label,
@@ -642,7 +642,7 @@ static void draw_figures(const struct assessed *a, const struct assessed *refere
 	draw_force(a->session, expert, name);
 }
 
-static json_t *shown_json(const struct job *job, const struct assessed *a)
+static json_t *shown_json(const struct assess_job *job, const struct assessed *a)
 {
 	const struct session *s = a->session;
 	const char *slash = strrchr(a->path, '/');
@@ -656,7 +656,7 @@ static json_t *shown_json(const struct job *job, const struct assessed *a)
 			 "cuts", cuts_json(s), "phases", phases_json(s));
 }
 
-static void write_page(const struct job *job)
+static void write_page(const struct assess_job *job)
 {
 	json_t *sessions = json_array(), *heads = json_array(), *page;
 	struct incise_error err = {0};
@@ -690,7 +690,7 @@ static void write_page(const struct job *job)
 
 int main(int argc, char **argv)
 {
-	struct job job = {0};
+	struct assess_job job = {0};
 	bool quiet;
 
 	parse_assess(&job, argc, argv);

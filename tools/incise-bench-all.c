@@ -34,7 +34,7 @@ static const char *const benchmarks[] = {"precision", "training", "stability", "
 					 "view",      "scenes",	  NULL};
 #define BENCHMARKS (int)(sizeof(benchmarks) / sizeof(*benchmarks) - 1)
 
-struct job {
+struct bench_all_job {
 	const char *folder, *from, *against;
 	char *only[BENCHMARKS];
 	int n_only;
@@ -43,7 +43,7 @@ struct job {
 
 static void parse_only(void *options, char *text)
 {
-	struct job *job = options;
+	struct bench_all_job *job = options;
 
 	job->n_only = cli_list("only", text, job->only, BENCHMARKS);
 	for (int i = 0; i < job->n_only; i++)
@@ -52,18 +52,18 @@ static void parse_only(void *options, char *text)
 
 static const struct cli_option options[] = {
 	{0, "report", "DIR", "folder to write everything to",
-	 CLI_OUTPUTS(struct job, folder)},
+	 CLI_OUTPUTS(struct bench_all_job, folder)},
 	{0, "from", "DIR",
 	 "measure nothing: write report.html and report.md of DIR/report.json "
 	 "again",
-	 CLI_TEXT(struct job, from)},
+	 CLI_TEXT(struct bench_all_job, from)},
 	{0, "against", "OLD.json",
 	 "report what changed beyond noise since that report.json",
-	 CLI_INPUT(struct job, against)},
+	 CLI_INPUT(struct bench_all_job, against)},
 	{0, "only", "LIST", "these benchmarks only", CLI_PARSED_BY(parse_only)},
 	{0, "quick", NULL, "smoke test: few points and repeats, not for publication",
-	 CLI_FLAG(struct job, quick)},
-	{0, "json", NULL, "print report.json, too", CLI_FLAG(struct job, json)},
+	 CLI_FLAG(struct bench_all_job, quick)},
+	{0, "json", NULL, "print report.json, too", CLI_FLAG(struct bench_all_job, json)},
 	{0},
 };
 
@@ -248,7 +248,7 @@ static json_t *run_benchmarks(const char *folder, json_t *names, bool quick,
 	return measured;
 }
 
-static bool wanted(const struct job *job, const char *benchmark)
+static bool wanted(const struct bench_all_job *job, const char *benchmark)
 {
 	for (int i = 0; i < job->n_only; i++)
 		if (!strcmp(job->only[i], benchmark))
@@ -257,7 +257,7 @@ static bool wanted(const struct job *job, const char *benchmark)
 }
 
 /* The command that gives the same; the folder is another on another machine. */
-static json_t *command_of(const struct job *job)
+static json_t *command_of(const struct bench_all_job *job)
 {
 	char line[600];
 	int n = snprintf(line, sizeof(line), "incise bench all --report DIR%s",
@@ -269,7 +269,7 @@ static json_t *command_of(const struct job *job)
 	return json_text(line);
 }
 
-static json_t *begin_report(const struct job *job)
+static json_t *begin_report(const struct bench_all_job *job)
 {
 	time_t now = time(NULL);
 	struct tm utc;
@@ -308,7 +308,7 @@ static void compare_bench_all(const char *path, const json_t *old, json_t *repor
 	json_object_set_new(report, "against", comparison);
 }
 
-static json_t *measure_bench_all(const struct job *job)
+static json_t *measure_bench_all(const struct bench_all_job *job)
 {
 	json_t *old = job->against ? compare_load(job->against) : NULL;
 	json_t *names = json_array(), *report;
@@ -344,9 +344,9 @@ static json_t *measure_bench_all(const struct job *job)
 
 /* --- the command line --- */
 
-static void parse_bench_all(struct job *job, int argc, char **argv)
+static void parse_bench_all(struct bench_all_job *job, int argc, char **argv)
 {
-	*job = (struct job){0};
+	*job = (struct bench_all_job){0};
 	cli_parse(&command, argc, argv, job);
 	if (optind < argc)
 		cli_usage("'%s': bench all takes options only", argv[optind]);
@@ -361,7 +361,7 @@ static void parse_bench_all(struct job *job, int argc, char **argv)
 }
 
 /* One line for the worst that is not as it should be. */
-static void judge_bench_all(const struct job *job, const json_t *report)
+static void judge_bench_all(const struct bench_all_job *job, const json_t *report)
 {
 	const json_t *against = json_object_get(report, "against");
 	size_t failed = json_array_size(json_object_get(report, "failed"));
@@ -384,7 +384,7 @@ static void judge_bench_all(const struct job *job, const json_t *report)
 int main(int argc, char **argv)
 {
 	struct incise_error err = {0};
-	struct job job;
+	struct bench_all_job job;
 	json_t *report;
 
 	parse_bench_all(&job, argc, argv);

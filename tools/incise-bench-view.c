@@ -38,7 +38,7 @@ struct fed_view {
 	int fed; /* ticks so far */
 };
 
-struct run {
+struct bench_view_run {
 	struct incise_scene *scene;
 	struct incise_rig *rig;
 	struct incise_plan *plan;
@@ -51,11 +51,11 @@ static int ticked(void *context, const struct incise_tick *tick)
 	return 0;
 }
 
-static void open_run(struct run *run, const char *path)
+static void open_run(struct bench_view_run *run, const char *path)
 {
 	struct incise_error err = {0};
 
-	*run = (struct run){.scene = incise_scene_load(path, NULL, &err)};
+	*run = (struct bench_view_run){.scene = incise_scene_load(path, NULL, &err)};
 	if (run->scene)
 		run->rig = incise_rig_open(PROCEDURE_RIG, INCISE_RIG_TRACKER, &err);
 	if (run->rig)
@@ -72,7 +72,7 @@ static void view_script_begin(struct view_script *script, const char *scene,
 	struct incise_loop_stats *stats = malloc(sizeof(*stats));
 	struct incise_loop_options loop = {.ticked = ticked};
 	struct incise_error err = {0};
-	struct run run;
+	struct bench_view_run run;
 
 	open_run(&run, scene);
 	loop.context = &run.procedure;

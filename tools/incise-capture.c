@@ -17,7 +17,7 @@
 
 enum camera { CAMERA_AUTO, CAMERA_OFF, CAMERA_PICTURES, CAMERA_DEPTH };
 
-struct options {
+struct capture_options {
 	enum { BOTH, ONLY_FORCE, ONLY_TRACKER } only;
 	const char *rig, *calibration, *output;
 	enum camera camera;
@@ -33,7 +33,8 @@ static const char *const triggers[] = {"button", "sync", NULL}; /* or a force */
 static void parse_trigger(void *whole, char *text)
 {
 	static const struct cli_unit units[] = {{"N", 1}, {"mN", 1e-3}, {0}};
-	struct incise_capture_options *capture = &((struct options *)whole)->capture;
+	struct incise_capture_options *capture =
+		&((struct capture_options *)whole)->capture;
 
 	capture->recorder.trigger_button = !strcmp(text, triggers[0]);
 	capture->recorder.trigger_force_N = 0;
@@ -51,7 +52,8 @@ static void parse_start_at(void *whole, char *text)
 {
 	struct incise_error err = {0};
 
-	if (incise_capture_start_at(&((struct options *)whole)->capture, text, &err))
+	if (incise_capture_start_at(&((struct capture_options *)whole)->capture, text,
+				    &err))
 		cli_usage("%s", err.text);
 }
 
@@ -61,7 +63,7 @@ static void parse_clock_source(void *whole, char *text)
 
 	if (incise_recorder_check_clock_source(text, &err))
 		cli_usage("%s", err.text);
-	((struct options *)whole)->capture.recorder.clock_source = text;
+	((struct capture_options *)whole)->capture.recorder.clock_source = text;
 }
 
 static const char *const onlys[] = {"force,tracker", "force", "tracker", NULL};
@@ -71,21 +73,21 @@ static const struct cli_option option_table[] = {
 	 "folder to record into; --overwrite replaces an existing one once the new "
 	 "one is complete, and removes the rest of an interrupted one, "
 	 "NAME.rec.part",
-	 CLI_OUTPUTS(struct options, output)},
-	{CLI_RIG_OPTION(struct options, rig)},
-	CALIBRATION_OPTION(struct options, calibration),
+	 CLI_OUTPUTS(struct capture_options, output)},
+	{CLI_RIG_OPTION(struct capture_options, rig)},
+	CALIBRATION_OPTION(struct capture_options, calibration),
 	{0, "duration", "TIME",
 	 "end after this time, for example 10s, 500ms, 2min or 1h (default: at "
 	 "Ctrl-C; on the simulated rig at the end of its cuts)",
-	 CLI_DURATION(struct options, capture.duration_s, 0.01, 1e6)},
+	 CLI_DURATION(struct capture_options, capture.duration_s, 0.01, 1e6)},
 	{0, "camera", "WHAT",
 	 "off; frames: record frames; depth: also find the scalpel in them; auto: "
 	 "as rig.conf has it (default; a rig sim:… then has no camera)",
-	 CLI_CHOICE(struct options, camera, cameras)},
+	 CLI_CHOICE(struct capture_options, camera, cameras)},
 	{0, "only", "LIST",
 	 "force or tracker: record this stream alone (and the camera); "
 	 "force,tracker: both (default)",
-	 CLI_CHOICE(struct options, only, onlys)},
+	 CLI_CHOICE(struct capture_options, only, onlys)},
 	{0, "trigger", "WHAT",
 	 "wait for the button of the stylus, for a force such as 0.2N, or for "
 	 "sync[:DEVICE], a pulse of the SYNC line of the stepper module; the "
@@ -101,8 +103,9 @@ static const struct cli_option option_table[] = {
 	 "sim:TAI_S,PPM,BOUND_US",
 	 CLI_PARSED_BY(parse_clock_source)},
 	{0, "cuts", NULL, "mark the start and the end of each cut in the table events",
-	 CLI_FLAG(struct options, capture.recorder.cuts)},
-	{0, "json", NULL, "report as one JSON object", CLI_FLAG(struct options, json)},
+	 CLI_FLAG(struct capture_options, capture.recorder.cuts)},
+	{0, "json", NULL, "report as one JSON object",
+	 CLI_FLAG(struct capture_options, json)},
 	{0},
 };
 
@@ -122,7 +125,7 @@ static const struct cli_command command = {
 		"no signature by the key of the rig",
 };
 
-static void parse_options(struct options *options, int argc, char **argv)
+static void parse_options(struct capture_options *options, int argc, char **argv)
 {
 	const struct incise_capture_options *capture = &options->capture;
 	const struct incise_recorder_setup *recorder = &capture->recorder;
@@ -163,7 +166,7 @@ static void parse_options(struct options *options, int argc, char **argv)
 
 /* --- recording ----------------------------------------------------------------------- */
 
-static struct incise_rig *open_rig(const struct options *options)
+static struct incise_rig *open_rig(const struct capture_options *options)
 {
 	static const unsigned int devices[] = {
 		[BOTH] = INCISE_RIG_TRACKER | INCISE_RIG_FORCE,
@@ -181,7 +184,7 @@ static struct incise_rig *open_rig(const struct options *options)
 }
 
 /* Whether the depth is measured in pictures. */
-static bool use_vision(const struct options *options, struct incise_rig *rig,
+static bool use_vision(const struct capture_options *options, struct incise_rig *rig,
 		       struct incise_vision_setup *vision)
 {
 	bool has = incise_rig_camera(rig) && !incise_rig_vision(rig, vision);
@@ -203,7 +206,7 @@ static void print_warning(void *context, const char *text)
  * Record into @target. With --overwrite a recording without a sample is removed, so that it does not
  * replace one with samples.
  */
-static void record_rig(const struct options *options, struct incise_rig *rig,
+static void record_rig(const struct capture_options *options, struct incise_rig *rig,
 		       const char *target, struct incise_capture_result *result)
 {
 	const struct incise_recorder_stats *stats = &result->stats;
@@ -252,9 +255,9 @@ static void sign_recording(const char *path, struct signing *signing)
 
 int main(int argc, char **argv)
 {
-	struct options options = {.capture = {.stop = &cli_stop,
-					      .step = capture_view_step,
-					      .warn = print_warning}};
+	struct capture_options options = {.capture = {.stop = &cli_stop,
+						      .step = capture_view_step,
+						      .warn = print_warning}};
 	struct incise_recorder_setup *recorder = &options.capture.recorder;
 	struct calibration_used calibration;
 	struct incise_capture_result result;

@@ -17,7 +17,7 @@
 #include "cli/plan_report.h"
 #include "cli/scene_argument.h"
 
-struct job {
+struct compile_job {
 	const char *output, *c_source, *rig, *calibration;
 	bool json;
 	struct incise_fixed_options options;
@@ -62,27 +62,28 @@ static const struct cli_option options[] = {
 	{'o', "output", "FILE",
 	 "write the compiled model (.fx) or scene (.plan) to this file; - is "
 	 "standard output",
-	 CLI_OUTPUT(struct job, output), .extensions = ".fx .plan"},
+	 CLI_OUTPUT(struct compile_job, output), .extensions = ".fx .plan"},
 	{0, "budget", "ERROR",
 	 "largest certified error, for example 0.1mN, 50uN or 1e-4 in the output's "
 	 "unit (default: 0.1mN)",
-	 CLI_QUANTITY(struct job, options.budget, newtons, 1e-9, 1e9)},
+	 CLI_QUANTITY(struct compile_job, options.budget, newtons, 1e-9, 1e9)},
 	{0, "method", "KIND",
 	 "direct, table or force (default: the cheapest within the budget)",
-	 CLI_PARSED(struct job, options.arithmetic, parse_arithmetic)},
+	 CLI_PARSED(struct compile_job, options.arithmetic, parse_arithmetic)},
 	{0, "cells", "N", "at least N cells per input of tables, up to 4096",
-	 CLI_INTEGER(struct job, options.cells, 1, 4096)},
+	 CLI_INTEGER(struct compile_job, options.cells, 1, 4096)},
 	{0, "c-source", "FILE.c",
 	 "also write it as C for a microcontroller, with a function FILE_eval",
-	 CLI_OUTPUT(struct job, c_source), .parse = check_c_source, .extensions = ".c"},
+	 CLI_OUTPUT(struct compile_job, c_source), .parse = check_c_source,
+	 .extensions = ".c"},
 	{0, "model", "FILE", "scene: use this model instead of its own",
-	 CLI_INPUT(struct job, scene.model)},
+	 CLI_INPUT(struct compile_job, scene.model)},
 	{'r', "rig", "RIG",
 	 "scene: rig.conf with the tracker and the actuators of the plan (default: "
 	 "a tracker of 120 Hz and no actuator, which no kernel loads)",
-	 CLI_INPUT(struct job, rig)},
-	CALIBRATION_OPTION(struct job, calibration),
-	{0, "json", NULL, "report as JSON", CLI_FLAG(struct job, json)},
+	 CLI_INPUT(struct compile_job, rig)},
+	CALIBRATION_OPTION(struct compile_job, calibration),
+	{0, "json", NULL, "report as JSON", CLI_FLAG(struct compile_job, json)},
 	{0},
 };
 
@@ -136,7 +137,7 @@ static void report_compile(const struct incise_fixed *fx, const char *model,
 	cli_written();
 }
 
-static void compile_model(const struct job *job, const char *path)
+static void compile_model(const struct compile_job *job, const char *path)
 {
 	struct incise_error err = {0};
 	struct incise_model *model = cli_require(incise_model_load(path, &err), &err);
@@ -162,7 +163,7 @@ static struct incise_rig *open_rig(const char *spec)
 			    INCISE_RIG_TRACKER | INCISE_RIG_STEPPER | INCISE_RIG_WATCH);
 }
 
-static void compile_scene(const struct job *job)
+static void compile_scene(const struct compile_job *job)
 {
 	struct incise_rig *rig = job->rig ? open_rig(job->rig) : NULL;
 	struct calibration_used calibration;
@@ -199,7 +200,7 @@ static void compile_scene(const struct job *job)
 	incise_rig_close(rig);
 }
 
-static bool is_of_model(const struct job *job)
+static bool is_of_model(const struct compile_job *job)
 {
 	struct incise_fixed_options usual;
 
@@ -211,7 +212,7 @@ static bool is_of_model(const struct job *job)
 
 int main(int argc, char **argv)
 {
-	struct job job = {.scene.arith = "fixed"};
+	struct compile_job job = {.scene.arith = "fixed"};
 	const char *path;
 	struct incise_fixed_options usual;
 	bool found; /* a scene, by its path or name */

@@ -30,7 +30,7 @@
 #define OTHER_LIVER 1000
 #define SEED_MAX (INT32_MAX - OTHER_LIVER)
 
-struct options {
+struct demo_options {
 	struct demo demo;
 	const char *loop_time, *scene;
 };
@@ -44,17 +44,17 @@ static void parse_loop(void *loop_time, char *text)
 
 static const struct cli_option option_table[] = {
 	{0, "report", "DIR", "folder to leave everything in (default: demo.out)",
-	 CLI_OUTPUTS(struct options, demo.folder)},
+	 CLI_OUTPUTS(struct demo_options, demo.folder)},
 	{0, "seed", "N", "of the simulated rig (default: 1)",
-	 CLI_INTEGER(struct options, demo.seed, 0, SEED_MAX)},
+	 CLI_INTEGER(struct demo_options, demo.seed, 0, SEED_MAX)},
 	{0, "duration", "TIME", "length of the haptic loop (default: 10s)",
-	 CLI_PARSED(struct options, loop_time, parse_loop)},
+	 CLI_PARSED(struct demo_options, loop_time, parse_loop)},
 	{0, "scene", "SCENE",
 	 "write a film and a contact sheet of a procedure on this scene, for "
 	 "example neck (Bhasin et al., 2005), instead",
-	 CLI_TEXT(struct options, scene)},
+	 CLI_TEXT(struct demo_options, scene)},
 	{0, "json", NULL, "print the summary as JSON, and nothing else",
-	 CLI_FLAG(struct options, demo.quiet)},
+	 CLI_FLAG(struct demo_options, demo.quiet)},
 	{0},
 };
 
@@ -426,8 +426,8 @@ static void film_scene(const char *scene, const char *folder)
 
 int main(int argc, char **argv)
 {
-	struct options options = {.demo = {.folder = "demo.out", .seed = 1},
-				  .loop_time = "10s"};
+	struct demo_options options = {.demo = {.folder = "demo.out", .seed = 1},
+				       .loop_time = "10s"};
 	struct demo *demo = &options.demo;
 	struct incise_model *model;
 	char *plot;

@@ -15,28 +15,28 @@
 #include "cli/json.h"
 #include "cli/scene_argument.h"
 
-struct job {
+struct eval_job {
 	const char *arith, *grid;
 	bool no_clamp, sd, parts, json;
 };
 
 static const struct cli_option options[] = {
 	{0, "arith", "KIND", "double (default) or fixed; a .fx is always fixed",
-	 CLI_PARSED(struct job, arith, scene_argument_arith)},
+	 CLI_PARSED(struct eval_job, arith, scene_argument_arith)},
 	{0, "no-clamp", NULL, "extrapolate outside the support (double only)",
-	 CLI_FLAG(struct job, no_clamp)},
+	 CLI_FLAG(struct eval_job, no_clamp)},
 	{0, "grid", "NxM",
 	 "evaluate on a grid over the support instead of reading; prints inputs "
 	 "and output, an empty line after each row",
-	 CLI_TEXT(struct job, grid)},
+	 CLI_TEXT(struct eval_job, grid)},
 	{0, "sd", NULL,
 	 "also print the standard deviation of a new measurement, from "
 	 "MODEL.fis.sd, which incise train writes",
-	 CLI_FLAG(struct job, sd)},
+	 CLI_FLAG(struct eval_job, sd)},
 	{0, "parts", NULL, "also print its parts: data, model and calibration; with --sd",
-	 CLI_FLAG(struct job, parts)},
+	 CLI_FLAG(struct eval_job, parts)},
 	{0, "json", NULL, "report as JSON, one row for each evaluation",
-	 CLI_FLAG(struct job, json)},
+	 CLI_FLAG(struct eval_job, json)},
 	{0},
 };
 
@@ -297,7 +297,7 @@ static void eval_file(struct evaluator *e, const char *path)
 	incise_infile_close(in);
 }
 
-static void parse_eval(struct job *job, int argc, char **argv)
+static void parse_eval(struct eval_job *job, int argc, char **argv)
 {
 	cli_parse(&command, argc, argv, job);
 	if (optind >= argc)
@@ -332,7 +332,7 @@ static void warn_outside(const struct evaluator *e, bool no_clamp)
 int main(int argc, char **argv)
 {
 	struct evaluator e = {0};
-	struct job job = {0};
+	struct eval_job job = {0};
 
 	parse_eval(&job, argc, argv);
 	open_model(&e, argv[optind], job.arith, !job.no_clamp);

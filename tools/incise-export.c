@@ -16,7 +16,7 @@
 #define BINS_MAX 1000
 #define CAMERA_OFF_MM 1.0 /* of depths by two devices that may differ */
 
-struct job {
+struct export_job {
 	const char *output;
 	bool json, damaged, no_lineage;
 	int min_count; /* 0: not given */
@@ -30,7 +30,7 @@ struct job {
 /* "12x10" */
 static void parse_bins(void *options, char *text)
 {
-	struct incise_export_options *how = &((struct job *)options)->how;
+	struct incise_export_options *how = &((struct export_job *)options)->how;
 	char extra;
 
 	if (sscanf(text, "%5d%*1[xX]%5d%c", &how->depth_bins, &how->velocity_bins,
@@ -44,7 +44,7 @@ static void parse_bins(void *options, char *text)
 
 static void load_calibration(void *options, char *path)
 {
-	struct job *job = options;
+	struct export_job *job = options;
 
 	calibration_use(&job->calibration, path, NULL);
 	job->how.calibration = &job->calibration.values;
@@ -59,34 +59,34 @@ static const struct cli_option options[] = {
 	{'o', "output", "FILE",
 	 "dataset to write, in the format of its extension:" INCISE_ROW_EXTENSIONS
 		 INCISE_MESSAGE_EXTENSIONS "; - is CSV on standard output (default)",
-	 CLI_OUTPUT(struct job, output),
+	 CLI_OUTPUT(struct export_job, output),
 	 .extensions = INCISE_ROW_EXTENSIONS INCISE_MESSAGE_EXTENSIONS},
 	{0, "rate", "HZ",
 	 "rows per second, each the mean of its samples (default: all samples)",
-	 CLI_NUMBER(struct job, how.rate_hz, 1e-3, 1e9)},
+	 CLI_NUMBER(struct export_job, how.rate_hz, 1e-3, 1e9)},
 	{0, "resample", NULL,
 	 "export the whole recording with the pose, at each force sample or at "
 	 "--rate, with uncertainty and flags",
-	 CLI_FLAG(struct job, how.resample)},
+	 CLI_FLAG(struct export_job, how.resample)},
 	{0, "from", "TIME", "begin so long after the first sample, for example 90s",
-	 CLI_DURATION(struct job, how.from_s, 0, 1e9)},
+	 CLI_DURATION(struct export_job, how.from_s, 0, 1e9)},
 	{0, "to", "TIME", "end so long after the first sample",
-	 CLI_DURATION(struct job, how.to_s, 1e-3, 1e9)},
+	 CLI_DURATION(struct export_job, how.to_s, 1e-3, 1e9)},
 	{0, "cut", "N", "only this cut, from 1",
-	 CLI_INTEGER(struct job, how.cut, 1, 1000000000)},
+	 CLI_INTEGER(struct export_job, how.cut, 1, 1000000000)},
 	{'a', "average", "DEPTHxVELOCITY",
 	 "average in bins of depth and velocity, for example 12x10",
 	 CLI_PARSED_BY(parse_bins)},
 	{0, "by-cut", NULL, "average each cut separately and name it in the column 'cut'",
-	 CLI_FLAG(struct job, how.by_cut)},
+	 CLI_FLAG(struct export_job, how.by_cut)},
 	{0, "depth-max", "MM",
 	 "upper end of the bins (default: largest where the blade advances)",
-	 CLI_NUMBER(struct job, how.depth_max_mm, 0.1, 1e6)},
+	 CLI_NUMBER(struct export_job, how.depth_max_mm, 0.1, 1e6)},
 	{0, "velocity-max", "MM_S",
 	 "upper end of the bins (default: largest where the blade advances)",
-	 CLI_NUMBER(struct job, how.velocity_max_mm_s, 0.1, 1e6)},
+	 CLI_NUMBER(struct export_job, how.velocity_max_mm_s, 0.1, 1e6)},
 	{0, "min-count", "N", "leave out bins with fewer samples (default: 50)",
-	 CLI_INTEGER(struct job, min_count, 1, 1000000000)},
+	 CLI_INTEGER(struct export_job, min_count, 1, 1000000000)},
 	{'c', "calibration", "FILE",
 	 "use this calibration of force, camera and delays instead of that of the "
 	 "recordings; none: nominal values",
@@ -94,19 +94,19 @@ static const struct cli_option options[] = {
 	{0, "profile", "NAME",
 	 "messages of MCAP: plain (JSON, default) or ros2 (ROS 2, as rosbag2 "
 	 "stores them; metres and UTC)",
-	 CLI_CHOICE(struct job, profile, profiles)},
+	 CLI_CHOICE(struct export_job, profile, profiles)},
 	{0, "tai", NULL,
 	 "also columns tai_ns and tai_u_ns: TAI and the bound of its error",
-	 CLI_FLAG(struct job, how.tai)},
+	 CLI_FLAG(struct export_job, how.tai)},
 	{0, "uncertainty", "WHICH",
 	 "columns of standard uncertainties: none (default), total, or parts, "
 	 "which are the total and what it is made of",
-	 CLI_CHOICE(struct job, uncertainty, uncertainties)},
+	 CLI_CHOICE(struct export_job, uncertainty, uncertainties)},
 	{0, "no-lineage", NULL, "write a CSV without the comments on its provenance",
-	 CLI_FLAG(struct job, no_lineage)},
-	RECORDING_DAMAGED(struct job, damaged),
+	 CLI_FLAG(struct export_job, no_lineage)},
+	RECORDING_DAMAGED(struct export_job, damaged),
 	{0, "json", NULL, "report as one JSON object; needs -o FILE",
-	 CLI_FLAG(struct job, json)},
+	 CLI_FLAG(struct export_job, json)},
 	{0},
 };
 
@@ -167,18 +167,18 @@ static void warn_unstated(const struct incise_export_report *report)
 
 static int progress(void *context, double share)
 {
-	struct job *job = context;
+	struct export_job *job = context;
 
 	cli_progress_bar(job->output, share, &job->percent);
 	return 0;
 }
 
-static bool is_part(const struct job *job)
+static bool is_part(const struct export_job *job)
 {
 	return job->how.from_s > 0 || job->how.to_s > 0 || job->how.cut;
 }
 
-static void export(char **paths, int n, const struct job *job,
+static void export(char **paths, int n, const struct export_job *job,
 		   struct incise_export_report *report)
 {
 	struct incise_recording **recordings = cli_alloc(n, sizeof(*recordings));
@@ -200,16 +200,16 @@ static void export(char **paths, int n, const struct job *job,
 	free(recordings);
 }
 
-static bool has_messages(const struct job *job)
+static bool has_messages(const struct export_job *job)
 {
 	return cli_extension_in(job->output, INCISE_MESSAGE_EXTENSIONS);
 }
 
-static void parse_export(struct job *job, int argc, char **argv)
+static void parse_export(struct export_job *job, int argc, char **argv)
 {
 	struct incise_export_options *how = &job->how;
 
-	*job = (struct job){.output = "-", .percent = -1};
+	*job = (struct export_job){.output = "-", .percent = -1};
 	incise_export_options_init(how);
 	cli_parse(&command, argc, argv, job);
 	if (optind == argc)
@@ -253,7 +253,7 @@ static void parse_export(struct job *job, int argc, char **argv)
 int main(int argc, char **argv)
 {
 	struct incise_export_report report = {0};
-	struct job job;
+	struct export_job job;
 
 	parse_export(&job, argc, argv);
 	export(argv + optind, argc - optind, &job, &report);

@@ -31,7 +31,7 @@
 #include "stepper/module.h"
 #include "train/sources.h"
 
-struct job {
+struct info_job {
 	bool json, all, damaged, dataset, all_rows;
 	const char *group, *target;
 	char *inputs[INCISE_MODEL_INPUTS_MAX];
@@ -40,31 +40,31 @@ struct job {
 
 static void parse_inputs(void *whole, char *text)
 {
-	struct job *job = whole;
+	struct info_job *job = whole;
 
 	job->n_inputs = cli_list("inputs", text, job->inputs, INCISE_MODEL_INPUTS_MAX);
 }
 
 static const struct cli_option options[] = {
-	{0, "json", NULL, "report as JSON", CLI_FLAG(struct job, json)},
+	{0, "json", NULL, "report as JSON", CLI_FLAG(struct info_job, json)},
 	{0, "all", NULL,
 	 "rig, scene: also the keys that the file leaves out, with their defaults",
-	 CLI_FLAG(struct job, all)},
-	RECORDING_DAMAGED(struct job, damaged),
+	 CLI_FLAG(struct info_job, all)},
+	RECORDING_DAMAGED(struct info_job, damaged),
 	{0, "dataset", NULL,
 	 "describe DATA.csv and NAME.rec as training data: rows, ranges, and "
 	 "groups that differ from the others",
-	 CLI_FLAG(struct job, dataset)},
+	 CLI_FLAG(struct info_job, dataset)},
 	{0, "group", "GROUP",
 	 "dataset: recording, rig, or a column that names the groups (default: "
 	 "cut, where all sources have it), or none",
-	 CLI_TEXT(struct job, group)},
+	 CLI_TEXT(struct info_job, group)},
 	{0, "inputs", "A,B", "dataset: input columns (default: depth_mm,velocity_mm_s)",
 	 CLI_PARSED_BY(parse_inputs)},
 	{0, "target", "COLUMN", "dataset: column to learn (default: force_N)",
-	 CLI_TEXT(struct job, target)},
+	 CLI_TEXT(struct info_job, target)},
 	{0, "all-rows", NULL, "dataset: also rows in which the blade did not advance",
-	 CLI_FLAG(struct job, all_rows)},
+	 CLI_FLAG(struct info_job, all_rows)},
 	{0},
 };
 
@@ -839,7 +839,7 @@ static json_t *passed_over(const char *rig, bool json)
 }
 
 /* The keys of a scene, or of a rig: "rig" is the one that is used here. */
-static void show_keys(const char *path, bool scene, const struct job *job)
+static void show_keys(const char *path, bool scene, const struct info_job *job)
 {
 	const bool here = !strcmp(path, "rig");
 	const char *rig = here ? cli_rig(NULL) : path;
@@ -863,7 +863,7 @@ static void show_keys(const char *path, bool scene, const struct job *job)
 	free(keys.key);
 }
 
-static void show_dataset(struct job *job, char **paths, int n)
+static void show_dataset(struct info_job *job, char **paths, int n)
 {
 	const char *columns[INCISE_MODEL_INPUTS_MAX + 1];
 	struct recording_rows rows = {.damaged = job->damaged};
@@ -888,9 +888,9 @@ static void show_dataset(struct job *job, char **paths, int n)
 
 int main(int argc, char **argv)
 {
-	struct job job = {.inputs = {"depth_mm", "velocity_mm_s"},
-			  .n_inputs = 2,
-			  .target = "force_N"};
+	struct info_job job = {.inputs = {"depth_mm", "velocity_mm_s"},
+			       .n_inputs = 2,
+			       .target = "force_N"};
 	enum file_kind kind;
 	bool compiled, plan, rig;
 	char *path;

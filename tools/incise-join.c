@@ -13,7 +13,7 @@
 #include "cli/recording.h"
 #include "cli/joined_report.h"
 
-struct job {
+struct join_job {
 	const char *output;
 	struct incise_session_options how;
 	bool json, damaged;
@@ -23,17 +23,17 @@ static const char *const aligns[] = {"clocks", "tap", "sync", NULL};
 
 static const struct cli_option options[] = {
 	{'o', "output", "NAME.rec", "joined recording to write: a folder",
-	 CLI_OUTPUT(struct job, output), .extensions = ".rec"},
+	 CLI_OUTPUT(struct join_job, output), .extensions = ".rec"},
 	{0, "within", "TIME",
 	 "refuse times that are uncertain by more, for example 1ms (default: state "
 	 "the uncertainty)",
-	 CLI_QUANTITY(struct job, how.within_s, joined_times, 1e-9, 3600)},
+	 CLI_QUANTITY(struct join_job, how.within_s, joined_times, 1e-9, 3600)},
 	{0, "align", "SIGNAL",
 	 "align by clocks (default), tap (knocks in force or motion) or sync "
 	 "(events of the SYNC line), and compare with the clocks",
-	 CLI_CHOICE(struct job, how.align, aligns)},
-	RECORDING_DAMAGED(struct job, damaged),
-	{0, "json", NULL, "report as one JSON object", CLI_FLAG(struct job, json)},
+	 CLI_CHOICE(struct join_job, how.align, aligns)},
+	RECORDING_DAMAGED(struct join_job, damaged),
+	{0, "json", NULL, "report as one JSON object", CLI_FLAG(struct join_job, json)},
 	{0},
 };
 
@@ -66,7 +66,7 @@ static void fail_join(const struct incise_error *err, const char *target,
 
 int main(int argc, char **argv)
 {
-	struct job job = {.how.note = print_note};
+	struct join_job job = {.how.note = print_note};
 	const struct incise_session_info *members;
 	struct incise_recording *session;
 	struct incise_error err = {0};

@@ -12,7 +12,7 @@
 #include "cli/file_kind.h"
 #include "cli/json.h"
 
-struct options {
+struct merge_options {
 	char **paths;
 	int n;
 	const char *output;
@@ -24,10 +24,10 @@ static const struct cli_option option_table[] = {
 	{'o', "output", "FILE",
 	 "write the model (.fis) or the factor (.fac) of all; - is standard "
 	 "output, for a model",
-	 CLI_OUTPUT(struct options, output), .extensions = ".fis .fac"},
+	 CLI_OUTPUT(struct merge_options, output), .extensions = ".fis .fac"},
 	{0, "ridge", "R", "ridge on scaled data (default: by cross-validation)",
-	 CLI_NUMBER(struct options, ridge, 0, 1e12)},
-	{0, "json", NULL, "report as JSON", CLI_FLAG(struct options, json)},
+	 CLI_NUMBER(struct merge_options, ridge, 0, 1e12)},
+	{0, "json", NULL, "report as JSON", CLI_FLAG(struct merge_options, json)},
 	{0},
 };
 
@@ -39,11 +39,11 @@ static const struct cli_command command = {
 	.examples = "incise merge lyon.fac graz.fac -o liver.fis",
 };
 
-static void parse_merge(struct options *options, int argc, char **argv)
+static void parse_merge(struct merge_options *options, int argc, char **argv)
 {
 	char *sd;
 
-	*options = (struct options){.ridge = NAN};
+	*options = (struct merge_options){.ridge = NAN};
 	cli_parse(&command, argc, argv, options);
 	options->paths = argv + optind;
 	options->n = argc - optind;
@@ -61,7 +61,7 @@ static void parse_merge(struct options *options, int argc, char **argv)
 }
 
 /* The same files as those of a training from the sources themselves. */
-static void save_model(const struct options *options,
+static void save_model(const struct merge_options *options,
 		       const struct incise_trained *trained)
 {
 	struct incise_error err = {0};
@@ -75,7 +75,7 @@ static void save_model(const struct options *options,
 	free(sd);
 }
 
-static void print_merge_report(const struct options *options,
+static void print_merge_report(const struct merge_options *options,
 			       const struct incise_factor_info *info,
 			       const struct incise_train_report *report)
 {
@@ -114,7 +114,7 @@ int main(int argc, char **argv)
 	struct incise_factor_info info;
 	struct incise_trained trained;
 	struct incise_error err = {0};
-	struct options options;
+	struct merge_options options;
 
 	parse_merge(&options, argc, argv);
 	for (int i = 0; i < options.n; i++)

@@ -24,7 +24,7 @@
 /* Depth for which the fixed-point error is stated: paper 1's deepest cut. */
 #define REACH_MM 20
 
-struct job {
+struct plan_job {
 	struct scene_argument scene;
 	const char *rig;
 	bool full, json;
@@ -35,11 +35,11 @@ static const struct cli_option options[] = {
 	{'r', "rig", "RIG",
 	 "file rig.conf, or sim:KEY=VALUE,…, whose stepper and tracker delay are "
 	 "used (default: no rig; a tracker of 120 Hz with a delay of 4.2 ms)",
-	 CLI_INPUT(struct job, rig)},
-	SCENE_ARGUMENT_OPTIONS(struct job, scene),
+	 CLI_INPUT(struct plan_job, rig)},
+	SCENE_ARGUMENT_OPTIONS(struct plan_job, scene),
 	{0, "full", NULL, "keep every stage, needed or not, to see what pruning saves",
-	 CLI_FLAG(struct job, full)},
-	{0, "json", NULL, "report as JSON", CLI_FLAG(struct job, json)},
+	 CLI_FLAG(struct plan_job, full)},
+	{0, "json", NULL, "report as JSON", CLI_FLAG(struct plan_job, json)},
 	{0},
 };
 
@@ -185,7 +185,7 @@ static json_t *axes_json(struct incise_rig *rig, const struct incise_plan_stabil
 }
 
 /* Of the model where the slowest of the hands comes to rest; false: not known. */
-static bool rest_force(const struct job *job, const struct incise_plan_stability *s,
+static bool rest_force(const struct plan_job *job, const struct incise_plan_stability *s,
 		       struct model_force *force)
 {
 	return s->support_mm > 0 &&
@@ -211,7 +211,7 @@ static json_t *surface_json(const struct incise_plan *plan)
 			 s.open_edges ? json_numbers(s.open_hi_mm, 3) : json_null());
 }
 
-static void report_plan_json(const struct job *job, const struct incise_plan *plan,
+static void report_plan_json(const struct plan_job *job, const struct incise_plan *plan,
 			     struct incise_rig *rig, const struct tick_cost *cost)
 {
 	json_t *kept = json_array(), *stages = json_array(), *left = json_array();
@@ -318,7 +318,7 @@ static void print_rest(const struct incise_plan_stability *s)
 	       s->noise_mm, s->noise_N);
 }
 
-static void print_stability(const struct job *job, const struct incise_plan *plan)
+static void print_stability(const struct plan_job *job, const struct incise_plan *plan)
 {
 	struct incise_plan_stability s;
 	struct model_force force;
@@ -387,7 +387,7 @@ static void print_axes(struct incise_rig *rig, const struct incise_plan_stabilit
 	}
 }
 
-static void report_plan_text(const struct job *job, const struct incise_plan *plan,
+static void report_plan_text(const struct plan_job *job, const struct incise_plan *plan,
 			     struct incise_rig *rig, const struct tick_cost *cost,
 			     const char *size)
 {
@@ -458,7 +458,7 @@ int main(int argc, char **argv)
 	struct incise_scene *scene;
 	struct incise_plan *plan;
 	struct tick_cost cost;
-	struct job job = {0};
+	struct plan_job job = {0};
 	char *size;
 
 	cli_parse(&command, argc, argv, &job);

@@ -16,7 +16,7 @@
 #include "origin/origins.h"
 #include "plot/figure.h"
 
-struct job {
+struct plot_job {
 	struct figure figure;
 	const char *output; /* NULL: a window */
 	bool range;
@@ -25,7 +25,7 @@ struct job {
 /* One of its ends may be missing. */
 static void parse_range(void *whole, char *text)
 {
-	struct job *job = whole;
+	struct plot_job *job = whole;
 	char *dots = strstr(text, "..");
 
 	if (!dots || (dots == text && !dots[2]))
@@ -45,13 +45,13 @@ static void parse_range(void *whole, char *text)
 static const struct cli_option options[] = {
 	{'o', "output", "FILE",
 	 "the file to write: NAME.png, .svg or .pdf (default: a window)",
-	 CLI_OUTPUT(struct job, output), .extensions = ".png .svg .pdf"},
+	 CLI_OUTPUT(struct plot_job, output), .extensions = ".png .svg .pdf"},
 	{0, "range", "TIME..TIME",
 	 "of a recording: the part to draw, such as 2s..4.5s, 90s.. or ..1min; "
 	 "from its first force sample (default: all)",
 	 CLI_PARSED_BY(parse_range)},
 	{0, "data", "DATA.csv", "of a model: also draw the residuals of this dataset",
-	 CLI_INPUT(struct job, figure.data)},
+	 CLI_INPUT(struct plot_job, figure.data)},
 	{0},
 };
 
@@ -138,7 +138,7 @@ static const char *window_form(void)
 	return form;
 }
 
-static void parse_plot(struct job *job, int argc, char **argv)
+static void parse_plot(struct plot_job *job, int argc, char **argv)
 {
 	cli_parse(&command, argc, argv, job);
 	job->figure.path =
@@ -148,12 +148,12 @@ static void parse_plot(struct job *job, int argc, char **argv)
 
 int main(int argc, char **argv)
 {
-	struct job job = {.figure = {
-				  .from_s = -INFINITY,
-				  .to_s = INFINITY,
-				  .folder = folder,
-				  .name = "figure",
-			  }};
+	struct plot_job job = {.figure = {
+				       .from_s = -INFINITY,
+				       .to_s = INFINITY,
+				       .folder = folder,
+				       .name = "figure",
+			       }};
 	struct incise_origins origins = {0};
 	const struct drawn *kind;
 	const char *form;

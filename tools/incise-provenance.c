@@ -18,7 +18,7 @@
 #include "cli/json.h"
 #include "cli/recording.h"
 
-struct job {
+struct provenance_job {
 	const char *recording;
 	bool json;
 };
@@ -26,8 +26,9 @@ struct job {
 static const struct cli_option options[] = {
 	{0, "recording", "NAME.rec",
 	 "compare with this recording; others are sought next to FILE",
-	 CLI_INPUT(struct job, recording)},
-	{0, "json", NULL, "report as one JSON object", CLI_FLAG(struct job, json)},
+	 CLI_INPUT(struct provenance_job, recording)},
+	{0, "json", NULL, "report as one JSON object",
+	 CLI_FLAG(struct provenance_job, json)},
 	{0},
 };
 
@@ -139,7 +140,8 @@ static char *beside(const char *file, const char *name)
 	return path;
 }
 
-static void compare_provenance(struct step *step, const struct job *job, const char *file)
+static void compare_provenance(struct step *step, const struct provenance_job *job,
+			       const char *file)
 {
 	bool recording = !strcmp(step->origin->kind, "recording");
 	char *path = beside(file, step->origin->name);
@@ -247,8 +249,8 @@ static json_t *step_json(const struct step *step)
 		states[step->state]);
 }
 
-static void report_provenance(const struct job *job, const char *path, struct step *steps,
-			      int n, bool cut)
+static void report_provenance(const struct provenance_job *job, const char *path,
+			      struct step *steps, int n, bool cut)
 {
 	json_t *list = json_array();
 
@@ -299,7 +301,7 @@ int main(int argc, char **argv)
 {
 	struct incise_origins origins = {0};
 	struct incise_error err = {0};
-	struct job job = {0};
+	struct provenance_job job = {0};
 	bool recorded = false, differs = false;
 	struct step *steps;
 	const char *path;

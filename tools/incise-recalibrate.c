@@ -11,17 +11,18 @@
 #include "cli/json.h"
 #include "cli/recording.h"
 
-struct job {
+struct recalibrate_job {
 	const char *calibration;
 	bool original, json;
 };
 
 static const struct cli_option options[] = {
 	{'c', "calibration", "FILE", "calibration to copy into the recording, and to use",
-	 CLI_INPUT(struct job, calibration)},
+	 CLI_INPUT(struct recalibrate_job, calibration)},
 	{0, "original", NULL, "use the calibration of the capture again",
-	 CLI_FLAG(struct job, original)},
-	{0, "json", NULL, "report as one JSON object", CLI_FLAG(struct job, json)},
+	 CLI_FLAG(struct recalibrate_job, original)},
+	{0, "json", NULL, "report as one JSON object",
+	 CLI_FLAG(struct recalibrate_job, json)},
 	{0},
 };
 
@@ -146,7 +147,7 @@ int main(int argc, char **argv)
 	struct incise_recording_info was = {0}, is = {0};
 	struct values before, now;
 	struct incise_error err = {0};
-	struct job job = {0};
+	struct recalibrate_job job = {0};
 	const char *path;
 	bool known;
 

@@ -11,16 +11,17 @@
 #include "cli/json.h"
 #include "cli/recording.h"
 
-struct job {
+struct recover_job {
 	const char *output;
 	bool json, damaged;
 };
 
 static const struct cli_option options[] = {
 	{'o', "output", "NAME.rec", "recording to write: a folder",
-	 CLI_OUTPUT(struct job, output), .extensions = ".rec"},
-	RECORDING_DAMAGED(struct job, damaged),
-	{0, "json", NULL, "report as one JSON object", CLI_FLAG(struct job, json)},
+	 CLI_OUTPUT(struct recover_job, output), .extensions = ".rec"},
+	RECORDING_DAMAGED(struct recover_job, damaged),
+	{0, "json", NULL, "report as one JSON object",
+	 CLI_FLAG(struct recover_job, json)},
 	{0},
 };
 
@@ -56,7 +57,7 @@ int main(int argc, char **argv)
 	struct incise_recording *recording;
 	struct incise_recovered made;
 	struct incise_error err = {0};
-	struct job job = {0};
+	struct recover_job job = {0};
 	const char *path;
 	bool converted;
 	char *target;

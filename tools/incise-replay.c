@@ -19,7 +19,7 @@
 
 #define PLOT_POINTS 20000 /* so that the plot of an hour is drawn as fast as any */
 
-struct job {
+struct replay_job {
 	const char *recording, *csv, *plot, *calibration;
 	struct scene_argument scene;
 	struct incise_replay_options how;
@@ -32,24 +32,24 @@ static const struct cli_option options[] = {
 	{0, "log", "FILE",
 	 "write predicted and measured force of every tick as CSV; - is standard "
 	 "output",
-	 CLI_OUTPUT(struct job, csv), .extensions = ".csv"},
+	 CLI_OUTPUT(struct replay_job, csv), .extensions = ".csv"},
 	{0, "plot", "NAME", "draw predicted and measured force as NAME.png and NAME.svg",
-	 CLI_OUTPUTS(struct job, plot)},
+	 CLI_OUTPUTS(struct replay_job, plot)},
 	{0, "real-time", NULL, "wait for each tick (default: as fast as possible)",
-	 CLI_FLAG(struct job, how.real_time)},
+	 CLI_FLAG(struct replay_job, how.real_time)},
 	{0, "poses", "WHEN",
 	 "give poses to the loop at their arrival, as live, or at their "
 	 "acquisition (default: arrival)",
-	 CLI_CHOICE(struct job, how.at, times)},
+	 CLI_CHOICE(struct replay_job, how.at, times)},
 	{'c', "calibration", "FILE",
 	 "use this calibration of force instead of that of the recording; none: "
 	 "nominal values",
-	 CLI_INPUT(struct job, calibration)},
-	SCENE_ARGUMENT_OPTIONS(struct job, scene),
+	 CLI_INPUT(struct replay_job, calibration)},
+	SCENE_ARGUMENT_OPTIONS(struct replay_job, scene),
 	{0, "tool", "KIND",
 	 "tool in the hand: auto, blade, handle or tube (default: auto)",
-	 CLI_CHOICE(struct job, how.tool, loop_tool_names)},
-	{0, "json", NULL, "report as JSON", CLI_FLAG(struct job, json)},
+	 CLI_CHOICE(struct replay_job, how.tool, loop_tool_names)},
+	{0, "json", NULL, "report as JSON", CLI_FLAG(struct replay_job, json)},
 	{0},
 };
 
@@ -62,9 +62,9 @@ static const struct cli_command command = {
 	.examples = "incise replay liver.rec scenes/liver.scene --log liver.csv",
 };
 
-static void parse_replay(struct job *job, int argc, char **argv)
+static void parse_replay(struct replay_job *job, int argc, char **argv)
 {
-	*job = (struct job){.how.stop = &cli_stop};
+	*job = (struct replay_job){.how.stop = &cli_stop};
 	cli_parse(&command, argc, argv, job);
 	if (optind == argc)
 		cli_usage("missing NAME.rec (recording)");
@@ -182,7 +182,7 @@ static double relative(const struct incise_replay_report *report)
 	return report->range_N > 0 ? report->rms_N / report->range_N : NAN;
 }
 
-static void report_replay_json(const struct job *job, double rate_hz,
+static void report_replay_json(const struct replay_job *job, double rate_hz,
 			       const struct incise_loop_stats *stats,
 			       const struct incise_replay_report *r)
 {
@@ -236,7 +236,7 @@ static void held_line(const struct incise_loop_stats *stats,
 		putchar('\n');
 }
 
-static void report_replay_text(const struct job *job, double rate_hz,
+static void report_replay_text(const struct replay_job *job, double rate_hz,
 			       const struct incise_loop_stats *stats,
 			       const struct incise_replay_report *r)
 {
@@ -277,7 +277,7 @@ int main(int argc, char **argv)
 	struct incise_error err = {0};
 	struct incise_scene *scene;
 	struct sink sink = {.percent = -1};
-	struct job job;
+	struct replay_job job;
 	double rate_hz;
 	int rc;
 

@@ -25,7 +25,7 @@ enum camera { CAMERA_AUTO, CAMERA_OFF, CAMERA_FRAMES };
 static const char *const cameras[] = {"auto", "off", "frames", NULL};
 static const char *const versions[] = {"auto", "1", "2", NULL};
 
-struct job {
+struct serve_job {
 	const char *rig, *calibration, *lsl;
 	struct serve_igtl_options igtl;
 	struct serve_source_options source;
@@ -38,35 +38,36 @@ static const struct cli_option options[] = {
 	{'r', "rig", "RIG",
 	 "serve the devices of this rig: file rig.conf, or sim:KEY=VALUE,… for the "
 	 "simulated rig",
-	 CLI_INPUT(struct job, rig)},
-	CALIBRATION_OPTION(struct job, calibration),
+	 CLI_INPUT(struct serve_job, rig)},
+	CALIBRATION_OPTION(struct serve_job, calibration),
 	{0, "igtl", "[ADDR:]PORT",
 	 "serve OpenIGTLink there (default: 127.0.0.1:18944); without ADDR to this "
 	 "machine only; there is no authentication",
-	 CLI_TEXT(struct job, igtl.address)},
+	 CLI_TEXT(struct serve_job, igtl.address)},
 	{0, "igtl-version", "VERSION",
 	 "header version: 1, 2, or auto, which is 1 until a client sends 2 "
 	 "(default: auto)",
-	 CLI_CHOICE(struct job, igtl.version, versions)},
+	 CLI_CHOICE(struct serve_job, igtl.version, versions)},
 	{0, "lsl", "PREFIX",
 	 "offer streams of the Lab Streaming Layer, too: PREFIX-pose, "
 	 "PREFIX-force, PREFIX-events; to the whole network",
-	 CLI_TEXT(struct job, lsl)},
+	 CLI_TEXT(struct serve_job, lsl)},
 	{0, "rate", "HZ",
 	 "values per second of each kind at most, forces as means (default: 100)",
-	 CLI_NUMBER(struct job, source.rate_hz, 0.1, 20000)},
+	 CLI_NUMBER(struct serve_job, source.rate_hz, 0.1, 20000)},
 	{0, "camera", "WHAT", "frames: fail without frames; off; auto (default)",
-	 CLI_CHOICE(struct job, camera, cameras)},
+	 CLI_CHOICE(struct serve_job, camera, cameras)},
 	{0, "speed", "FACTOR", "play a recording faster or slower (default: 1)",
-	 CLI_NUMBER(struct job, source.speed, 0.01, 100)},
+	 CLI_NUMBER(struct serve_job, source.speed, 0.01, 100)},
 	{0, "endless", NULL, "play a recording again and again",
-	 CLI_FLAG(struct job, source.endless)},
+	 CLI_FLAG(struct serve_job, source.endless)},
 	{0, "idle", "TIME", "close a client that stands still for so long (default: 30s)",
-	 CLI_DURATION(struct job, igtl.idle_s, 0.2, 86400)},
+	 CLI_DURATION(struct serve_job, igtl.idle_s, 0.2, 86400)},
 	{0, "duration", "TIME", "end after this time (default: at Ctrl-C)",
-	 CLI_DURATION(struct job, duration_s, 0.01, 1e9)},
-	{0, "json", NULL, "report as JSON", CLI_FLAG(struct job, json)},
-	{'v', "verbose", NULL, "print events on stderr", CLI_FLAG(struct job, verbose)},
+	 CLI_DURATION(struct serve_job, duration_s, 0.01, 1e9)},
+	{0, "json", NULL, "report as JSON", CLI_FLAG(struct serve_job, json)},
+	{'v', "verbose", NULL, "print events on stderr",
+	 CLI_FLAG(struct serve_job, verbose)},
 	{0},
 };
 
@@ -82,7 +83,7 @@ static const struct cli_command command = {
 	.success = "ended as requested, or at the end of the recording",
 };
 
-struct run {
+struct serve_run {
 	struct serve_source *source;
 	struct serve_info info;
 	struct serve_stream *stream;
@@ -97,7 +98,7 @@ static bool is_recording(const char *operand)
 	       file_kind_of(operand) == FILE_RECORDING;
 }
 
-static void open_source(struct run *run, struct job *job)
+static void open_source(struct serve_run *run, struct serve_job *job)
 {
 	struct calibration_used calibration;
 	const char *operand = job->source.operand;
@@ -136,7 +137,7 @@ static void open_source(struct run *run, struct job *job)
 	run->stream = serve_stream_new(run->source, job->source.rate_hz);
 }
 
-static void add_sink(struct run *run, struct serve_sink *sink)
+static void add_sink(struct serve_run *run, struct serve_sink *sink)
 {
 	struct epoll_event event = {.events = EPOLLIN, .data.ptr = sink};
 
@@ -147,7 +148,7 @@ static void add_sink(struct run *run, struct serve_sink *sink)
 		cli_fail("epoll: %s", strerror(errno));
 }
 
-static void open_sinks(struct run *run, const struct job *job)
+static void open_sinks(struct serve_run *run, const struct serve_job *job)
 {
 	struct epoll_event event = {.events = EPOLLIN};
 
@@ -162,7 +163,7 @@ static void open_sinks(struct run *run, const struct job *job)
 }
 
 /* Work of the sinks until a time, or a signal. */
-static void wait_until(struct run *run, int64_t t_ns)
+static void wait_until(struct serve_run *run, int64_t t_ns)
 {
 	const struct itimerspec at = {.it_value = {t_ns / NS, t_ns % NS}};
 	struct epoll_event events[SERVE_SINKS + 1];
@@ -184,7 +185,7 @@ static void wait_until(struct run *run, int64_t t_ns)
 	}
 }
 
-static void show_serve(const struct run *run, double seconds)
+static void show_serve(const struct serve_run *run, double seconds)
 {
 	char text[400];
 	int n = snprintf(text, sizeof(text), "%s, %.0f s", run->info.name, seconds);
@@ -197,14 +198,14 @@ static void show_serve(const struct run *run, double seconds)
 	cli_progress("%s", text);
 }
 
-static void tick_sinks(struct run *run, int64_t now)
+static void tick_sinks(struct serve_run *run, int64_t now)
 {
 	for (int i = 0; i < run->sinks; i++)
 		if (run->sink[i]->ops->tick)
 			run->sink[i]->ops->tick(run->sink[i], now);
 }
 
-static void serve(struct run *run, const struct job *job)
+static void serve(struct serve_run *run, const struct serve_job *job)
 {
 	int64_t start = cli_now_ns(), now = start, next = start, tick = start;
 	int64_t end = job->duration_s > 0 ? start + (int64_t)(job->duration_s * 1e9)
@@ -237,7 +238,7 @@ static void serve(struct run *run, const struct job *job)
 	cli_progress_end();
 }
 
-static void report_serve(const struct run *run, const struct job *job)
+static void report_serve(const struct serve_run *run, const struct serve_job *job)
 {
 	const struct serve_stream *stream = run->stream;
 	json_t *object;
@@ -270,9 +271,9 @@ static void report_serve(const struct run *run, const struct job *job)
 
 int main(int argc, char **argv)
 {
-	struct job job = {.igtl = {.address = "127.0.0.1:18944", .idle_s = 30},
-			  .source = {.rate_hz = 100, .speed = 1}};
-	struct run run = {0};
+	struct serve_job job = {.igtl = {.address = "127.0.0.1:18944", .idle_s = 30},
+				.source = {.rate_hz = 100, .speed = 1}};
+	struct serve_run run = {0};
 
 	cli_parse(&command, argc, argv, &job);
 	if (argc - optind > 1)

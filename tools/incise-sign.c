@@ -10,7 +10,7 @@
 #include "cli/json.h"
 #include "cli/proof_report.h"
 
-struct job {
+struct sign_job {
 	struct incise_prove_options prove;
 	bool json;
 };
@@ -19,12 +19,12 @@ static const struct cli_option options[] = {
 	{0, "key", "FILE",
 	 "sign with this private key of ssh-keygen, or with the agent if it is a "
 	 "public one, such as ~/.ssh/id_ed25519.pub",
-	 CLI_INPUT(struct job, prove.key)},
+	 CLI_INPUT(struct sign_job, prove.key)},
 	{0, "timestamp", "WHERE",
 	 "have the time certified (RFC 3161): http://… asks this authority, "
 	 "FILE.tsq writes a query for one, FILE.tsr takes its reply",
-	 CLI_OUTPUTS(struct job, prove.timestamp)},
-	{0, "json", NULL, "report as one JSON object", CLI_FLAG(struct job, json)},
+	 CLI_OUTPUTS(struct sign_job, prove.timestamp)},
+	{0, "json", NULL, "report as one JSON object", CLI_FLAG(struct sign_job, json)},
 	{0},
 };
 
@@ -87,7 +87,7 @@ static bool is_server(const char *where)
 	return !strncmp(where, "http://", 7) || !strncmp(where, "https://", 8);
 }
 
-static char *parse_sign(struct job *job, int argc, char **argv)
+static char *parse_sign(struct sign_job *job, int argc, char **argv)
 {
 	const char *timestamp;
 	char *path;
@@ -111,7 +111,7 @@ static char *parse_sign(struct job *job, int argc, char **argv)
 
 int main(int argc, char **argv)
 {
-	struct job job = {.prove.write = write_file};
+	struct sign_job job = {.prove.write = write_file};
 	struct incise_error err = {0};
 	const char *path = parse_sign(&job, argc, argv);
 	const struct incise_proof_seal *last;

@@ -15,7 +15,7 @@
 #include "status/pages.h"
 #include "status/report.h"
 
-struct job {
+struct status_job {
 	bool follow, json, prometheus;
 };
 
@@ -23,11 +23,11 @@ static const struct cli_option options[] = {
 	{'f', "follow", NULL,
 	 "keep reporting: a live view on a terminal, one line per second in a "
 	 "pipe; ends with the loop, or at Ctrl-C",
-	 CLI_FLAG(struct job, follow)},
+	 CLI_FLAG(struct status_job, follow)},
 	{0, "json", NULL, "report as one JSON object; with --follow one per second",
-	 CLI_FLAG(struct job, json)},
+	 CLI_FLAG(struct status_job, json)},
 	{0, "prometheus", NULL, "report in Prometheus' text format",
-	 CLI_FLAG(struct job, prometheus)},
+	 CLI_FLAG(struct status_job, prometheus)},
 	{0},
 };
 
@@ -278,7 +278,7 @@ static const struct state_page_file *followed(const struct state_pages *pages)
 int main(int argc, char **argv)
 {
 	struct state_pages pages;
-	struct job job = {0};
+	struct status_job job = {0};
 	bool well;
 
 	cli_parse(&command, argc, argv, &job);

@@ -15,7 +15,7 @@
 #define FOLLOW_NS 20000000 /* between readings */
 #define MOTION_S 2	   /* added to twice the time that the limits allow a motion */
 
-struct job {
+struct stepper_job {
 	const struct subcommand *subcommand;
 	const char *rig;
 	double amount; /* the operand: mm or mm/s */
@@ -30,30 +30,30 @@ struct subcommand {
 	const char *operand;	      /* its name, or NULL */
 	const struct cli_unit *units; /* of it */
 	/* On an open drive; failure ends the program. */
-	void (*run)(const struct job *job, struct stepper_drive *drive);
+	void (*run)(const struct stepper_job *job, struct stepper_drive *drive);
 	bool watch;	   /* does not become the owner */
 	const char *takes; /* letters of options, see check_options() */
 };
 
 static const struct cli_option options[] = {
-	{CLI_RIG_OPTION(struct job, rig)},
+	{CLI_RIG_OPTION(struct stepper_job, rig)},
 	{0, "axis", "N", "actuator of the rig, 1 to 3 (default: 1)",
-	 CLI_INTEGER(struct job, axis, 1, INCISE_RIG_AXES_MAX)},
+	 CLI_INTEGER(struct stepper_job, axis, 1, INCISE_RIG_AXES_MAX)},
 	{'f', "follow", NULL, "status: print a line at each change, until Ctrl-C",
-	 CLI_FLAG(struct job, follow)},
+	 CLI_FLAG(struct stepper_job, follow)},
 	{0, "by", NULL, "move: by MM from the present position, not to MM",
-	 CLI_FLAG(struct job, by)},
+	 CLI_FLAG(struct stepper_job, by)},
 	{0, "unhomed", NULL, "move: also if not homed, to MM of the present count",
-	 CLI_FLAG(struct job, unhomed)},
+	 CLI_FLAG(struct stepper_job, unhomed)},
 	{0, "hold", NULL, "move, home: stay powered afterwards, until Ctrl-C",
-	 CLI_FLAG(struct job, hold)},
+	 CLI_FLAG(struct stepper_job, hold)},
 	{0, "duration", "TIME",
 	 "status --follow, enable, jog, --hold: end after this time, for example "
 	 "2s",
-	 CLI_DURATION(struct job, seconds, 0.001, 86400)},
+	 CLI_DURATION(struct stepper_job, seconds, 0.001, 86400)},
 	{0, "repeat", "N", "home N times, and report the repeatability",
-	 CLI_INTEGER(struct job, repeat, 1, 1000)},
-	{0, "json", NULL, "report as JSON", CLI_FLAG(struct job, json)},
+	 CLI_INTEGER(struct stepper_job, repeat, 1, 1000)},
+	{0, "json", NULL, "report as JSON", CLI_FLAG(struct stepper_job, json)},
 	{0},
 };
 
@@ -80,7 +80,7 @@ static const struct cli_command command = {
 
 /* --- status, disable, clear ------------------------------------------------------------ */
 
-static json_t *report(const struct job *job, const struct stepper_drive *drive)
+static json_t *report(const struct stepper_job *job, const struct stepper_drive *drive)
 {
 	json_t *object = json_pack("{ss}", "command", job->subcommand->name);
 
@@ -97,7 +97,7 @@ static void put_json(json_t *object, size_t form)
 	json_decref(object);
 }
 
-static void put_line(const struct job *job, const struct stepper_drive *drive,
+static void put_line(const struct stepper_job *job, const struct stepper_drive *drive,
 		     int64_t begin_ns)
 {
 	double t_s = (double)(drive->status.t_ns - begin_ns) / INCISE_NS_PER_S;
@@ -119,7 +119,7 @@ static bool changed(const struct incise_stepper_status *a,
 	       a->late != b->late;
 }
 
-static void follow(const struct job *job, struct stepper_drive *drive)
+static void follow(const struct stepper_job *job, struct stepper_drive *drive)
 {
 	int64_t begin = incise_clock_now(drive->clock), now = begin;
 	struct incise_stepper_status shown;
@@ -140,7 +140,7 @@ static void follow(const struct job *job, struct stepper_drive *drive)
 	}
 }
 
-static void run_status(const struct job *job, struct stepper_drive *drive)
+static void run_status(const struct stepper_job *job, struct stepper_drive *drive)
 {
 	if (job->follow)
 		follow(job, drive);
@@ -150,7 +150,7 @@ static void run_status(const struct job *job, struct stepper_drive *drive)
 		stepper_status_text(drive->stepper, &drive->info, &drive->status);
 }
 
-static void run_disable(const struct job *job, struct stepper_drive *drive)
+static void run_disable(const struct stepper_job *job, struct stepper_drive *drive)
 {
 	/* As if this program had powered it. */
 	drive->powered = true;
@@ -166,7 +166,7 @@ static void run_disable(const struct job *job, struct stepper_drive *drive)
 			       : "");
 }
 
-static void run_clear(const struct job *job, struct stepper_drive *drive)
+static void run_clear(const struct stepper_job *job, struct stepper_drive *drive)
 {
 	struct incise_error err = {0};
 	unsigned int before = drive->status.faults;
@@ -189,7 +189,7 @@ static void run_clear(const struct job *job, struct stepper_drive *drive)
 
 /* --- enable, move, jog, home ----------------------------------------------------------- */
 
-static void run_enable(const struct job *job, struct stepper_drive *drive)
+static void run_enable(const struct stepper_job *job, struct stepper_drive *drive)
 {
 	stepper_drive_power(drive);
 	if (!job->json) {
@@ -204,7 +204,7 @@ static void run_enable(const struct job *job, struct stepper_drive *drive)
 }
 
 /* Print the result of a motion. */
-static void put_moved(const struct job *job, const struct stepper_drive *drive,
+static void put_moved(const struct stepper_job *job, const struct stepper_drive *drive,
 		      double from_mm, double seconds)
 {
 	const struct incise_stepper_status *s = &drive->status;
@@ -225,14 +225,14 @@ static void put_moved(const struct job *job, const struct stepper_drive *drive,
 	fflush(stdout);
 }
 
-static void maybe_hold(const struct job *job, struct stepper_drive *drive)
+static void maybe_hold(const struct stepper_job *job, struct stepper_drive *drive)
 {
 	if (job->hold)
 		stepper_drive_hold(drive, job->seconds);
 }
 
 /* The target within the travel; outside of it fails. */
-static double destination(const struct job *job, struct stepper_drive *drive)
+static double destination(const struct stepper_job *job, struct stepper_drive *drive)
 {
 	double mm = job->amount, from_mm = drive->status.position_mm;
 	/* A travel need not be of whole steps. */
@@ -283,7 +283,7 @@ static _Noreturn void fail_stopped(struct stepper_drive *drive)
 			   strsignal(cli_stop), drive->status.position_mm);
 }
 
-static void run_move(const struct job *job, struct stepper_drive *drive)
+static void run_move(const struct stepper_job *job, struct stepper_drive *drive)
 {
 	double to_mm = destination(job, drive), from_mm = drive->status.position_mm;
 	double within_s = motion_s(&drive->info, to_mm - from_mm), seconds;
@@ -315,7 +315,7 @@ static void run_move(const struct job *job, struct stepper_drive *drive)
 	maybe_hold(job, drive);
 }
 
-static void run_jog(const struct job *job, struct stepper_drive *drive)
+static void run_jog(const struct stepper_job *job, struct stepper_drive *drive)
 {
 	double mm_s = job->amount, end_mm = mm_s > 0 ? drive->info.travel_mm : 0;
 	double from_mm = drive->status.position_mm, seconds;
@@ -353,7 +353,7 @@ struct edges {
 };
 
 /* A drive that homed by itself: only its 0 is known. */
-static void put_unknown_edge(struct edges *edges, const struct job *job,
+static void put_unknown_edge(struct edges *edges, const struct stepper_job *job,
 			     const struct stepper_drive *drive)
 {
 	bool first = !edges->unknown;
@@ -372,7 +372,7 @@ static void put_unknown_edge(struct edges *edges, const struct job *job,
 	fflush(stdout);
 }
 
-static void find_edge(struct edges *edges, const struct job *job,
+static void find_edge(struct edges *edges, const struct stepper_job *job,
 		      struct stepper_drive *drive)
 {
 	const struct incise_stepper_info *info = &drive->info;
@@ -408,7 +408,7 @@ static void find_edge(struct edges *edges, const struct job *job,
 	fflush(stdout);
 }
 
-static json_t *home_json(const struct job *job, const struct stepper_drive *drive,
+static json_t *home_json(const struct stepper_job *job, const struct stepper_drive *drive,
 			 const struct edges *edges)
 {
 	long long spread = edges->highest - edges->lowest;
@@ -438,7 +438,7 @@ static void put_home(const struct edges *edges, const struct stepper_drive *driv
 	json_decref(edges->before_steps);
 }
 
-static void run_home(const struct job *job, struct stepper_drive *drive)
+static void run_home(const struct stepper_job *job, struct stepper_drive *drive)
 {
 	struct edges edges = {.before_mm = json_array(), .before_steps = json_array()};
 	int times = job->repeat ? job->repeat : 1;
@@ -473,7 +473,7 @@ static const struct subcommand subcommands[] = {
 #define SUBCOMMANDS (sizeof(subcommands) / sizeof(*subcommands))
 
 /* An option that only other subcommands take is bad usage. */
-static void check_options(const struct job *job)
+static void check_options(const struct stepper_job *job)
 {
 	const struct {
 		bool given;
@@ -511,7 +511,7 @@ static const struct subcommand *subcommand_named(const char *name)
 	cli_unknown("subcommand", name, names);
 }
 
-static void parse(struct job *job, int argc, char **argv)
+static void parse(struct stepper_job *job, int argc, char **argv)
 {
 	const struct subcommand *sub;
 	int operands;
@@ -541,7 +541,7 @@ static void parse(struct job *job, int argc, char **argv)
 int main(int argc, char **argv)
 {
 	struct stepper_drive drive;
-	struct job job = {.axis = 1};
+	struct stepper_job job = {.axis = 1};
 
 	parse(&job, argc, argv);
 	stepper_drive_open(&drive, job.rig, job.axis,

@@ -12,12 +12,12 @@
 #include "haptic/control.h"
 #include "status/pages.h"
 
-struct job {
+struct tool_job {
 	bool json;
 };
 
 static const struct cli_option options[] = {
-	{0, "json", NULL, "report as JSON", CLI_FLAG(struct job, json)},
+	{0, "json", NULL, "report as JSON", CLI_FLAG(struct tool_job, json)},
 	{0},
 };
 
@@ -138,7 +138,7 @@ int main(int argc, char **argv)
 {
 	char held[CONTROL_LINE], wanted[CONTROL_LINE];
 	struct state_pages pages;
-	struct job job = {0};
+	struct tool_job job = {0};
 	int n;
 
 	cli_parse(&command, argc, argv, &job);

@@ -17,7 +17,7 @@
 #include "cli/recording.h"
 #include "train/sources.h"
 
-struct options {
+struct train_options {
 	char **paths;
 	int n_paths;
 	const char *data; /* for messages: the path, or the number of sources */
@@ -37,7 +37,7 @@ struct options {
 
 static void parse_inputs(void *whole, char *text)
 {
-	struct options *options = whole;
+	struct train_options *options = whole;
 
 	options->how.n_inputs =
 		cli_list("inputs", text, options->inputs, INCISE_MODEL_INPUTS_MAX);
@@ -45,7 +45,7 @@ static void parse_inputs(void *whole, char *text)
 
 static void parse_mfs(void *whole, char *text)
 {
-	struct options *options = whole;
+	struct train_options *options = whole;
 	char *items[INCISE_MODEL_INPUTS_MAX];
 
 	options->n_mfs = 0;
@@ -92,85 +92,85 @@ static const struct cli_option option_table[] = {
 	{'o', "output", "FILE",
 	 "write the model to this file (.fis); - is standard output (default: NAME.fis "
 	 "of one source NAME.rec or NAME.csv)",
-	 CLI_OUTPUT(struct options, model), .extensions = ".fis"},
+	 CLI_OUTPUT(struct train_options, model), .extensions = ".fis"},
 	{0, "premises", "FILE",
 	 "keep the membership functions and ranges of this model (.fis); only the "
 	 "consequents are learnt",
-	 CLI_INPUT(struct options, premises)},
+	 CLI_INPUT(struct train_options, premises)},
 	{0, "factor", "FILE",
 	 "write the sums of these sources (.fac) for incise merge, instead of a "
 	 "model; needs --premises",
-	 CLI_OUTPUT(struct options, factor), .extensions = ".fac"},
+	 CLI_OUTPUT(struct train_options, factor), .extensions = ".fac"},
 	{0, "inputs", "A,B", "input columns (default: depth_mm,velocity_mm_s)",
 	 CLI_PARSED_BY(parse_inputs)},
 	{0, "target", "COLUMN", "column to learn (default: force_N)",
-	 CLI_TEXT(struct options, target)},
+	 CLI_TEXT(struct train_options, target)},
 	{0, "group", "GROUP",
 	 "hold out whole groups: recording, rig, or a column that names them, such "
 	 "as cut (default: cut, where all sources have it), or none",
-	 CLI_TEXT(struct options, how.group)},
+	 CLI_TEXT(struct train_options, how.group)},
 	{0, "rate", "HZ",
 	 "rows per second of a recording, each the mean of its samples (default: "
 	 "all samples)",
-	 CLI_NUMBER(struct options, rows.rate_hz, 0.1, 1e6)},
+	 CLI_NUMBER(struct train_options, rows.rate_hz, 0.1, 1e6)},
 	{0, "from", "TIME",
 	 "of each recording: begin so long after its first sample, for example 90s",
-	 CLI_DURATION(struct options, rows.from_s, 0, 1e9)},
+	 CLI_DURATION(struct train_options, rows.from_s, 0, 1e9)},
 	{0, "to", "TIME", "of each recording: end so long after its first sample",
-	 CLI_DURATION(struct options, rows.to_s, 1e-3, 1e9)},
+	 CLI_DURATION(struct train_options, rows.to_s, 1e-3, 1e9)},
 	{0, "cut", "N", "of each recording: only this cut, from 1",
-	 CLI_INTEGER(struct options, rows.cut, 1, 1000000000)},
-	RECORDING_DAMAGED(struct options, rows.damaged),
+	 CLI_INTEGER(struct train_options, rows.cut, 1, 1000000000)},
+	RECORDING_DAMAGED(struct train_options, rows.damaged),
 	{0, "all-rows", NULL,
 	 "also use rows in which the blade did not advance (advancing is 0)",
-	 CLI_FLAG(struct options, how.all_rows)},
+	 CLI_FLAG(struct train_options, how.all_rows)},
 	{0, "uncertainty", "WHICH",
 	 "uncertainties of the columns, as incise export --uncertainty parts "
 	 "writes them: parts, or none (default: parts of files that have them)",
-	 CLI_PARSED(struct options, uncertainty, parse_uncertainty)},
+	 CLI_PARSED(struct train_options, uncertainty, parse_uncertainty)},
 	{0, "check", "SHARE",
 	 "hold out this share of the data as a test set, for example 0.3",
-	 CLI_NUMBER(struct options, how.check, 0.01, 0.99)},
+	 CLI_NUMBER(struct train_options, how.check, 0.01, 0.99)},
 	{0, "seed", "N", "seed of every random choice (default: 1)",
-	 CLI_INTEGER(struct options, how.train.seed, 0, 1L << 53)},
+	 CLI_INTEGER(struct train_options, how.train.seed, 0, 1L << 53)},
 	{0, "mf", "N,M",
 	 "membership functions per input (default: 5,4 for two inputs, else 3 "
 	 "each), or auto: chosen by cross-validation",
 	 CLI_PARSED_BY(parse_mfs)},
 	{0, "mf-type", "KIND", "gaussmf (default) or gbellmf",
-	 CLI_PARSED(struct options, how.type, parse_type)},
+	 CLI_PARSED(struct train_options, how.type, parse_type)},
 	{0, "epochs", "N", "largest number of epochs (default: 80)",
-	 CLI_INTEGER(struct options, how.train.epochs, 1, 100000)},
+	 CLI_INTEGER(struct train_options, how.train.epochs, 1, 100000)},
 	{0, "step", "K",
 	 "initial step of the membership functions' parameters (default: 0.01); "
 	 "only with --classic",
-	 CLI_NUMBER(struct options, how.train.step, 1e-9, 10)},
+	 CLI_NUMBER(struct train_options, how.train.step, 1e-9, 10)},
 	{0, "ridge", "R",
 	 "one ridge on scaled data (default: an average of fits, weighted by "
 	 "cross-validation)",
-	 CLI_NUMBER(struct options, how.train.ridge, 0, 1e12)},
+	 CLI_NUMBER(struct train_options, how.train.ridge, 0, 1e12)},
 	{0, "starts", "N",
 	 "number of starting points of the membership functions (default: 3)",
-	 CLI_INTEGER(struct options, how.train.starts, 1, 100)},
+	 CLI_INTEGER(struct train_options, how.train.starts, 1, 100)},
 	{0, "sample", "N",
 	 "pairs that the search of the membership functions uses, at random; 0: "
 	 "all (default: 3000)",
-	 CLI_INTEGER(struct options, sample, 0, 1000000000)},
+	 CLI_INTEGER(struct train_options, sample, 0, 1000000000)},
 	{0, "classic", NULL,
 	 "train as MATLAB's anfis does: no scaling, a ridge of 1e-6; the held-out "
 	 "data choose the epoch",
-	 CLI_FLAG(struct options, how.train.classic)},
+	 CLI_FLAG(struct train_options, how.train.classic)},
 	{0, "initial", "FILE", "also write the initial model, before training",
-	 CLI_OUTPUT(struct options, initial), .extensions = ".fis"},
+	 CLI_OUTPUT(struct train_options, initial), .extensions = ".fis"},
 	{0, "history", "FILE", "write the RMSE of each epoch to this CSV file",
-	 CLI_OUTPUT(struct options, history), .extensions = ".csv"},
+	 CLI_OUTPUT(struct train_options, history), .extensions = ".csv"},
 	{0, "shard", "I/N",
 	 "use share I of N of the sources, from 1: for the tasks of a job array; "
 	 "needs --factor",
-	 CLI_PARSED(struct options, shard, parse_shard)},
+	 CLI_PARSED(struct train_options, shard, parse_shard)},
 	{0, "mpi", NULL, "share the sources among the processes of mpirun",
-	 CLI_FLAG(struct options, mpi)},
-	{0, "json", NULL, "report as JSON", CLI_FLAG(struct options, json)},
+	 CLI_FLAG(struct train_options, mpi)},
+	{0, "json", NULL, "report as JSON", CLI_FLAG(struct train_options, json)},
 	{0},
 };
 
@@ -195,7 +195,7 @@ static char *path_beside(const char *output, const char *end)
 }
 
 /* Of one source NAME.rec, NAME.fis in this folder; NULL: none. */
-static const char *default_model(const struct options *options)
+static const char *default_model(const struct train_options *options)
 {
 	const char *name = strrchr(options->paths[0], '/'), *end;
 	char *path;
@@ -209,11 +209,11 @@ static const char *default_model(const struct options *options)
 	return path;
 }
 
-static void parse_train(struct options *options, int argc, char **argv)
+static void parse_train(struct train_options *options, int argc, char **argv)
 {
 	char *sd;
 
-	*options = (struct options){
+	*options = (struct train_options){
 		.inputs = {"depth_mm", "velocity_mm_s"},
 		.how.n_inputs = 2,
 		.target = "force_N",
@@ -296,7 +296,7 @@ static void parse_train(struct options *options, int argc, char **argv)
 #define REDRAWN_NS 100000000
 
 struct show {
-	const struct options *options;
+	const struct train_options *options;
 	FILE *history; /* or NULL */
 	enum incise_train_phase phase;
 	int64_t start_ns, drawn_ns; /* of the phase, and the last time */
@@ -407,7 +407,7 @@ static struct incise_model *load_premises(const char *path)
 }
 
 /* Take the columns of the options, or of the premises if these are given. */
-static void choose_columns(struct options *options, const char **columns)
+static void choose_columns(struct train_options *options, const char **columns)
 {
 	const struct incise_model_info *info =
 		options->how.premises ? incise_model_info(options->how.premises) : NULL;
@@ -423,7 +423,7 @@ static void choose_columns(struct options *options, const char **columns)
 }
 
 /* Ways that cannot carry uncertainties are refused. */
-static void check_weighed(const struct options *options)
+static void check_weighed(const struct train_options *options)
 {
 	const char *way = options->factor	       ? "--factor"
 			  : options->mpi	       ? "--mpi"
@@ -439,7 +439,8 @@ static void check_weighed(const struct options *options)
 			way, options->paths[0]);
 }
 
-static void choose_uncertainties(struct options *options, struct uncertainties *found)
+static void choose_uncertainties(struct train_options *options,
+				 struct uncertainties *found)
 {
 	const char **columns = (const char **)options->how.columns;
 
@@ -475,8 +476,8 @@ static const char *unit_of_train(const char *column)
 }
 
 /* A number in the unit of the target, which ends its key. */
-static void set_in_unit(json_t *object, const char *name, const struct options *options,
-			double value)
+static void set_in_unit(json_t *object, const char *name,
+			const struct train_options *options, double value)
 {
 	const char *unit = unit_of_train(options->target);
 	char key[80];
@@ -485,7 +486,7 @@ static void set_in_unit(json_t *object, const char *name, const struct options *
 	json_set_number(object, key, value);
 }
 
-static json_t *error_object(const struct options *options, double rmse, double r2,
+static json_t *error_object(const struct train_options *options, double rmse, double r2,
 			    uint64_t pairs)
 {
 	const char *unit = unit_of_train(options->target);
@@ -519,7 +520,7 @@ static void warn(json_t *list, const char *fmt, ...)
 }
 
 /* Warn on stderr; the same as a list for JSON. */
-static json_t *warnings(const struct options *options,
+static json_t *warnings(const struct train_options *options,
 			const struct incise_trained *trained)
 {
 	const struct incise_corpus_side *fit = incise_corpus_side(trained->corpus, false);
@@ -581,7 +582,7 @@ static json_t *warnings(const struct options *options,
 	return list;
 }
 
-static json_t *propagated_json(const struct options *options,
+static json_t *propagated_json(const struct train_options *options,
 			       const struct incise_propagation_report *r)
 {
 	json_t *object;
@@ -596,7 +597,7 @@ static json_t *propagated_json(const struct options *options,
 	return object;
 }
 
-static void report_train_json(const struct options *options,
+static void report_train_json(const struct train_options *options,
 			      const struct incise_trained *trained, json_t *warned)
 {
 	const struct incise_model *model = trained->model;
@@ -666,7 +667,7 @@ static void print_row(const char *name, double train, double check)
 	isnan(check) ? printf("\n") : printf("%14.5g\n", check);
 }
 
-static void report_train_text(const struct options *options,
+static void report_train_text(const struct train_options *options,
 			      const struct incise_trained *trained)
 {
 	const struct incise_model *model = trained->model;
@@ -749,7 +750,8 @@ static void hold_signals(int how)
 	sigprocmask(how, &set, NULL);
 }
 
-static void run_training(struct options *options, struct incise_train_source *sources,
+static void run_training(struct train_options *options,
+			 struct incise_train_source *sources,
 			 struct incise_trained *trained, struct incise_outfile **history)
 {
 	const char *output = options->factor ? options->factor : options->model;
@@ -781,7 +783,7 @@ static void run_training(struct options *options, struct incise_train_source *so
 	cli_fail_with(&err);
 }
 
-static void save_factor(const struct options *options, struct incise_factor *factor)
+static void save_factor(const struct train_options *options, struct incise_factor *factor)
 {
 	struct incise_factor_info info;
 	struct incise_error err = {0};
@@ -801,7 +803,7 @@ static void save_factor(const struct options *options, struct incise_factor *fac
 	cli_written();
 }
 
-static void save_model(const struct options *options,
+static void save_model(const struct train_options *options,
 		       const struct incise_trained *trained,
 		       struct incise_outfile *history)
 {
@@ -820,7 +822,7 @@ static void save_model(const struct options *options,
 	free(sd);
 }
 
-static void report_model(const struct options *options,
+static void report_model(const struct train_options *options,
 			 const struct incise_trained *trained)
 {
 	json_t *warned = warnings(options, trained);
@@ -841,7 +843,7 @@ int main(int argc, char **argv)
 	struct incise_outfile *history = NULL;
 	struct uncertainties uncertainties;
 	struct incise_trained trained;
-	struct options options;
+	struct train_options options;
 	char *data;
 
 	parse_train(&options, argc, argv);

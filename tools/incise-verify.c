@@ -15,7 +15,7 @@
 
 #define FINDINGS_MAX 1000 /* in the JSON object */
 
-struct job {
+struct verify_job {
 	struct incise_prove_options prove;
 	bool json;
 };
@@ -24,13 +24,13 @@ static const struct cli_option options[] = {
 	{0, "signers", "FILE",
 	 "check signatures and say who vouches for what; FILE lists who may sign, "
 	 "in the format ALLOWED SIGNERS of ssh-keygen(1)",
-	 CLI_INPUT(struct job, prove.signers)},
+	 CLI_INPUT(struct verify_job, prove.signers)},
 	{0, "revoked", "FILE",
 	 "keys that are not accepted: public keys, or a list of ssh-keygen -k",
-	 CLI_INPUT(struct job, prove.revoked)},
+	 CLI_INPUT(struct verify_job, prove.revoked)},
 	{0, "ca", "FILE", "certificates of authorities in PEM: check time-stamps by them",
-	 CLI_INPUT(struct job, prove.authorities)},
-	{0, "json", NULL, "report as one JSON object", CLI_FLAG(struct job, json)},
+	 CLI_INPUT(struct verify_job, prove.authorities)},
+	{0, "json", NULL, "report as one JSON object", CLI_FLAG(struct verify_job, json)},
 	{0},
 };
 
@@ -273,7 +273,7 @@ int main(int argc, char **argv)
 {
 	struct sink sink = {0};
 	struct incise_verify_watch watch = {found, progress, &sink};
-	struct job job = {.prove = {.level = INCISE_PROVE_ALL, .watch = &watch}};
+	struct verify_job job = {.prove = {.level = INCISE_PROVE_ALL, .watch = &watch}};
 	struct incise_error err = {0};
 	struct incise_proof proof;
 

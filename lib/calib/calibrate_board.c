@@ -166,17 +166,18 @@ static int find_start(const struct incise_board_views *views, struct solution *s
 #define AXIS_PLACES 33 /* on the axis */
 #define REACH_PX 8.0   /* to both sides of a place; the length of its scale */
 
-struct state {
+struct calibrate_board_state {
 	union board_lens lens;
 	double pose[BOARD_POSE];
 };
 
-static double *number_of_calibrate_board(struct state *state, int i)
+static double *number_of_calibrate_board(struct calibrate_board_state *state, int i)
 {
 	return i < BOARD_LENS ? &state->lens.number[i] : &state->pose[i - BOARD_LENS];
 }
 
-static double apart(const struct state *state, const double a[2], const double b[2])
+static double apart(const struct calibrate_board_state *state, const double a[2],
+		    const double b[2])
 {
 	double from[2], to[2];
 
@@ -186,13 +187,13 @@ static double apart(const struct state *state, const double a[2], const double b
 }
 
 static double axis_scale(const struct incise_board_views *views,
-			 const struct state *state)
+			 const struct calibrate_board_state *state)
 {
 	return apart(state, views->axis_px[0], views->axis_px[1]);
 }
 
 /* Component k of the plane's normal as the camera has it. */
-static double normal_of(const struct state *state, int k)
+static double normal_of(const struct calibrate_board_state *state, int k)
 {
 	double r[9];
 
@@ -209,16 +210,17 @@ static double cov(const struct solution *s, int i, int j)
 }
 
 /* One metric. k -1: the scale; 0, 1: the normal's x, y. */
-static double metric(const struct incise_board_views *views, const struct state *state,
-		     int k)
+static double metric(const struct incise_board_views *views,
+		     const struct calibrate_board_state *state, int k)
 {
 	return k < 0 ? axis_scale(views, state) : normal_of(state, k);
 }
 
 static void gradient(const struct incise_board_views *views, const struct solution *s,
-		     const struct state *state, int k, double g[BOARD_LENS + BOARD_POSE])
+		     const struct calibrate_board_state *state, int k,
+		     double g[BOARD_LENS + BOARD_POSE])
 {
-	struct state moved = *state;
+	struct calibrate_board_state moved = *state;
 
 	for (int i = 0; i < BOARD_LENS + BOARD_POSE; i++) {
 		double step = fmax(0.1 * sqrt(fmax(0, cov(s, i, i))), 1e-12);
@@ -244,7 +246,8 @@ static double variance(const struct solution *s, const double *g, const double *
 }
 
 static void find_tilt(const struct incise_board_views *views, const struct solution *s,
-		      const struct state *state, struct incise_board_fit *fit)
+		      const struct calibrate_board_state *state,
+		      struct incise_board_fit *fit)
 {
 	double g[2][BOARD_LENS + BOARD_POSE], n[2], xx, xy, yy, largest;
 
@@ -261,7 +264,8 @@ static void find_tilt(const struct incise_board_views *views, const struct solut
 }
 
 /* The range of scales within the region, and the error of a single scale. */
-static void find_change(const struct incise_board_views *views, const struct state *state,
+static void find_change(const struct incise_board_views *views,
+			const struct calibrate_board_state *state,
 			struct incise_board_fit *fit)
 {
 	const double *top = views->axis_px[0], *bottom = views->axis_px[1];
@@ -305,7 +309,8 @@ static void find_change(const struct incise_board_views *views, const struct sta
 }
 
 static void find_residual(const struct incise_board_views *views,
-			  const struct state *state, struct incise_board_fit *fit)
+			  const struct calibrate_board_state *state,
+			  struct incise_board_fit *fit)
 {
 	int corners = views->columns * views->rows;
 	const double *px = views->corners + (size_t)2 * corners * views->plane;
@@ -324,7 +329,7 @@ static void find_residual(const struct incise_board_views *views,
 }
 
 /* The inverse of K [r1 r2 t], by cofactors, with its last number 1. */
-static void find_homography(const struct state *state, double h[9])
+static void find_homography(const struct calibrate_board_state *state, double h[9])
 {
 	const struct incise_board_lens *l = &state->lens.by_name;
 	double r[9], m[9];
@@ -356,7 +361,7 @@ static void find_scale(const struct incise_board_views *views, const struct solu
 		       struct incise_board_fit *fit)
 {
 	double g[BOARD_LENS + BOARD_POSE], middle[2], r[9], sum = 0;
-	struct state state = {.lens = s->lens};
+	struct calibrate_board_state state = {.lens = s->lens};
 	union board_lens u;
 
 	memcpy(state.pose, s->pose[views->plane], sizeof(state.pose));

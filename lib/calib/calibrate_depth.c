@@ -233,19 +233,20 @@ out:
 
 /* --- line --- */
 
-struct line {
+struct calibrate_depth_line {
 	double slope, middle_px,
 		middle_mm; /* depth = middle_mm + slope (px - middle_px) */
 	double sxx;
 };
 
-static double off_line(const struct line *line, double px, double mm)
+static double off_line(const struct calibrate_depth_line *line, double px, double mm)
 {
 	return mm - line->middle_mm - line->slope * (px - line->middle_px);
 }
 
 /* Repeated medians: the median over pairs of the median slope to all others. */
-static int start_line(const struct incise_depth_lengths *p, struct line *line)
+static int start_line(const struct incise_depth_lengths *p,
+		      struct calibrate_depth_line *line)
 {
 	int step = 1 + (p->n - 1) / MEDIANS_MAX, m = 0, rc = -ENOMEM;
 	double *slopes = malloc(p->n * sizeof(*slopes));
@@ -281,7 +282,7 @@ out:
 
 /* Least squares of the near pairs. */
 static void fit_calibrate_depth_line(const struct incise_depth_lengths *p,
-				     const bool *near, struct line *line)
+				     const bool *near, struct calibrate_depth_line *line)
 {
 	double sxy = 0;
 	int k = 0;
@@ -306,8 +307,8 @@ static void fit_calibrate_depth_line(const struct incise_depth_lengths *p,
 
 /* Returns the number of near pairs; *changed: they are another set than before. */
 static int choose_calibrate_depth(const struct incise_depth_lengths *p,
-				  const struct line *line, double *residual, bool *near,
-				  bool *changed)
+				  const struct calibrate_depth_line *line,
+				  double *residual, bool *near, bool *changed)
 {
 	double spread;
 	int k = 0;
@@ -330,7 +331,8 @@ static int choose_calibrate_depth(const struct incise_depth_lengths *p,
 
 /* The bend of a parabola at the ends of the lengths; q = x² without its part along 1, x. */
 static void find_bend(const struct incise_depth_lengths *p, const bool *near,
-		      const struct line *line, struct incise_depth_fit *fit)
+		      const struct calibrate_depth_line *line,
+		      struct incise_depth_fit *fit)
 {
 	double sx2 = 0, sx3 = 0, sqq = 0, sqr = 0, srr = 0, factor, end = 0;
 	int k = fit->inliers;
@@ -364,8 +366,8 @@ static void find_bend(const struct incise_depth_lengths *p, const bool *near,
 		sqrt(fmax(0, srr - sqr * sqr / sqq) / (k - 3) / sqq * factor) * end;
 }
 
-static int check_line(const struct line *line, const struct incise_depth_fit *fit,
-		      struct incise_error *err)
+static int check_line(const struct calibrate_depth_line *line,
+		      const struct incise_depth_fit *fit, struct incise_error *err)
 {
 	double slope = line->slope;
 
@@ -395,7 +397,7 @@ static int check_line(const struct line *line, const struct incise_depth_fit *fi
 static int fit_pairs(const struct incise_depth_lengths *p, bool *near, double *residual,
 		     struct incise_depth_fit *fit, struct incise_error *err)
 {
-	struct line line = {0};
+	struct calibrate_depth_line line = {0};
 	bool changed = true;
 	double u_slope, u_middle, mean_px, zero, *r;
 	int rc, k = 0;

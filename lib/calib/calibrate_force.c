@@ -20,7 +20,7 @@ struct load {
 	double own2, common_mV, weight;
 };
 
-struct work {
+struct calibrate_force_work {
 	const struct incise_calibrate_force_pair *pairs;
 	const struct incise_calibrate_force_setup *setup;
 	int n;
@@ -50,7 +50,7 @@ static int by_force(const void *a, const void *b)
 }
 
 /* Gather the pairs that are used into loads. */
-static void gather_loads(struct work *w)
+static void gather_loads(struct calibrate_force_work *w)
 {
 	double most = 0;
 
@@ -102,7 +102,8 @@ static double student(int freedom)
 }
 
 /* The scatter of readings of one load, pooled; without repetition the one about a line. */
-static void measure_scatter(const struct work *w, struct incise_calibrate_force *result)
+static void measure_scatter(const struct calibrate_force_work *w,
+			    struct incise_calibrate_force *result)
 {
 	double squares = 0;
 	int used = 0;
@@ -144,7 +145,7 @@ static void measure_scatter(const struct work *w, struct incise_calibrate_force 
 }
 
 /* A load's readings share the error of its weight, and a code without noise. */
-static void weigh_loads(struct work *w, double slope, double code_u_mV,
+static void weigh_loads(struct calibrate_force_work *w, double slope, double code_u_mV,
 			double scatter_sd_mV)
 {
 	for (int k = 0; k < w->n_loads; k++) {
@@ -168,7 +169,8 @@ static void add_calibrate_force_part(struct incise_calibrate_force *result,
 }
 
 /* Sources that turn all loads alike. */
-static void add_common(const struct work *w, struct incise_calibrate_force *result)
+static void add_common(const struct calibrate_force_work *w,
+		       struct incise_calibrate_force *result)
 {
 	const struct incise_calibrate_force_setup *s = w->setup;
 	const double S = result->sensitivity_mV_N;
@@ -185,7 +187,7 @@ static void add_common(const struct work *w, struct incise_calibrate_force *resu
 					 (s->weight_kg_m3 * s->weight_kg_m3));
 }
 
-static void fit_calibrate_force_line(struct work *w,
+static void fit_calibrate_force_line(struct calibrate_force_work *w,
 				     struct incise_calibrate_force *result)
 {
 	double slope = w->robust_slope, zero = 0, code_u_mV = 0, t;
@@ -294,8 +296,8 @@ static void take_calibrate_force(struct way *way, double reading)
 }
 
 /* Readings of a load by both ways. */
-static void gather_calibrate_force(const struct work *w, int load, struct way *up,
-				   struct way *down)
+static void gather_calibrate_force(const struct calibrate_force_work *w, int load,
+				   struct way *up, struct way *down)
 {
 	*up = *down = (struct way){0};
 	for (int i = 0; i < w->n; i++)
@@ -303,7 +305,7 @@ static void gather_calibrate_force(const struct work *w, int load, struct way *u
 			take_calibrate_force(w->pairs[i].descending ? down : up, w->y[i]);
 }
 
-static bool is_first_of_series(const struct work *w, int i)
+static bool is_first_of_series(const struct calibrate_force_work *w, int i)
 {
 	for (int j = 0; j < i; j++)
 		if (w->pairs[j].series == w->pairs[i].series)
@@ -312,7 +314,7 @@ static bool is_first_of_series(const struct work *w, int i)
 }
 
 /* Zero after the loads of a series less the one before; NAN: one is missing. */
-static double zero_return_mV(const struct work *w, int series)
+static double zero_return_mV(const struct calibrate_force_work *w, int series)
 {
 	double before = NAN, after = NAN;
 	bool loaded = false;
@@ -331,7 +333,8 @@ static double zero_return_mV(const struct work *w, int series)
 }
 
 /* fmax() takes the number where one of two is NaN: metrics start as not stated. */
-static void measure_metrics(const struct work *w, struct incise_calibrate_force *result)
+static void measure_metrics(const struct calibrate_force_work *w,
+			    struct incise_calibrate_force *result)
 {
 	const struct load *last = &w->loads[w->n_loads - 1];
 	const double S = result->sensitivity_mV_N;
@@ -464,7 +467,8 @@ static bool near(double ratio, double expected)
  * Name the mistake behind a slope that is off by a known factor. Columns are swapped where the
  * inverse of the slope, with loads in the unit of the column, is the nominal sensitivity.
  */
-static int check_slope(const struct work *w, double slope, struct incise_error *err)
+static int check_slope(const struct calibrate_force_work *w, double slope,
+		       struct incise_error *err)
 {
 	const double nominal = w->setup->nominal_mV_N, ratio = slope / nominal;
 	const double N_g = 1e-3 * w->setup->gravity_m_s2;
@@ -496,7 +500,7 @@ static int check_slope(const struct work *w, double slope, struct incise_error *
  * The reading that all loads from one on (@top: upwards) share, though they are clearly apart;
  * NAN: none. A wrongly noted weight makes none: other pairs of its load read otherwise.
  */
-static double plateau(const struct work *w, bool top)
+static double plateau(const struct calibrate_force_work *w, bool top)
 {
 	double low = INFINITY, high = -INFINITY, F_min = INFINITY, F_max = 0;
 	double least = INFINITY, most = -INFINITY, end, near_mV;
@@ -524,7 +528,7 @@ static double plateau(const struct work *w, bool top)
 }
 
 /* Mark saturated pairs; returns their number. */
-static int mark_saturated(struct work *w)
+static int mark_saturated(struct calibrate_force_work *w)
 {
 	const struct incise_calibrate_force_setup *s = w->setup;
 	const double margin = isfinite(s->low_mV) && isfinite(s->high_mV)
@@ -551,13 +555,13 @@ static int mark_saturated(struct work *w)
 }
 
 /* Different loads among the pairs that are used. */
-static int count_loads(struct work *w)
+static int count_loads(struct calibrate_force_work *w)
 {
 	gather_loads(w);
 	return w->n_loads;
 }
 
-static int check_loads(struct work *w, struct incise_error *err)
+static int check_loads(struct calibrate_force_work *w, struct incise_error *err)
 {
 	int loads = count_loads(w), used = 0;
 
@@ -584,7 +588,7 @@ static int check_loads(struct work *w, struct incise_error *err)
 				used, loads);
 }
 
-static int mark_outliers(struct work *w, struct incise_error *err)
+static int mark_outliers(struct calibrate_force_work *w, struct incise_error *err)
 {
 	double *x = malloc(w->n * sizeof(*x)), *y = malloc(w->n * sizeof(*y));
 	int *from = malloc(w->n * sizeof(*from)), m = 0, found = 0, rc = -ENOMEM;
@@ -629,7 +633,7 @@ static int mark_outliers(struct work *w, struct incise_error *err)
 }
 
 /* Mistakes are named before pairs are left out: by the slope of all readings. */
-static int check_whole(struct work *w, struct incise_error *err)
+static int check_whole(struct calibrate_force_work *w, struct incise_error *err)
 {
 	bool *outlier = malloc(w->n * sizeof(*outlier));
 	struct robust_line line;
@@ -643,7 +647,7 @@ static int check_whole(struct work *w, struct incise_error *err)
 	return rc || !(line.slope > 0) ? 0 : check_slope(w, line.slope, err);
 }
 
-static int fit(struct work *w, struct incise_calibrate_force *result,
+static int fit(struct calibrate_force_work *w, struct incise_calibrate_force *result,
 	       struct incise_error *err)
 {
 	int rc;
@@ -684,7 +688,7 @@ int incise_calibrate_force(const struct incise_calibrate_force_pair *pairs, int 
 			   enum incise_calibrate_force_state *states,
 			   struct incise_error *err)
 {
-	struct work w = {.pairs = pairs, .n = n, .setup = setup};
+	struct calibrate_force_work w = {.pairs = pairs, .n = n, .setup = setup};
 	int rc = check_calibrate_force_setup(setup, err);
 
 	if (!rc && n < 1)

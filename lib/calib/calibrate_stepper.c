@@ -21,7 +21,7 @@ struct stroke {
 	int used;
 };
 
-struct work {
+struct calibrate_stepper_work {
 	const struct incise_calibrate_stepper_point *points;
 	const struct incise_calibrate_stepper_setup *setup;
 	int n, n_strokes;
@@ -47,7 +47,8 @@ struct work {
 #define FAR 4.5
 
 /* Distance of a point from its stroke's line, N. */
-static double off_line(const struct work *w, const struct stroke *stroke, int i)
+static double off_line(const struct calibrate_stepper_work *w,
+		       const struct stroke *stroke, int i)
 {
 	return w->points[i].force_N - stroke->zero_N -
 	       w->slope * w->points[i].position_mm;
@@ -61,7 +62,7 @@ static double upper_median(double *values, int n)
 }
 
 /* Use points behind the turns that are not saturated, until they prove to be far. */
-static void choose_points(struct work *w, double skip_mm)
+static void choose_points(struct calibrate_stepper_work *w, double skip_mm)
 {
 	for (int k = 0; k < w->n_strokes; k++) {
 		const struct stroke *s = &w->strokes[k];
@@ -78,7 +79,7 @@ static void choose_points(struct work *w, double skip_mm)
 }
 
 /* Slopes of pairs that are far apart, so that noise does not make them steep. */
-static int slope_of_pairs(struct work *w, double *scratch)
+static int slope_of_pairs(struct calibrate_stepper_work *w, double *scratch)
 {
 	uint64_t choice = 1;
 	int n = 0;
@@ -103,7 +104,7 @@ static int slope_of_pairs(struct work *w, double *scratch)
 }
 
 /* The zero of each stroke, and the spread about the lines, by medians. */
-static int medians(struct work *w, double *scratch)
+static int medians(struct calibrate_stepper_work *w, double *scratch)
 {
 	int all = 0;
 
@@ -127,7 +128,7 @@ static int medians(struct work *w, double *scratch)
 	return 0;
 }
 
-static void drop_far(struct work *w)
+static void drop_far(struct calibrate_stepper_work *w)
 {
 	/* Readings without any noise scatter by rounding. */
 	double far = fmax(FAR * hypot(w->sd, w->setup->resolution_N / sqrt(12)),
@@ -145,7 +146,7 @@ static void drop_far(struct work *w)
 	}
 }
 
-static int least_squares(struct work *w)
+static int least_squares(struct calibrate_stepper_work *w)
 {
 	double sxy = 0, squares = 0;
 	int used = 0;
@@ -195,7 +196,7 @@ static int least_squares(struct work *w)
  * Fit lines of one slope through the points further than @skip_mm behind each turn, without
  * outliers. Returns 0, -EDOM (nothing to fit), -ENOMEM.
  */
-static int fit_lines(struct work *w, double skip_mm)
+static int fit_lines(struct calibrate_stepper_work *w, double skip_mm)
 {
 	double *scratch = malloc((w->n > PAIRS ? w->n : PAIRS) * sizeof(*scratch));
 	int rc;
@@ -225,7 +226,7 @@ static int fit_lines(struct work *w, double skip_mm)
 #define SLIP 0.01 /* of full scale, that strokes of one way may be apart */
 
 /* Noise is the distance of three points in a row from a line; the force has to exceed it. */
-static int check_moves(const struct work *w, struct incise_error *err)
+static int check_moves(const struct calibrate_stepper_work *w, struct incise_error *err)
 {
 	double *scratch = malloc(w->n * sizeof(*scratch)), noise, spread;
 	int m = 0;
@@ -253,7 +254,7 @@ static int check_moves(const struct work *w, struct incise_error *err)
 }
 
 /* In each quarter, the median distance from the lines in its first half and its second. */
-static int check_follows(const struct work *w, struct incise_error *err)
+static int check_follows(const struct calibrate_stepper_work *w, struct incise_error *err)
 {
 	double *scratch = malloc(w->n * sizeof(*scratch)), low = INFINITY, middle[BLOCKS];
 	bool known[BLOCKS] = {false};
@@ -294,8 +295,8 @@ static int check_follows(const struct work *w, struct incise_error *err)
 }
 
 /* Strokes of one way lie on each other, unless steps were lost between them. */
-static int check_slip(const struct work *w, struct incise_calibrate_stepper *result,
-		      struct incise_error *err)
+static int check_slip(const struct calibrate_stepper_work *w,
+		      struct incise_calibrate_stepper *result, struct incise_error *err)
 {
 	int least = w->n, from = 0;
 	double worst = 0;
@@ -324,8 +325,8 @@ static int check_slip(const struct work *w, struct incise_calibrate_stepper *res
 }
 
 /* Refuse lines that are not those of an actuator; count outliers. 0, -EDOM, -ENOMEM. */
-static int check_lines(const struct work *w, struct incise_calibrate_stepper *result,
-		       struct incise_error *err)
+static int check_lines(const struct calibrate_stepper_work *w,
+		       struct incise_calibrate_stepper *result, struct incise_error *err)
 {
 	int rc;
 
@@ -401,14 +402,14 @@ static int by_way(const void *a, const void *b)
 }
 
 /* Distance of the lines of two strokes that meet, in mm of lost travel. */
-static double apart_mm(const struct work *w, int k)
+static double apart_mm(const struct calibrate_stepper_work *w, int k)
 {
 	return w->strokes[k].way * (w->strokes[k - 1].zero_N - w->strokes[k].zero_N) /
 	       w->slope;
 }
 
 /* Points behind all turns but the first stroke's, whose turn was not measured. */
-static int gather_calibrate_stepper(const struct work *w, double far_mm,
+static int gather_calibrate_stepper(const struct calibrate_stepper_work *w, double far_mm,
 				    struct moment *moments)
 {
 	int m = 0;
@@ -449,8 +450,9 @@ static double square(double off, double sd)
  * The model of a force that stands still up to @dead, with a rest that fades on @fade (0:
  * none). Without a @stiction the rest is what the dead travel leaves.
  */
-static struct model try_model(const struct work *w, const struct moment *moments, int m,
-			      double D, double dead, double fade, bool stiction)
+static struct model try_model(const struct calibrate_stepper_work *w,
+			      const struct moment *moments, int m, double D, double dead,
+			      double fade, bool stiction)
 {
 	struct model model = {.dead_mm = dead, .fade_mm = fade};
 	const double most_N = w->slope * (dead - D);
@@ -486,9 +488,9 @@ static struct model try_model(const struct work *w, const struct moment *moments
 }
 
 /* Try dead travels and fades about @from, so far apart, and keep the best. */
-static void try_about(const struct work *w, const struct moment *moments, int m, double D,
-		      bool stiction, double least_mm, struct model from, double wide,
-		      struct model *best)
+static void try_about(const struct calibrate_stepper_work *w,
+		      const struct moment *moments, int m, double D, bool stiction,
+		      double least_mm, struct model from, double wide, struct model *best)
 {
 	const double far_mm = LOOK * w->range_mm;
 
@@ -514,7 +516,7 @@ static void try_about(const struct work *w, const struct moment *moments, int m,
 		}
 }
 
-static struct model search_calibrate_stepper(const struct work *w,
+static struct model search_calibrate_stepper(const struct calibrate_stepper_work *w,
 					     const struct moment *moments, int m,
 					     double D, double least_mm, bool stiction,
 					     bool rest)
@@ -536,7 +538,8 @@ static struct model search_calibrate_stepper(const struct work *w,
 	return best;
 }
 
-static int measure_turn(const struct work *w, struct incise_calibrate_stepper *result)
+static int measure_turn(const struct calibrate_stepper_work *w,
+			struct incise_calibrate_stepper *result)
 {
 	struct moment *moments = malloc(w->n * sizeof(*moments));
 	double D[2] = {0, 0}, mean_mm, spacing, u_D2 = 0, u_rest, worth;
@@ -647,7 +650,7 @@ static int check_values(const struct incise_calibrate_stepper_point *points, int
 	return 0;
 }
 
-static int find_strokes(struct work *w, struct incise_error *err)
+static int find_strokes(struct calibrate_stepper_work *w, struct incise_error *err)
 {
 	int ways[2] = {0, 0}, most = w->n / 4 + 1, short_ones = 0;
 	struct stroke *s = NULL;
@@ -711,7 +714,8 @@ static int find_strokes(struct work *w, struct incise_error *err)
 	return 0;
 }
 
-static int find_saturated(struct work *w, struct incise_calibrate_stepper *result,
+static int find_saturated(struct calibrate_stepper_work *w,
+			  struct incise_calibrate_stepper *result,
 			  struct incise_error *err)
 {
 	const struct incise_calibrate_stepper_setup *s = w->setup;
@@ -737,7 +741,8 @@ static int find_saturated(struct work *w, struct incise_calibrate_stepper *resul
 }
 
 /* Means of an eighth of the range: of each stroke, for misfit, and of all, for linearity. */
-static void measure_bends(const struct work *w, struct incise_calibrate_stepper *result)
+static void measure_bends(const struct calibrate_stepper_work *w,
+			  struct incise_calibrate_stepper *result)
 {
 	double all[2][BLOCKS] = {{0}}, chi2 = 0;
 	int counts[2][BLOCKS] = {{0}}, blocks = 0;
@@ -789,7 +794,8 @@ static void add_calibrate_stepper_part(struct incise_calibrate_stepper *result,
 	result->N_step_u = hypot(result->N_step_u, u_N_step);
 }
 
-static void measure_range(const struct work *w, struct incise_calibrate_stepper *result)
+static void measure_range(const struct calibrate_stepper_work *w,
+			  struct incise_calibrate_stepper *result)
 {
 	result->low_mm = result->low_N = INFINITY;
 	result->high_mm = result->high_N = -INFINITY;
@@ -804,7 +810,8 @@ static void measure_range(const struct work *w, struct incise_calibrate_stepper 
 	}
 }
 
-static void conclude(const struct work *w, struct incise_calibrate_stepper *result)
+static void conclude(const struct calibrate_stepper_work *w,
+		     struct incise_calibrate_stepper *result)
 {
 	const struct incise_calibrate_stepper_setup *s = w->setup;
 	const double step = s->step_mm, root = sqrt(w->sxx);
@@ -838,7 +845,7 @@ static void conclude(const struct work *w, struct incise_calibrate_stepper *resu
 		       !(fabs(result->N_mm / s->spring_N_mm - 1) > s->tolerance);
 }
 
-static int fit(struct work *w, struct incise_calibrate_stepper *result,
+static int fit(struct calibrate_stepper_work *w, struct incise_calibrate_stepper *result,
 	       struct incise_error *err)
 {
 	double skip_mm = FIRST_SKIP * w->range_mm;
@@ -880,7 +887,7 @@ int incise_calibrate_stepper(const struct incise_calibrate_stepper_point *points
 			     enum incise_calibrate_stepper_state *states,
 			     struct incise_error *err)
 {
-	struct work w = {.points = points, .setup = setup, .n = n};
+	struct calibrate_stepper_work w = {.points = points, .setup = setup, .n = n};
 	int rc = check_values(points, n, setup, err);
 
 	*result = (struct incise_calibrate_stepper){.points = n};

@@ -20,7 +20,7 @@
 #define SECONDS_MIN 4
 #define QUARTERS 4
 
-struct work {
+struct redundancy_work {
 	double *depth, *off,
 		*along; /* tracker's depth; camera - tracker; place on the way */
 	int64_t *t_ns;
@@ -57,7 +57,7 @@ static void find_way(const struct incise_depth_pair *pairs, int n, double way[2]
 }
 
 /* Uncertainty of a mean of @off from means over whole seconds: neighbours err alike. */
-static double mean_u(const struct work *w, const double *off, const bool *take)
+static double mean_u(const struct redundancy_work *w, const double *off, const bool *take)
 {
 	double sum = 0, squares = 0, mean = 0;
 	int64_t second = INT64_MIN;
@@ -85,7 +85,7 @@ static double mean_u(const struct work *w, const double *off, const bool *take)
 	return seconds > 1 ? sqrt(squares / (seconds - 1) / seconds) : INFINITY;
 }
 
-static void find_places(struct work *w, const struct robust_line *line,
+static void find_places(struct redundancy_work *w, const struct robust_line *line,
 			struct incise_redundancy *r)
 {
 	double low = INFINITY, high = -INFINITY, least = INFINITY, most = -INFINITY;
@@ -129,7 +129,7 @@ static void find_places(struct work *w, const struct robust_line *line,
 	r->place_u_mm = hypot(least_u, most_u);
 }
 
-static void compare_redundancy(struct work *w, struct incise_redundancy *r)
+static void compare_redundancy(struct redundancy_work *w, struct incise_redundancy *r)
 {
 	struct robust_line line = {0};
 	double mean = 0, squares = 0, distance;
@@ -170,7 +170,7 @@ static void compare_redundancy(struct work *w, struct incise_redundancy *r)
 }
 
 /* Seconds that hold a pair. */
-static int seconds_of(const struct work *w)
+static int seconds_of(const struct redundancy_work *w)
 {
 	int seconds = 0;
 
@@ -183,7 +183,7 @@ static int seconds_of(const struct work *w)
 int incise_redundancy(const struct incise_depth_pair *pairs, int n,
 		      struct incise_redundancy *result, struct incise_error *err)
 {
-	struct work w = {0};
+	struct redundancy_work w = {0};
 	double way[2];
 	int rc = 0, seconds = 0;
 

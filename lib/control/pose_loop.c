@@ -53,7 +53,7 @@ struct loop {
 	struct incise_force_map map;
 };
 
-struct run {
+struct pose_loop_run {
 	struct incise_plant plant[3];
 	struct incise_predict predict;
 	double pose_mm[WAITING_MOST + POSES_MOST][3]; /* the oldest first */
@@ -71,8 +71,8 @@ static int64_t to_ns(double t_s)
 }
 
 /* Each state's place in a run, in mm, mm/s, mm/s², N. */
-static double *find_loop_place(const struct loop *loop, struct run *run, int state,
-			       int axis)
+static double *find_loop_place(const struct loop *loop, struct pose_loop_run *run,
+			       int state, int axis)
 {
 	double *const own[OWN_STATES] = {
 		&run->plant[axis].position_mm,	 &run->plant[axis].velocity_mm_s,
@@ -105,7 +105,7 @@ static double unit(const struct loop *loop, int state)
 	return late >= 0 && late < loop->late && most_N_mm > 0 ? most_N_mm : 1;
 }
 
-static void go_to(struct run *run, double t_s)
+static void go_to(struct pose_loop_run *run, double t_s)
 {
 	for (int i = 0; i < 3; i++)
 		incise_plant_step(&run->plant[i], run->force_N[i],
@@ -113,7 +113,7 @@ static void go_to(struct run *run, double t_s)
 	run->t_s = t_s;
 }
 
-static void take_pose_loop(struct run *run, double arrival_s)
+static void take_pose_loop(struct pose_loop_run *run, double arrival_s)
 {
 	struct incise_tracker_sample sample = {
 		.t_ns = to_ns(arrival_s),
@@ -127,8 +127,8 @@ static void take_pose_loop(struct run *run, double arrival_s)
 }
 
 /* The mean of the last places, with this one. A cell of several ticks follows the next in parts. */
-static void set_mean(const struct loop *loop, struct run *run, const double x[3],
-		     double mean[3])
+static void set_mean(const struct loop *loop, struct pose_loop_run *run,
+		     const double x[3], double mean[3])
 {
 	double left = loop->map.mean_ticks - 1, c = loop->cell_ticks;
 
@@ -144,7 +144,7 @@ static void set_mean(const struct loop *loop, struct run *run, const double x[3]
 	}
 }
 
-static void set_force(const struct loop *loop, struct run *run)
+static void set_force(const struct loop *loop, struct pose_loop_run *run)
 {
 	const struct incise_force_map *map = &loop->map;
 	double x[3], v[3], a[3] = {0}, mean[3] = {0}, attitude[4];
@@ -164,7 +164,7 @@ static void set_force(const struct loop *loop, struct run *run)
 }
 
 /* Round a period: the last poses are taken in before the tick that starts the next one. */
-static void run_period(const struct loop *loop, struct run *run)
+static void run_period(const struct loop *loop, struct pose_loop_run *run)
 {
 	double lead_s = LEAD * loop->tick_s;
 	int taken = 0;
@@ -199,7 +199,7 @@ static void measure_period(const struct loop *loop, double *matrix)
 	int n = size_of_pose_loop(loop);
 
 	for (int column = 0; column < n; column++) {
-		struct run run = {
+		struct pose_loop_run run = {
 			.plant = {loop->plant[0], loop->plant[1], loop->plant[2]},
 			.predict = loop->predict,
 			.n = loop->waiting,

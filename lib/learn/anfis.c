@@ -17,7 +17,7 @@
 /* Firing strengths are kept from the fit to the gradient for so many numbers: 8 MB. */
 #define KEPT_MAX (1 << 20)
 
-struct state {
+struct anfis_state {
 	struct incise_basis basis, best;
 	struct incise_lsq *lsq;
 	int n_linear;
@@ -32,7 +32,7 @@ struct state {
 };
 
 /* Firing strengths of pair n: kept, or computed into w. */
-static const double *strengths(const struct state *s, size_t n, const double *x,
+static const double *strengths(const struct anfis_state *s, size_t n, const double *x,
 			       double *w)
 {
 	if (n < s->n_kept)
@@ -41,7 +41,8 @@ static const double *strengths(const struct state *s, size_t n, const double *x,
 	return w;
 }
 
-static int solve_anfis(struct state *s, const struct incise_pairs *pairs, double ridge)
+static int solve_anfis(struct anfis_state *s, const struct incise_pairs *pairs,
+		       double ridge)
 {
 	struct incise_ridge plain = {ridge, 1, s->n_linear, 1};
 
@@ -49,7 +50,7 @@ static int solve_anfis(struct state *s, const struct incise_pairs *pairs, double
 	return incise_lsq_solve(s->lsq, &plain, s->x);
 }
 
-static double check_rmse(const struct state *s, const struct incise_pairs *pairs,
+static double check_rmse(const struct anfis_state *s, const struct incise_pairs *pairs,
 			 struct incise_watch *watch)
 {
 	double sum = 0;
@@ -64,7 +65,7 @@ static double check_rmse(const struct state *s, const struct incise_pairs *pairs
 }
 
 /* One pair's part in the gradient. */
-static void add_gradient(struct state *s, const double *x, const double *w,
+static void add_gradient(struct anfis_state *s, const double *x, const double *w,
 			 const double *f, double y, double error)
 {
 	double slopes[INCISE_MODEL_INPUTS_MAX * INCISE_MODEL_MFS_MAX * BASIS_PARAMS_MAX];
@@ -81,7 +82,7 @@ static void add_gradient(struct state *s, const double *x, const double *w,
 }
 
 /* Training RMSE, and the gradient on the way. */
-static double gradient(struct state *s, const struct incise_pairs *pairs,
+static double gradient(struct anfis_state *s, const struct incise_pairs *pairs,
 		       struct incise_watch *watch)
 {
 	double buffer[INCISE_MODEL_RULES_MAX], f[INCISE_MODEL_RULES_MAX], sum = 0;
@@ -101,7 +102,7 @@ static double gradient(struct state *s, const struct incise_pairs *pairs,
 }
 
 /* A step of length s->step down the gradient. */
-static void move_premises(struct state *s)
+static void move_premises(struct anfis_state *s)
 {
 	double norm = 0, p[BASIS_PARAMS_MAX];
 
@@ -127,7 +128,7 @@ static void move_premises(struct state *s)
  * Jang's rule: after four falls in a row the step grows, after up and down twice it
  * shrinks; each at most every fourth epoch, counted from 0.
  */
-static void adapt_step(struct state *s, int epoch)
+static void adapt_step(struct anfis_state *s, int epoch)
 {
 	const double *e = s->rmse;
 
@@ -143,7 +144,7 @@ static void adapt_step(struct state *s, int epoch)
 	}
 }
 
-static int epoch(struct state *s, struct incise_anfis *anfis, int number)
+static int epoch(struct anfis_state *s, struct incise_anfis *anfis, int number)
 {
 	double train, check, score;
 	int rc = solve_anfis(s, anfis->train, anfis->ridge);
@@ -170,7 +171,7 @@ static int epoch(struct state *s, struct incise_anfis *anfis, int number)
 	return 0;
 }
 
-static void state_free(struct state *s)
+static void state_free(struct anfis_state *s)
 {
 	if (!s)
 		return;
@@ -184,7 +185,7 @@ static void state_free(struct state *s)
 
 int incise_anfis_run(struct incise_model *model, struct incise_anfis *anfis)
 {
-	struct state *s = calloc(1, sizeof(*s));
+	struct anfis_state *s = calloc(1, sizeof(*s));
 	int rc = s ? incise_basis_init(&s->basis, model) : -ENOMEM;
 
 	if (rc)

@@ -24,14 +24,14 @@ struct incise_dataset {
 	char **names; /* of groups */
 };
 
-struct reader {
+struct dataset_reader {
 	struct incise_lines lines;
 	char *field[FIELDS_MAX]; /* into the line */
 	int n_fields;
 };
 
 /* The end of the field at *c; a quoted one ("" stands for ") is unquoted in place. */
-static int field_end(struct reader *in, char **c)
+static int field_end(struct dataset_reader *in, char **c)
 {
 	char *from = *c + 1, *to = *c;
 
@@ -58,7 +58,7 @@ static int field_end(struct reader *in, char **c)
 }
 
 /* Split a row into its fields. */
-static int split_row(struct reader *in, char *c)
+static int split_row(struct dataset_reader *in, char *c)
 {
 	for (in->n_fields = 0;; c++) {
 		int rc;
@@ -80,7 +80,7 @@ static int split_row(struct reader *in, char *c)
 }
 
 /* Next row that is not empty or a comment: 1, or 0 at the end. */
-static int next_dataset_row(struct reader *in)
+static int next_dataset_row(struct dataset_reader *in)
 {
 	int rc;
 
@@ -94,7 +94,7 @@ static int next_dataset_row(struct reader *in)
 }
 
 /* -ENOENT: there is none. */
-static int look_for_column(struct reader *in, const char *name)
+static int look_for_column(struct dataset_reader *in, const char *name)
 {
 	int at = -ENOENT;
 
@@ -110,7 +110,7 @@ static int look_for_column(struct reader *in, const char *name)
 	return at;
 }
 
-static int find_column(struct reader *in, const char *name)
+static int find_column(struct dataset_reader *in, const char *name)
 {
 	const char *names[FIELDS_MAX + 1] = {NULL}, *nearest;
 	char list[260] = "";
@@ -141,7 +141,7 @@ static int find_column(struct reader *in, const char *name)
 		nearest ? nearest : "", nearest ? "'?" : "");
 }
 
-static int read_dataset_number(struct reader *in, int field, const char *column,
+static int read_dataset_number(struct dataset_reader *in, int field, const char *column,
 			       double *value)
 {
 	const char *text = in->field[field];
@@ -236,7 +236,7 @@ static int keep_row(void *user, const double *row, const char *group,
 	return 0;
 }
 
-static int read_rows(struct reader *in, struct sink *sink)
+static int read_rows(struct dataset_reader *in, struct sink *sink)
 {
 	int at[FIELDS_MAX], group_at = -1, where_at, rc;
 	double row[FIELDS_MAX];
@@ -315,7 +315,7 @@ static const struct incise_infile_kind csv = {
 static int read_dataset_file(const char *path, struct sink *sink,
 			     struct incise_error *err)
 {
-	struct reader in;
+	struct dataset_reader in;
 	int rc = incise_lines_open(&in.lines, path, &csv, err);
 
 	if (rc)
@@ -327,7 +327,7 @@ static int read_dataset_file(const char *path, struct sink *sink,
 
 bool incise_dataset_has(const char *path, const char *column, bool *stated)
 {
-	struct reader in;
+	struct dataset_reader in;
 	double value;
 	int at = -ENOENT;
 

@@ -33,7 +33,7 @@
 #define VISITED_MAX \
 	(1 + INCISE_MODEL_INPUTS_MAX * (MFS_MAX - 1) * INCISE_MODEL_INPUTS_MAX)
 
-struct grid {
+struct grid_search_grid {
 	int n_mfs[INCISE_MODEL_INPUTS_MAX], rules;
 	double total;
 	double *error; /* by unit */
@@ -48,7 +48,7 @@ struct race {
 	struct incise_folds folds;
 	struct incise_watch watch;
 	double *errors; /* ridges × units */
-	struct grid visited[VISITED_MAX];
+	struct grid_search_grid visited[VISITED_MAX];
 	int n;
 };
 
@@ -78,7 +78,7 @@ static int visit(struct race *race, const int *n_mfs)
 	static const struct incise_variable output = {"", 0, 1};
 	struct incise_model *model = incise_model_new_grid(
 		race->n_inputs, race->inputs, n_mfs, race->type, &output, NULL);
-	struct grid *grid = &race->visited[race->n];
+	struct grid_search_grid *grid = &race->visited[race->n];
 	struct incise_ridge ridges[TUNE_RIDGES];
 	struct incise_basis basis;
 	int rc = model ? incise_basis_init(&basis, model) : -errno;
@@ -145,16 +145,16 @@ static int grow_grid_search(struct race *race, int *at, size_t n_pairs)
  * The fewest rules within a standard error of the best, or as good as alike; of as many
  * rules, the best.
  */
-static const struct grid *winner(const struct race *race)
+static const struct grid_search_grid *winner(const struct race *race)
 {
-	const struct grid *best = &race->visited[0], *chosen;
+	const struct grid_search_grid *best = &race->visited[0], *chosen;
 
 	for (int i = 1; i < race->n; i++)
 		if (race->visited[i].total < best->total)
 			best = &race->visited[i];
 	chosen = best;
 	for (int i = 0; i < race->n; i++) {
-		const struct grid *grid = &race->visited[i];
+		const struct grid_search_grid *grid = &race->visited[i];
 		double spread =
 			incise_crossval_spread(&race->folds, grid->error, best->error);
 

@@ -33,7 +33,7 @@
 /* A fall of the squared error below this share is the end. */
 #define TOLERANCE 1e-7
 
-struct state {
+struct varpro_state {
 	const struct incise_pairs *pairs;
 	const struct incise_ridge *ridge;
 	int n, q;			 /* consequents, premises */
@@ -45,7 +45,7 @@ struct state {
 };
 
 /* The best consequents for some premises; *error is the penalised squared error. */
-static int solve_varpro(struct state *s, const struct incise_basis *basis,
+static int solve_varpro(struct varpro_state *s, const struct incise_basis *basis,
 			double *consequents, double *error)
 {
 	const double *factor;
@@ -60,7 +60,7 @@ static int solve_varpro(struct state *s, const struct incise_basis *basis,
 }
 
 /* ∂output/∂step of all premises, at a pair. */
-static void derivative(const struct state *s, const struct incise_basis *basis,
+static void derivative(const struct varpro_state *s, const struct incise_basis *basis,
 		       const double *w, const double *x, const double *consequents,
 		       double *to)
 {
@@ -78,7 +78,7 @@ static void derivative(const struct state *s, const struct incise_basis *basis,
 }
 
 /* R₂ and g for the strengths and consequents of the last solution. False: none. */
-static bool project(struct state *s, const struct incise_basis *basis,
+static bool project(struct varpro_state *s, const struct incise_basis *basis,
 		    const double *consequents)
 {
 	int d = s->pairs->n_inputs, stride;
@@ -118,7 +118,7 @@ static double largest_column(struct incise_lsq *triangle, int q)
 }
 
 /* The damped step into s->step. */
-static int find_step(struct state *s, double damping)
+static int find_step(struct varpro_state *s, double damping)
 {
 	struct incise_ridge ridge = {damping, 1, s->q, 1};
 	int rc = incise_lsq_solve(s->damped, &ridge, s->step);
@@ -129,8 +129,9 @@ static int find_step(struct state *s, double damping)
 }
 
 /* One step downhill; false where there is none. */
-static bool improve(struct state *s, struct incise_basis *basis, double *consequents,
-		    double *trial_consequents, double *error, double *mu)
+static bool improve(struct varpro_state *s, struct incise_basis *basis,
+		    double *consequents, double *trial_consequents, double *error,
+		    double *mu)
 {
 	double norm =
 		project(s, basis, consequents) ? largest_column(s->damped, s->q) : 0;
@@ -156,7 +157,7 @@ static bool improve(struct state *s, struct incise_basis *basis, double *consequ
 	return false;
 }
 
-static void state_free(struct state *s)
+static void state_free(struct varpro_state *s)
 {
 	incise_lsq_free(s->linear);
 	incise_lsq_free(s->all);
@@ -170,7 +171,8 @@ int incise_varpro_run(struct incise_basis *basis, double *consequents,
 		      struct incise_varpro *varpro)
 {
 	int q = basis->n_premises, n = basis->n_rules * (basis->n_inputs + 1);
-	struct state s = {.pairs = varpro->pairs, .ridge = varpro->ridge, .n = n, .q = q};
+	struct varpro_state s = {
+		.pairs = varpro->pairs, .ridge = varpro->ridge, .n = n, .q = q};
 	double *trial = malloc(n * sizeof(double)), error, mu = MU_FIRST;
 	int rc = -ENOMEM;
 

@@ -16,7 +16,7 @@
 #include "loop_control.h"
 #include "state_page.h"
 
-struct run {
+struct loop_run {
 	struct incise_plan *plan;
 	struct incise_clock *clock;
 	const struct incise_loop_options *options;
@@ -64,7 +64,7 @@ static void count_tick(struct incise_loop_stats *stats, const struct incise_tick
 	stats->limited += !!(tick->flags & (INCISE_TICK_CLAMPED | INCISE_TICK_SLEWED));
 }
 
-static void send_event(const struct run *run, enum incise_loop_event_kind kind,
+static void send_event(const struct loop_run *run, enum incise_loop_event_kind kind,
 		       int64_t t_ns, double value)
 {
 	struct incise_loop_event event = {t_ns, run->stats->ticks, value, kind};
@@ -74,7 +74,7 @@ static void send_event(const struct run *run, enum incise_loop_event_kind kind,
 }
 
 /* Report flags that changed. */
-static void report_changes(struct run *run, const struct incise_tick *tick)
+static void report_changes(struct loop_run *run, const struct incise_tick *tick)
 {
 	unsigned int begun = tick->flags & ~run->flags, ended = run->flags & ~tick->flags;
 	char flag = incise_plan_pose_flag(run->plan);
@@ -101,7 +101,7 @@ static void report_changes(struct run *run, const struct incise_tick *tick)
 }
 
 /* One tick with its statistics. */
-static INCISE_REALTIME int run_tick(struct run *run, struct incise_tick *tick,
+static INCISE_REALTIME int run_tick(struct loop_run *run, struct incise_tick *tick,
 				    int64_t start_ns)
 {
 	const struct incise_loop_options *options = run->options;
@@ -121,7 +121,7 @@ static INCISE_REALTIME int run_tick(struct run *run, struct incise_tick *tick,
 }
 
 /* A stall past the end skips only the ticks that were still due. */
-static INCISE_REALTIME int skip(struct run *run, int64_t now_ns)
+static INCISE_REALTIME int skip(struct loop_run *run, int64_t now_ns)
 {
 	int64_t ticks = (now_ns - run->due_ns) / run->period_ns;
 	int64_t left = (run->end_ns - run->due_ns - 1) / run->period_ns + 1;
@@ -142,7 +142,7 @@ static INCISE_REALTIME int skip(struct run *run, int64_t now_ns)
 }
 
 /* Whether the loop ends before the next tick: after its duration, or stopped and faded. */
-static INCISE_REALTIME bool stops(struct run *run)
+static INCISE_REALTIME bool stops(struct loop_run *run)
 {
 	const struct incise_loop_options *options = run->options;
 
@@ -159,7 +159,7 @@ static INCISE_REALTIME bool stops(struct run *run)
 }
 
 /* A waiting plan takes over at a tick at which the old one requests no force. */
-static INCISE_REALTIME void change_plan(struct run *run, int64_t now_ns)
+static INCISE_REALTIME void change_plan(struct loop_run *run, int64_t now_ns)
 {
 	bool waits = !run->fading && run->options->control &&
 		     incise_loop_control_waiting(run->options->control);
@@ -183,7 +183,7 @@ static INCISE_REALTIME void change_plan(struct run *run, int64_t now_ns)
 }
 
 /* At each tick, as the plan may be another. */
-static INCISE_REALTIME void take_tool(struct run *run)
+static INCISE_REALTIME void take_tool(struct loop_run *run)
 {
 	enum incise_tool tool;
 
@@ -192,7 +192,7 @@ static INCISE_REALTIME void take_tool(struct run *run)
 		incise_plan_set_tool(run->plan, tool);
 }
 
-static INCISE_REALTIME void count_lateness(struct run *run, int64_t now_ns)
+static INCISE_REALTIME void count_lateness(struct loop_run *run, int64_t now_ns)
 {
 	int64_t lag_ns = now_ns - run->due_ns + incise_clock_lag_ns(run->clock);
 
@@ -203,7 +203,7 @@ static INCISE_REALTIME void count_lateness(struct run *run, int64_t now_ns)
 }
 
 /* Returns 0 or a device's errno; *ended is the result of options->ticked(). */
-static int run_ticks(struct run *run, int *ended)
+static int run_ticks(struct loop_run *run, int *ended)
 {
 	const struct incise_loop_options *options = run->options;
 	struct incise_loop_stats *stats = run->stats;
@@ -234,7 +234,7 @@ static int run_ticks(struct run *run, int *ended)
 	return rc;
 }
 
-static int explain(const struct run *run, int rc, struct incise_error *err)
+static int explain(const struct loop_run *run, int rc, struct incise_error *err)
 {
 	unsigned long long ticks = run->stats->ticks;
 	char cause[300];
@@ -257,7 +257,7 @@ int incise_loop_run(struct incise_plan *plan, struct incise_clock *clock,
 		    struct incise_loop_stats *stats, struct incise_error *err)
 {
 	struct incise_pose_counts poses;
-	struct run run = {
+	struct loop_run run = {
 		.plan = plan, .clock = clock, .options = options, .stats = stats};
 	int rc, released, slack_ns, ended = 0;
 

@@ -82,7 +82,7 @@ static void add_state_writer(struct sum *sum, double value)
  *     force    f(k-1) ────────▶          held between them
  *     tool     x(k-1)          x(k)      work on the tissue: -f(k-1)·(x(k) - x(k-1))
  */
-struct work {
+struct state_writer_work {
 	struct sum absorbed; /* by the tissue */
 	struct sum returned; /* to the hand; ≥ 0 */
 	double tool_mm[3], force_N[3];
@@ -90,7 +90,7 @@ struct work {
 	bool known; /* tool_mm and force_N of the last tick */
 };
 
-static void add_work(struct work *work, const struct incise_tick *tick)
+static void add_work(struct state_writer_work *work, const struct incise_tick *tick)
 {
 	bool known = !(tick->flags & (INCISE_TICK_STALE | INCISE_TICK_FAULT));
 	double way_mm[3], work_mJ;
@@ -129,7 +129,7 @@ struct incise_state_writer {
 	struct mirror mirror;
 	/* The loop's, on cache lines of its own. */
 	_Alignas(64) struct state_live live;
-	struct work work;
+	struct state_writer_work work;
 	uint64_t written;
 };
 

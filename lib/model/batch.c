@@ -28,7 +28,7 @@ static void one_by_one(const struct incise_fixed *fx, const int32_t *x, int32_t 
 #define LANES 4
 
 /* One input of four evaluations: the place in the table, and the way into the cell. */
-struct place {
+struct batch_place {
 	__m256i cell; /* 64-bit lanes */
 	__m256i from; /* share of the knot below: 2^cell_shift - share of the knot above */
 	__m256i to;
@@ -68,11 +68,12 @@ AVX2_INLINE __m256i distance_from_min(const struct incise_fixed_input *in, __m25
 	return _mm256_and_si256(x, _mm256_set1_epi64x(UINT32_MAX));
 }
 
-AVX2_INLINE struct place locate(const struct incise_fixed_input *in, __m256i distance)
+AVX2_INLINE struct batch_place locate(const struct incise_fixed_input *in,
+				      __m256i distance)
 {
 	const __m256i width = _mm256_set1_epi64x((int64_t)1 << in->cell_shift);
 	const __m256i mask = _mm256_sub_epi64(width, _mm256_set1_epi64x(1));
-	struct place p;
+	struct batch_place p;
 
 	p.cell = _mm256_srl_epi64(distance, _mm_cvtsi32_si128(in->cell_shift));
 	p.to = _mm256_and_si256(distance, mask);
@@ -89,7 +90,7 @@ AVX2_INLINE __m256i between(__m256i from, __m256i to, __m256i share_from,
 }
 
 /* As incise_fx_lerp(); the lower halves count. */
-AVX2_INLINE __m256i lerp(__m256i from, __m256i to, const struct place *p, int shift)
+AVX2_INLINE __m256i lerp(__m256i from, __m256i to, const struct batch_place *p, int shift)
 {
 	return _mm256_srl_epi64(between(from, to, p->from, p->to),
 				_mm_cvtsi32_si128(shift));
@@ -97,7 +98,7 @@ AVX2_INLINE __m256i lerp(__m256i from, __m256i to, const struct place *p, int sh
 
 /* The last step of all tables: between two values in Q(shift_a), rounded to Q16. */
 AVX2_INLINE __m256i round_output(const struct incise_fixed *fx, __m256i from, __m256i to,
-				 const struct place *p, int cell_shift)
+				 const struct batch_place *p, int cell_shift)
 {
 	/* Floors of floors are one floor. */
 	const __m256i half =
@@ -123,7 +124,7 @@ AVX2 static void one_input(const struct incise_fixed *fx, const int32_t *x, int3
 	for (size_t k = 0; k < n; k += LANES) {
 		__m256i at =
 			_mm256_cvtepu32_epi64(_mm_loadu_si128((const __m128i *)(x + k)));
-		struct place p = locate(in, distance_from_min(in, at));
+		struct batch_place p = locate(in, distance_from_min(in, at));
 		__m256i v = pairs(fx->data, p.cell);
 
 		store_low(y + k, round_output(fx, v, high_halves(v), &p, in->cell_shift));
@@ -140,8 +141,8 @@ AVX2 static void force(const struct incise_fixed *fx, const int32_t *x, int32_t 
 
 	for (size_t k = 0; k < n; k += LANES) {
 		__m256i at = _mm256_loadu_si256((const __m256i *)(x + 2 * k));
-		struct place pa = locate(a, distance_from_min(a, at));
-		struct place pb = locate(b, distance_from_min(b, high_halves(at)));
+		struct batch_place pa = locate(a, distance_from_min(a, at));
+		struct batch_place pb = locate(b, distance_from_min(b, high_halves(at)));
 		__m256i index =
 			_mm256_add_epi64(_mm256_mul_epu32(pa.cell, width), pb.cell);
 		__m256i low = pairs(fx->data, index);
@@ -189,7 +190,7 @@ AVX2_INLINE void add_weighted(struct sums *s, __m256i w, __m256i fold, __m256i f
 
 /* One evaluation, functions i to i+3 in a lane each. */
 AVX2_INLINE void weigh_four(struct sums *s, const struct rows *r, int i,
-			    const struct place *p, int shift)
+			    const struct batch_place *p, int shift)
 {
 	const int32_t *weight = r->weight + i, *fold = r->fold + 2 * i;
 	__m256i w = _mm256_cvtepu32_epi64(_mm_loadu_si128((const __m128i *)weight));
@@ -204,7 +205,7 @@ AVX2_INLINE void weigh_four(struct sums *s, const struct rows *r, int i,
 /* The same for the last one to three: nothing beyond the rows is read, and a weight of 0
  * counts for nothing. */
 AVX2_INLINE void weigh_rest(struct sums *s, const struct rows *r, int i,
-			    const struct place *p, int shift)
+			    const struct batch_place *p, int shift)
 {
 	const int32_t *weight = r->weight + i, *fold = r->fold + 2 * i;
 	const __m256i mask = _mm256_cmpgt_epi64(_mm256_set1_epi64x(r->n - i),
@@ -222,7 +223,8 @@ AVX2_INLINE void weigh_rest(struct sums *s, const struct rows *r, int i,
 /* Four evaluations in a lane each, function i: a vector with one function of a single
  * evaluation would be three quarters idle. */
 AVX2_INLINE void weigh_across(struct sums *s, const struct rows *r, int i,
-			      const struct place *pa, const struct place *pb, int shift)
+			      const struct batch_place *pa, const struct batch_place *pb,
+			      int shift)
 {
 	const int32_t *weight = r->weight + i, *fold = r->fold + 2 * i;
 	const __m256i n = _mm256_set1_epi64x(r->n);
@@ -237,8 +239,9 @@ AVX2_INLINE void weigh_across(struct sums *s, const struct rows *r, int i,
 }
 
 /* Four evaluations' sums, a lane each. n is a constant where it matters for speed. */
-AVX2_INLINE struct sums table_sums(const struct incise_fixed *fx, const struct place *pa,
-				   const struct place *pb, int n)
+AVX2_INLINE struct sums table_sums(const struct incise_fixed *fx,
+				   const struct batch_place *pa,
+				   const struct batch_place *pb, int n)
 {
 	const struct rows first = {fx->input[0].values, fx->data, n};
 	int shift = fx->input[0].cell_shift;
@@ -253,8 +256,8 @@ AVX2_INLINE struct sums table_sums(const struct incise_fixed *fx, const struct p
 	for (int e = 0; e < LANES; e++) {
 		struct rows r = {first.weight + cell_a[e] * (uint32_t)n,
 				 first.fold + cell_b[e] * (uint32_t)(2 * n), n};
-		struct place p = {.from = _mm256_set1_epi64x((int64_t)from[e]),
-				  .to = _mm256_set1_epi64x((int64_t)to[e])};
+		struct batch_place p = {.from = _mm256_set1_epi64x((int64_t)from[e]),
+					.to = _mm256_set1_epi64x((int64_t)to[e])};
 		int i = 0;
 
 		of[e] = (struct sums){0};
@@ -284,8 +287,8 @@ AVX2_INLINE void table_of(const struct incise_fixed *fx, const int32_t *x, int32
 	for (size_t k = 0; k < count; k += LANES) {
 		__m256i at = _mm256_loadu_si256((const __m256i *)(x + 2 * k));
 		__m256i from_a = distance_from_min(a, at), centred, v[2];
-		struct place pa = locate(a, from_a);
-		struct place pb = locate(b, distance_from_min(b, high_halves(at)));
+		struct batch_place pa = locate(a, from_a);
+		struct batch_place pb = locate(b, distance_from_min(b, high_halves(at)));
 		struct sums s = table_sums(fx, &pa, &pb, n);
 
 		centred = _mm256_sub_epi64(from_a, middle);

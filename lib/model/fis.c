@@ -34,7 +34,7 @@ static const char *const system_keys[] = {
 enum variable_key { VARIABLE_NAME, RANGE, NUM_MFS, ENABLED };
 static const char *const variable_keys[] = {"Name", "Range", "NumMFs", "Enabled", NULL};
 
-struct reader {
+struct fis_reader {
 	struct incise_lines lines;
 	char *text; /* of the line, without white space at its ends and comment */
 	struct incise_model *model;
@@ -68,7 +68,7 @@ static void cut_fis_text(char *text)
 }
 
 /* Next line that is not empty or a comment: 1, or 0 at the end of the file. */
-static int next_fis_line(struct reader *in)
+static int next_fis_line(struct fis_reader *in)
 {
 	int rc;
 
@@ -82,7 +82,7 @@ static int next_fis_line(struct reader *in)
 }
 
 /* 'NAME' at *text, which moves behind it; '' within it is a quote. */
-static int read_quoted(struct reader *in, const char **text, char *name)
+static int read_quoted(struct fis_reader *in, const char **text, char *name)
 {
 	const char *at = *text;
 	int n = 0;
@@ -103,7 +103,7 @@ static int read_quoted(struct reader *in, const char **text, char *name)
 }
 
 /* 'NAME', then the end of the line. */
-static int read_name(struct reader *in, const char *text, char *name)
+static int read_name(struct fis_reader *in, const char *text, char *name)
 {
 	int rc = read_quoted(in, &text, name);
 
@@ -116,7 +116,7 @@ static int read_name(struct reader *in, const char *text, char *name)
  * [a b c]: just n finite numbers, then the end of the line; a single number may lack its brackets.
  * @padded: zeros may follow, with which MATLAB once filled the numbers of each function up to four.
  */
-static int read_numbers(struct reader *in, const char *text, double *values, int n,
+static int read_numbers(struct fis_reader *in, const char *text, double *values, int n,
 			bool padded)
 {
 	bool bare = n == 1 && *text != '[';
@@ -145,7 +145,7 @@ static int read_numbers(struct reader *in, const char *text, double *values, int
 }
 
 /* A whole number from min to max, then the end of the line. */
-static int read_whole(struct reader *in, const char *key, const char *text, int min,
+static int read_whole(struct fis_reader *in, const char *key, const char *text, int min,
 		      int max, int *value)
 {
 	char *end;
@@ -161,7 +161,7 @@ static int read_whole(struct reader *in, const char *key, const char *text, int 
 /* --- keys of the sections --- */
 
 /* The place of a key among @known, each of which is given once at most. */
-static int find_key(struct reader *in, const char *key, const char *const known[],
+static int find_key(struct fis_reader *in, const char *key, const char *const known[],
 		    unsigned *seen)
 {
 	const char *near = incise_nearest_name(key, known);
@@ -179,7 +179,7 @@ static int find_key(struct reader *in, const char *key, const char *const known[
 	return i;
 }
 
-static int system_key(struct reader *in, const char *key, const char *value)
+static int system_key(struct fis_reader *in, const char *key, const char *value)
 {
 	struct incise_model *model = in->model;
 	int i = find_key(in, key, system_keys, &in->system_seen), n, rc;
@@ -231,7 +231,7 @@ static bool skip(const char **text, char c)
 }
 
 /* MFn='name':'kind',[…]: name and kind; *value moves to the bracket. */
-static int mf_head(struct reader *in, const char *key, const char **value, int n_mfs,
+static int mf_head(struct fis_reader *in, const char *key, const char **value, int n_mfs,
 		   int *number, char *name, char *kind)
 {
 	int rc;
@@ -252,7 +252,7 @@ static int mf_head(struct reader *in, const char *key, const char **value, int n
 }
 
 /* @n_min and @n_max of @n functions; the ends of an output's range may be equal. */
-static int variable_key(struct reader *in, struct incise_variable *v, const char *key,
+static int variable_key(struct fis_reader *in, struct incise_variable *v, const char *key,
 			const char *value, unsigned *seen, int n_min, int n_max, int *n)
 {
 	bool output = v == &in->model->info.output;
@@ -291,7 +291,7 @@ static void take_widths(struct incise_mf *mf)
 }
 
 /* A key of an input's section, i from 0 on. */
-static int input_key(struct reader *in, int i, const char *key, const char *value)
+static int input_key(struct fis_reader *in, int i, const char *key, const char *value)
 {
 	struct incise_model *model = in->model;
 	char name[INCISE_MODEL_NAME_MAX], kind[INCISE_MODEL_NAME_MAX];
@@ -327,7 +327,7 @@ static int input_key(struct reader *in, int i, const char *key, const char *valu
 	return rc;
 }
 
-static int output_key(struct reader *in, const char *key, const char *value)
+static int output_key(struct fis_reader *in, const char *key, const char *value)
 {
 	struct incise_model *model = in->model;
 	char name[INCISE_MODEL_NAME_MAX], kind[INCISE_MODEL_NAME_MAX];
@@ -364,7 +364,7 @@ static int output_key(struct reader *in, const char *key, const char *value)
 /* --- rules --- */
 
 /* Rules refer to the variables: all of them must come before. */
-static int check_variables(struct reader *in)
+static int check_variables(struct fis_reader *in)
 {
 	struct incise_model *model = in->model;
 
@@ -403,7 +403,7 @@ static bool read_index(const char **text, long *index)
 }
 
 /* "1 2, 3 (1) : 1" */
-static int read_rule(struct reader *in)
+static int read_rule(struct fis_reader *in)
 {
 	struct incise_model *model = in->model;
 	struct incise_rule *rule = &model->rule[model->info.n_rules];
@@ -456,7 +456,7 @@ static int read_rule(struct reader *in)
 
 /* --- the whole file --- */
 
-static int read_fis_file(struct reader *in)
+static int read_fis_file(struct fis_reader *in)
 {
 	enum { NONE, SYSTEM, INPUT, OUTPUT, RULES } section = NONE;
 	int input = 0, rc;
@@ -540,7 +540,7 @@ static const struct incise_infile_kind fis = {
 
 struct incise_model *incise_model_load(const char *path, struct incise_error *err)
 {
-	struct reader *in = calloc(1, sizeof(*in));
+	struct fis_reader *in = calloc(1, sizeof(*in));
 	struct incise_model *model = calloc(1, sizeof(*model));
 	int rc;
 

@@ -240,7 +240,7 @@ static int enclose(const struct incise_grid *grid, struct incise_slope *slopes)
  */
 
 /* A point and the slope there, negated where the lowest is sought. */
-struct place {
+struct slope_place {
 	double slope;
 	double x[INCISE_MODEL_INPUTS_MAX];
 };
@@ -262,17 +262,17 @@ static void even_steps(double *step, int n)
 }
 
 static double climb(const struct incise_secant *s, int input, double sign,
-		    struct place *place)
+		    struct slope_place *place)
 {
 	/* Both ends' climbs together ask as often as the points before them. */
 	int left = s->n_points / (2 * STARTS);
 	double share = FIRST_STEP;
 
 	for (int halving = 0; halving < HALVINGS && left > 0;) {
-		struct place best = *place;
+		struct slope_place best = *place;
 
 		for (int k = 0; k < 2 * s->n_inputs; k++) {
-			struct place next = *place;
+			struct slope_place next = *place;
 			int i = k / 2;
 			double by = (s->max[i] - s->min[i]) * share;
 
@@ -294,7 +294,7 @@ static double climb(const struct incise_secant *s, int input, double sign,
 }
 
 /* Keep the best, the steepest first. */
-static void keep_slope(struct place *best, const struct place *place)
+static void keep_slope(struct slope_place *best, const struct slope_place *place)
 {
 	int k = STARTS;
 
@@ -309,7 +309,7 @@ static void keep_slope(struct place *best, const struct place *place)
 static void search_slope(const struct incise_secant *s, int input,
 			 struct incise_slope *slope)
 {
-	struct place best[2][STARTS];
+	struct slope_place best[2][STARTS];
 	double step[INCISE_MODEL_INPUTS_MAX];
 
 	even_steps(step, s->n_inputs);
@@ -319,7 +319,7 @@ static void search_slope(const struct incise_secant *s, int input,
 		best[1][k] = best[0][k];
 	}
 	for (int k = 0; k < s->n_points; k++) {
-		struct place place;
+		struct slope_place place;
 
 		for (int i = 0; i < s->n_inputs; i++) {
 			double u = fmod(0.5 + k * step[i], 1);

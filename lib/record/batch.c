@@ -72,18 +72,19 @@ static uint64_t get_word(const uint8_t *from, int width)
 }
 
 /* From 0 to @span in n - 1 steps, each rounded down. */
-struct line {
+struct batch_line {
 	uint64_t value, step, rest, sum, steps;
 };
 
-static struct line line_to(uint64_t span, size_t n)
+static struct batch_line line_to(uint64_t span, size_t n)
 {
 	uint64_t steps = n > 1 ? n - 1 : 1;
 
-	return (struct line){.step = span / steps, .rest = span % steps, .steps = steps};
+	return (struct batch_line){
+		.step = span / steps, .rest = span % steps, .steps = steps};
 }
 
-static void line_next(struct line *line)
+static void line_next(struct batch_line *line)
 {
 	line->value += line->step;
 	line->sum += line->rest;
@@ -106,7 +107,7 @@ static int width_of_batch(uint64_t range)
 static uint64_t range_of_batch(const int64_t *values, size_t n, uint64_t span,
 			       int64_t *least)
 {
-	struct line line = line_to(span, n);
+	struct batch_line line = line_to(span, n);
 	int64_t low = values[0], high = values[0];
 
 	for (size_t k = 0; k < n; k++, line_next(&line)) {
@@ -125,7 +126,7 @@ static uint8_t *put_integers(uint8_t *to, const int64_t *values, size_t n)
 {
 	int64_t base, base_of_line;
 	uint64_t range = range_of_batch(values, n, 0, &base), range_of_line, span = 0;
-	struct line line;
+	struct batch_line line;
 	int width;
 
 	/* Numbers and times are near a line; codes are not. */
@@ -241,7 +242,7 @@ static const uint8_t *take_bytes(struct input *input, size_t n)
 static bool get_integers(struct input *input, int64_t *values, size_t n)
 {
 	const uint8_t *head = take_bytes(input, INTEGER_HEAD), *from;
-	struct line line;
+	struct batch_line line;
 	uint64_t base;
 
 	if (!head || (*head != 0 && *head != 1 && *head != 2 && *head != 4 && *head != 8))

@@ -17,14 +17,14 @@
 #define STEP_MM_S2 10
 
 /* All that a tick changes. */
-struct state {
+struct force_map_state {
 	struct incise_double_state state;
 	struct incise_double_ends ends;
 	struct incise_double_average average;
 	struct incise_proxy proxy;
 };
 
-static void keep_force_map(struct state *to, const struct incise_plan *plan)
+static void keep_force_map(struct force_map_state *to, const struct incise_plan *plan)
 {
 	to->state = plan->doubles.state;
 	to->proxy = plan->proxy;
@@ -34,7 +34,7 @@ static void keep_force_map(struct state *to, const struct incise_plan *plan)
 		to->average = *to->state.average;
 }
 
-static void restore(struct incise_plan *plan, const struct state *from)
+static void restore(struct incise_plan *plan, const struct force_map_state *from)
 {
 	plan->doubles.state = from->state;
 	plan->proxy = from->proxy;
@@ -62,8 +62,9 @@ static void set_filter(struct incise_double_predict *p,
 	p->t_ns = p->arrival_ns = t_ns;
 }
 
-static void force_after(struct incise_plan *plan, const struct state *from, int64_t t_ns,
-			int ticks, const struct change *change, double force_N[3])
+static void force_after(struct incise_plan *plan, const struct force_map_state *from,
+			int64_t t_ns, int ticks, const struct change *change,
+			double force_N[3])
 {
 	struct incise_double_state *state = &plan->doubles.state;
 	struct incise_tick tick;
@@ -83,7 +84,7 @@ static void force_after(struct incise_plan *plan, const struct state *from, int6
 }
 
 /* A column: the change of the force by a change of this size in @part. */
-static void measure_column(struct incise_plan *plan, const struct state *from,
+static void measure_column(struct incise_plan *plan, const struct force_map_state *from,
 			   int64_t t_ns, int ticks, struct change *change, double part[3],
 			   const double along[3], double size, double column[3])
 {
@@ -99,8 +100,9 @@ static void measure_column(struct incise_plan *plan, const struct state *from,
 }
 
 /* Speeds and accelerations to both sides: the search covers corners at rest, such as |v|'s. */
-static void measure_mean_column(struct incise_plan *plan, const struct state *from,
-				int64_t t_ns, struct change *change, double part[3],
+static void measure_mean_column(struct incise_plan *plan,
+				const struct force_map_state *from, int64_t t_ns,
+				struct change *change, double part[3],
 				const double along[3], double size, double column[3])
 {
 	double other[3];
@@ -136,7 +138,7 @@ void incise_plan_force_map(struct incise_plan *plan, int64_t t_ns,
 	double size = against ? -STEP_MM : STEP_MM;
 	int n_stages = plan->n_stages, n = plan->average_ticks;
 	struct change change = {.x = {0}};
-	struct state from;
+	struct force_map_state from;
 
 	for (int i = 0; i < n_stages; i++)
 		kept[i] = all[i];

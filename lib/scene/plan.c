@@ -20,11 +20,11 @@ static const struct incise_tracker_info fed_tracker = {
 };
 
 /* Where the rig's plane lies. */
-struct place {
+struct plan_place {
 	double point_mm[3], normal[3];
 };
 
-static const struct place floor_place = {.normal = {0, 0, 1}};
+static const struct plan_place floor_place = {.normal = {0, 0, 1}};
 
 /* On a mesh the direction to the surface is rounding where the tool is shallow: so is the tilt. */
 static bool fits_integers(const struct incise_scene *scene)
@@ -79,7 +79,7 @@ static int take_model(struct incise_plan *plan, struct incise_error *err)
  * well.
  */
 static int take_rig(struct incise_plan *plan, struct incise_rig *rig,
-		    struct incise_tracker_info *tracker, struct place place,
+		    struct incise_tracker_info *tracker, struct plan_place place,
 		    struct incise_error *err)
 {
 	if (rig) {
@@ -249,7 +249,8 @@ static int check_age(const struct incise_plan *plan,
 static struct incise_plan *new_plan(const struct incise_scene *scene,
 				    struct incise_rig *rig,
 				    struct incise_tracker_info tracker,
-				    const struct place *place, struct incise_error *err)
+				    const struct plan_place *place,
+				    struct incise_error *err)
 {
 	struct incise_plan *plan = calloc(1, sizeof(*plan));
 	int rc;
@@ -317,7 +318,7 @@ struct incise_plan *incise_plan_new_fed_on(const struct incise_scene *scene,
 					   const double normal[3],
 					   struct incise_error *err)
 {
-	struct place place;
+	struct plan_place place;
 
 	if (!(tracker->rate_hz > 0) || !isfinite(tracker->rate_hz) ||
 	    tracker->latency_ns < 0) {

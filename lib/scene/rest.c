@@ -133,7 +133,7 @@ struct motion {
 };
 
 /* A run at work: positions along the axes, from the place. */
-struct run {
+struct rest_run {
 	double lean_N;
 	struct incise_plant device[3];
 	struct motion tick[3]; /* the motion of each in one */
@@ -354,14 +354,14 @@ static void move_axis(struct incise_plant *plant, const struct motion *tick,
 	plant->velocity_mm_s = tick->vx * x + tick->vv * v + tick->vf * force_N;
 }
 
-static void set_lean(const struct search *s, const struct run *run, double lean_N[3])
+static void set_lean(const struct search *s, const struct rest_run *run, double lean_N[3])
 {
 	for (int i = 0; i < 3; i++)
 		lean_N[i] =
 			run->lean_N * (s->way.askew * s->along[i] - s->way.at->normal[i]);
 }
 
-static void go_to(const struct search *s, struct run *run, double t_s)
+static void go_to(const struct search *s, struct rest_run *run, double t_s)
 {
 	double way_s = t_s - run->t_s, lean_N[3];
 
@@ -376,7 +376,7 @@ static void go_to(const struct search *s, struct run *run, double t_s)
 	run->t_s = t_s;
 }
 
-static void feed_rest(struct search *s, const struct run *run, unsigned int pose)
+static void feed_rest(struct search *s, const struct rest_run *run, unsigned int pose)
 {
 	struct incise_tracker_sample sample = {
 		.t_ns = to_ns(run->pose[pose % POSES_MOST].arrival_s),
@@ -391,7 +391,7 @@ static void feed_rest(struct search *s, const struct run *run, unsigned int pose
 	incise_plan_feed(&s->plan, &sample, 1);
 }
 
-static void tick(struct search *s, struct run *run)
+static void tick(struct search *s, struct rest_run *run)
 {
 	double most_N = s->device.slew_N_s * s->device.period_s;
 	double end_s = run->t_s + s->device.period_s;
@@ -429,7 +429,7 @@ static void tick(struct search *s, struct run *run)
 }
 
 /* Where it starts; a guided one goes along the skin meanwhile. */
-static void hold_rest(const struct search *s, struct run *run)
+static void hold_rest(const struct search *s, struct rest_run *run)
 {
 	for (int i = 0; i < (s->way.guided ? 1 : 3); i++) {
 		run->device[i].position_mm =
@@ -439,12 +439,12 @@ static void hold_rest(const struct search *s, struct run *run)
 }
 
 /* In the air, until the force may start. */
-static void start_rest(struct search *s, struct run *run)
+static void start_rest(struct search *s, struct rest_run *run)
 {
 	double air_s = AIR_S + s->plan.scene->limits.ramp_ms * 1e-3;
 	int ticks = (int)(air_s / s->device.period_s);
 
-	*run = (struct run){.lean_N = 0};
+	*run = (struct rest_run){.lean_N = 0};
 	for (int i = 0; i < 3; i++)
 		run->device[i] = plant(s, i);
 	hold_rest(s, run);
@@ -466,7 +466,7 @@ static void start_rest(struct search *s, struct run *run)
  * A number as it rises from its lowest and falls from its highest: a swing does both, and more than once. A sinking
  * or creeping tool turns in one, a tool that slides over an edge once in both.
  */
-struct range {
+struct rest_range {
 	double low, high, rise, fall;
 	double turn; /* the farthest since it last turned */
 	int legs;    /* ways to or fro of more than a swing that counts */
@@ -474,9 +474,9 @@ struct range {
 
 #define LEGS 3
 
-static const struct range none = {INFINITY, -INFINITY, 0, 0, 0, 0};
+static const struct rest_range none = {INFINITY, -INFINITY, 0, 0, 0, 0};
 
-static void see(struct range *range, double at)
+static void see(struct rest_range *range, double at)
 {
 	double sign = range->legs % 2 ? -1 : 1;
 
@@ -494,7 +494,7 @@ static void see(struct range *range, double at)
 }
 
 struct window {
-	struct range at_mm[3], N[3];
+	struct rest_range at_mm[3], N[3];
 	double from_mm[3], to_mm[3];
 	bool seen;
 };
@@ -508,7 +508,7 @@ static struct window empty(void)
 	return window;
 }
 
-static void see_run(struct window *window, const struct run *run)
+static void see_run(struct window *window, const struct rest_run *run)
 {
 	for (int i = 0; i < 3; i++) {
 		see(&window->at_mm[i], run->device[i].position_mm);
@@ -521,7 +521,7 @@ static void see_run(struct window *window, const struct run *run)
 }
 
 /* The largest of the axes that move by themselves. */
-static double swing_of(const struct search *s, const struct range range[3])
+static double swing_of(const struct search *s, const struct rest_range range[3])
 {
 	double most = 0;
 
@@ -531,7 +531,7 @@ static double swing_of(const struct search *s, const struct range range[3])
 	return most;
 }
 
-static double moved_of(const struct search *s, const struct range range[3])
+static double moved_of(const struct search *s, const struct rest_range range[3])
 {
 	double most = 0;
 
@@ -586,7 +586,7 @@ static double depth_of(const struct search *s, const struct window *last)
 }
 
 /* Lean from the air on. Returns the time until it rested, or 0: it swings. */
-static double lean(struct search *s, struct run *run, struct window *last)
+static double lean(struct search *s, struct rest_run *run, struct window *last)
 {
 	int quarter = (int)fmax(QUARTER_S / s->device.period_s, 1), still = 0;
 	int long_window = (int)fmax(WINDOW_S / s->device.period_s, 1);
@@ -642,7 +642,7 @@ static double lean(struct search *s, struct run *run, struct window *last)
 }
 
 /* Notes the run when it is the worst so far. */
-static void note_rest(const struct search *s, const struct run *run,
+static void note_rest(const struct search *s, const struct rest_run *run,
 		      const struct window *last, double settle_s, int way,
 		      struct incise_rest *rest)
 {
@@ -704,7 +704,7 @@ static bool is_same(const struct incise_force_map *a, const struct incise_force_
  * Where a run came to rest, the loop as a linear one. It must not swing; where only the averaged normal makes it,
  * and the account of work may end it, it is kicked that way, and must come to rest again. Returns whether it does.
  */
-static bool judge_linear(struct search *s, const struct run *run, double depth_mm,
+static bool judge_linear(struct search *s, const struct rest_run *run, double depth_mm,
 			 int way, struct incise_rest *rest)
 {
 	const struct incise_pose_loop loop = {
@@ -729,7 +729,7 @@ static bool judge_linear(struct search *s, const struct run *run, double depth_m
 		};
 		double most = rest->weakest.margin / (1 + s->way.reserve), settle_s = -1;
 		struct incise_swing swing = {0};
-		struct run kicked = *run;
+		struct rest_run kicked = *run;
 		struct window last;
 
 		incise_plan_force_map(&s->plan, to_ns(run->t_s), s->axis, side, &map);
@@ -778,7 +778,7 @@ void incise_rest_take_weakest(struct incise_plan_weakest *to,
 }
 
 /* Returns whether it rests. */
-static bool try(struct search *s, struct run *run, int lean_of, int way,
+static bool try(struct search *s, struct rest_run *run, int lean_of, int way,
 		struct incise_rest *rest)
 {
 	struct window last;
@@ -800,7 +800,7 @@ static bool lean_all(struct search *s, const struct incise_plan *plan,
 		     int number, struct incise_rest *rest)
 {
 	double most_N = fmin(s->device.force_N, s->device.continuous_N);
-	struct run air;
+	struct rest_run air;
 
 	if (trial->way >= 0 && number != trial->way)
 		return true;
@@ -813,7 +813,7 @@ static bool lean_all(struct search *s, const struct incise_plan *plan,
 	for (int i = LEANS, halves = 0; i > 0 || (way->held == INCISE_HELD_ACROSS &&
 						  !s->decides && halves < HALVES_MOST);
 	     i -= way->every) {
-		struct run run = air;
+		struct rest_run run = air;
 
 		halves += i <= 0;
 		run.lean_N =
@@ -885,7 +885,7 @@ static void shake(struct search *s, const struct incise_plan *plan,
 				.reserve = RESERVE};
 	int ticks = (int)(NOISE_S / s->device.period_s);
 	struct window window = empty();
-	struct run run;
+	struct rest_run run;
 
 	set_way(s, plan->scene, &way);
 	set_plan(s, plan, trial);

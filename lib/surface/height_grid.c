@@ -27,7 +27,7 @@ static const char *const keys[] = {
 };
 #define N_KEYS (sizeof(keys) / sizeof(*keys))
 
-struct grid {
+struct height_grid {
 	struct text text;
 	struct incise_error *err;
 	double value[N_KEYS];
@@ -37,7 +37,7 @@ struct grid {
 };
 
 /* The header's lines, up to the first that does not begin with a letter. */
-static int read_header(struct grid *grid)
+static int read_header(struct height_grid *grid)
 {
 	const char *word;
 	size_t length;
@@ -75,7 +75,7 @@ static int read_header(struct grid *grid)
 	return 0;
 }
 
-static int check_header(struct grid *grid)
+static int check_header(struct height_grid *grid)
 {
 	const double *value = grid->value;
 	const bool *given = grid->given;
@@ -110,7 +110,8 @@ static int check_header(struct grid *grid)
 	return 0;
 }
 
-static int read_height(struct grid *grid, size_t column, size_t row, double *height)
+static int read_height(struct height_grid *grid, size_t column, size_t row,
+		       double *height)
 {
 	const char *word;
 	size_t length;
@@ -131,7 +132,7 @@ static int read_height(struct grid *grid, size_t column, size_t row, double *hei
 	return 0;
 }
 
-static int read_heights(struct grid *grid, const double at_mm[3])
+static int read_heights(struct height_grid *grid, const double at_mm[3])
 {
 	const double *value = grid->value, cell = value[CELL];
 	double x0 = grid->given[XLL_CENTER] ? value[XLL_CENTER]
@@ -174,7 +175,7 @@ static int read_heights(struct grid *grid, const double at_mm[3])
 	return 0;
 }
 
-static int make_triangles(struct grid *grid)
+static int make_triangles(struct height_grid *grid)
 {
 	struct mesh_draft *draft = &grid->draft;
 	size_t n = 2 * (grid->columns - 1) * (grid->rows - 1);
@@ -199,7 +200,7 @@ static int make_triangles(struct grid *grid)
 struct mesh *height_grid_load(const char *path, const double at_mm[3],
 			      struct incise_error *err)
 {
-	struct grid grid = {.err = err, .draft.path = path};
+	struct height_grid grid = {.err = err, .draft.path = path};
 	struct mesh *mesh = NULL;
 	int rc = text_open(&grid.text, path, err);
 

@@ -320,12 +320,12 @@ struct node {
 
 #define NO_VERTEX UINT32_MAX
 
-struct grid {
+struct uv_map_grid {
 	const struct uv_map *map;
 	struct node *node; /* SIDE² */
 };
 
-static bool place_uv_node(struct grid *grid, struct node *node, const double px[2])
+static bool place_uv_node(struct uv_map_grid *grid, struct node *node, const double px[2])
 {
 	double point[3];
 
@@ -337,7 +337,7 @@ static bool place_uv_node(struct grid *grid, struct node *node, const double px[
 	return true;
 }
 
-static void node_px(const struct grid *grid, int i, double px[2])
+static void node_px(const struct uv_map_grid *grid, int i, double px[2])
 {
 	px[0] = (double)grid->map->size * (i % SIDE) / CELLS;
 	px[1] = (double)grid->map->size * (i / SIDE) / CELLS;
@@ -352,7 +352,7 @@ static int neighbour(int i, int dx, int dy)
 }
 
 /* The last place on the surface between one on it and one outside. */
-static void to_border(struct grid *grid, struct node *node, const double on[2],
+static void to_border(struct uv_map_grid *grid, struct node *node, const double on[2],
 		      const double off[2])
 {
 	double in = 0, out = 1, px[2];
@@ -371,7 +371,7 @@ static void to_border(struct grid *grid, struct node *node, const double on[2],
 		place_uv_node(grid, node, on);
 }
 
-static void place_all(struct grid *grid)
+static void place_all(struct uv_map_grid *grid)
 {
 	static const int around[8][2] = {{1, 0}, {0, 1},  {-1, 0},  {0, -1},
 					 {1, 1}, {-1, 1}, {-1, -1}, {1, -1}};
@@ -400,7 +400,7 @@ static void place_all(struct grid *grid)
 }
 
 /* The place of a neighbour, or without one of the vertex itself. */
-static const double *beside(const struct grid *grid, int i, int dx, int dy)
+static const double *beside(const struct uv_map_grid *grid, int i, int dx, int dy)
 {
 	int other = neighbour(i, dx, dy);
 
@@ -409,7 +409,7 @@ static const double *beside(const struct grid *grid, int i, int dx, int dy)
 }
 
 /* The normal as drawn: facets of a mesh smoothed, with the relief. */
-static void drawn_normal(const struct grid *grid, int i, double normal[3])
+static void drawn_normal(const struct uv_map_grid *grid, int i, double normal[3])
 {
 	double right[3], down[3], out[3];
 
@@ -432,7 +432,7 @@ static bool raised(const struct uv_map *map, const double px[2])
 	return false;
 }
 
-static void write_vertex(const struct grid *grid, int i, struct uv_map_vertex *to)
+static void write_vertex(const struct uv_map_grid *grid, int i, struct uv_map_vertex *to)
 {
 	bool faceted = incise_surface_triangles(grid->map->surface) > 0;
 	const struct node *node = &grid->node[i];
@@ -457,7 +457,7 @@ static void write_vertex(const struct grid *grid, int i, struct uv_map_vertex *t
 	to->px[1] = (float)node->px[1];
 }
 
-static void write_triangle(const struct grid *grid, struct uv_map *map,
+static void write_triangle(const struct uv_map_grid *grid, struct uv_map *map,
 			   const int corner[3])
 {
 	bool there = false;
@@ -475,7 +475,7 @@ static void write_triangle(const struct grid *grid, struct uv_map *map,
 static int make_grid(struct uv_map *map)
 {
 	const size_t n = SIDE * SIDE;
-	struct grid grid = {map, calloc(n, sizeof(*grid.node))};
+	struct uv_map_grid grid = {map, calloc(n, sizeof(*grid.node))};
 
 	map->vertices = calloc(n, sizeof(*map->vertices));
 	map->indices = calloc(6 * CELLS * CELLS, sizeof(*map->indices));

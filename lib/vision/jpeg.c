@@ -13,7 +13,7 @@
 #include <jerror.h>
 #include "vision_opencv.h"
 
-struct reader {
+struct jpeg_reader {
 	struct jpeg_decompress_struct jpeg;
 	struct jpeg_error_mgr errors;
 	jmp_buf out;
@@ -21,7 +21,7 @@ struct reader {
 
 static void leave(j_common_ptr jpeg)
 {
-	struct reader *reader = (struct reader *)jpeg->client_data;
+	struct jpeg_reader *reader = (struct jpeg_reader *)jpeg->client_data;
 
 	longjmp(reader->out, 1);
 }
@@ -46,7 +46,7 @@ static void be_silent(j_common_ptr jpeg)
 	(void)jpeg;
 }
 
-static int decode_jpeg(struct reader *r, const struct incise_camera_frame *frame,
+static int decode_jpeg(struct jpeg_reader *r, const struct incise_camera_frame *frame,
 		       struct incise_vision_box *area, uint8_t *rgb)
 {
 	struct jpeg_decompress_struct *jpeg = &r->jpeg;
@@ -83,7 +83,7 @@ static int decode_jpeg(struct reader *r, const struct incise_camera_frame *frame
 int incise_jpeg_decode(const struct incise_camera_frame *frame,
 		       struct incise_vision_box *area, uint8_t *rgb)
 {
-	struct reader r = {.jpeg = {.client_data = &r}};
+	struct jpeg_reader r = {.jpeg = {.client_data = &r}};
 	volatile int ret = -EBADMSG;
 
 	r.jpeg.err = jpeg_std_error(&r.errors);

@@ -63,7 +63,7 @@ void calibrate_stated(struct calibrate *c, double given, const char *key,
 
 enum { KEY, VALUE, PREVIOUS, CHANGE, COLUMNS };
 
-struct row {
+struct calibrate_row {
 	char text[COLUMNS][UNCERTAINTY_TEXT];
 };
 
@@ -81,7 +81,8 @@ static void round_to(double value, double U, const char *unit,
 }
 
 static void fill_row(const struct calibrate *c,
-		     const struct incise_calibration_value *value, struct row *row)
+		     const struct incise_calibration_value *value,
+		     struct calibrate_row *row)
 {
 	const struct incise_calibration_record *last;
 	const struct incise_calibration_value *previous =
@@ -136,7 +137,7 @@ static bool is_of_another(const struct incise_calibration_value *value)
 static void print_result(const struct calibrate *c, FILE *out)
 {
 	const struct incise_calibration_record *record = &c->record;
-	struct row rows[INCISE_CALIBRATION_VALUES + 1] = {
+	struct calibrate_row rows[INCISE_CALIBRATION_VALUES + 1] = {
 		{{"result", "value ± U (k = 2)", "previous", "change"}}};
 	int width[COLUMNS] = {0}, n = 1;
 

@@ -147,7 +147,7 @@ static bool has_point(const struct table *table)
 	       (table->at[POSITION] >= 0 || table->at[STEPS] >= 0);
 }
 
-struct reader {
+struct stepper_reader {
 	struct stepper *stepper;
 	bool has_steps, has_both;
 	double mm, counted; /* largest travel in both columns */
@@ -156,7 +156,7 @@ struct reader {
 
 static void add_stepper_row(void *context, const struct table *table, const double *row)
 {
-	struct reader *r = context;
+	struct stepper_reader *r = context;
 	double mm = row[POSITION], steps = row[STEPS];
 
 	if (!r->stepper->n) {
@@ -197,7 +197,7 @@ static void read_points(void *run, const char *path)
 		has_point,
 	};
 	struct stepper *stepper = run;
-	struct reader r = {.stepper = stepper};
+	struct stepper_reader r = {.stepper = stepper};
 
 	find_sensor_u(stepper);
 	table_read(path, &form, add_stepper_row, &r);

@@ -12,14 +12,14 @@
 #include "cli.h"
 #include "file_kind.h"
 
-struct place {
+struct output_place {
 	const char *path; /* as given, for messages */
 	struct stat st;
 };
 
 struct output {
-	struct place file, folder; /* of "-" there is no folder */
-	const char *name;	   /* below its folder */
+	struct output_place file, folder; /* of "-" there is no folder */
+	const char *name;		  /* below its folder */
 	bool exists;
 	bool part;   /* of another output */
 	bool within; /* added to a recording that is read */
@@ -27,7 +27,7 @@ struct output {
 };
 
 struct input {
-	struct place at;
+	struct output_place at;
 	struct input *next;
 };
 

@@ -27,7 +27,7 @@
 #define QUANTILES 400
 
 /* Panels in rows, two of them side by side, from the top. */
-struct grid {
+struct model_grid {
 	FILE *script;
 	int height, top; /* pixels */
 	/* Files of data, of this figure alone: another figure may be in its folder. */
@@ -35,7 +35,7 @@ struct grid {
 };
 
 /* The next row of that height has panels of half the figure's width, or of all of it. */
-static void place_model_plot(struct grid *grid, int column, int columns, int height)
+static void place_model_plot(struct model_grid *grid, int column, int columns, int height)
 {
 	fprintf(grid->script, "set size %g,%g\nset origin %g,%g\n", 1.0 / columns,
 		(double)height / grid->height, (double)column / columns,
@@ -130,7 +130,7 @@ static void put_residual_label(FILE *script, const struct model_surface *surface
 	fputc('\n', script);
 }
 
-static void put_residuals(struct grid *grid, const struct model_surface *surface,
+static void put_residuals(struct model_grid *grid, const struct model_surface *surface,
 			  const struct residuals *r)
 {
 	/* Three digits of the RMSE. */
@@ -199,8 +199,8 @@ static void write_band(const struct incise_model *model,
 }
 
 /* Over one of the inputs; the others are at the middle of their support. */
-static void put_band(struct grid *grid, const struct model_surface *surface, int input,
-		     int columns)
+static void put_band(struct model_grid *grid, const struct model_surface *surface,
+		     int input, int columns)
 {
 	place_model_plot(grid, input, columns, BAND_HEIGHT);
 	fputs("set key inside top left\nset xrange [*:*]\nset yrange [*:*]\n"
@@ -220,7 +220,7 @@ static void put_band(struct grid *grid, const struct model_surface *surface, int
 
 /* --- the figure -------------------------------------------------------------------------- */
 
-static void put_surface(struct grid *grid, const struct model_surface *surface)
+static void put_surface(struct model_grid *grid, const struct model_surface *surface)
 {
 	const char *title = surface->n_inputs > 2
 				    ? "the other inputs at the middle of their support"
@@ -250,7 +250,7 @@ static FILE *draw_model(const struct figure *figure, const struct model_surface 
 	int rows = (n + columns - 1) / columns;
 	int bands = uncertainty ? columns : 0;
 	struct residuals residuals = {0};
-	struct grid grid = {
+	struct model_grid grid = {
 		.height = rows * FUNCTIONS_HEIGHT + SURFACE_HEIGHT +
 			  (bands ? BAND_HEIGHT : 0),
 		.functions = cli_text("%s-functions.dat", figure->name),

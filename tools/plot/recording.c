@@ -57,7 +57,7 @@ static double bin_s(const struct span *span, double bin)
 }
 
 /* The least and the largest value of each column, in the order in which they were read. */
-struct line {
+struct recording_line {
 	FILE *out;
 	const struct span *span;
 	int bin; /* of the values below; -1: empty */
@@ -67,10 +67,10 @@ struct line {
 	double least, largest; /* of all that are drawn */
 };
 
-static void line_open(struct line *line, const struct span *span, const char *folder,
-		      const char *name)
+static void line_open(struct recording_line *line, const struct span *span,
+		      const char *folder, const char *name)
 {
-	*line = (struct line){
+	*line = (struct recording_line){
 		.out = plot_data(folder, name),
 		.span = span,
 		.bin = -1,
@@ -79,14 +79,14 @@ static void line_open(struct line *line, const struct span *span, const char *fo
 	};
 }
 
-static void put_point(struct line *line, double t_s, double value)
+static void put_point(struct recording_line *line, double t_s, double value)
 {
 	fprintf(line->out, "%.7g %.6g\n", t_s, value);
 	line->run++;
 	line->last_s = t_s;
 }
 
-static void flush_bin(struct line *line)
+static void flush_bin(struct recording_line *line)
 {
 	bool low_first = line->low_s <= line->high_s;
 
@@ -101,7 +101,7 @@ static void flush_bin(struct line *line)
 }
 
 /* No line across a gap. */
-static void line_gap(struct line *line)
+static void line_gap(struct recording_line *line)
 {
 	double value = line->low;
 
@@ -117,7 +117,7 @@ static void line_gap(struct line *line)
 	line->run = 0;
 }
 
-static void line_add(struct line *line, double t_s, double value)
+static void line_add(struct recording_line *line, double t_s, double value)
 {
 	int bin = bin_of(line->span, t_s);
 
@@ -144,7 +144,7 @@ static void line_add(struct line *line, double t_s, double value)
 	line->largest = fmax(line->largest, value);
 }
 
-static void line_close(struct line *line, const char *folder)
+static void line_close(struct recording_line *line, const char *folder)
 {
 	line_gap(line);
 	/* Data without a point are an error of gnuplot. */
@@ -180,7 +180,7 @@ struct event {
 
 enum { PANEL_FORCE, PANEL_DEPTH, PANEL_SPEED, PANEL_POSITION, PANELS };
 
-struct range {
+struct recording_range {
 	double low, high;
 };
 
@@ -195,7 +195,7 @@ struct recorded {
 	int n_cuts, n_events;
 	struct cut cut[CUTS_MOST];
 	struct event event[EVENTS_MOST];
-	struct range range[PANELS];
+	struct recording_range range[PANELS];
 	uint64_t rows, rows_read; /* for the progress */
 	int percent;
 };
@@ -246,7 +246,8 @@ static bool note_sample(struct recorded *r, int stream, int64_t seq, double t_s,
 	return lost;
 }
 
-static void widen_recording(struct range *range, const struct line *line)
+static void widen_recording(struct recording_range *range,
+			    const struct recording_line *line)
 {
 	range->low = fmin(range->low, line->least);
 	range->high = fmax(range->high, line->largest);
@@ -260,11 +261,11 @@ struct shown {
 
 static void read_lines(struct recorded *r, struct ArrowArrayStream *stream,
 		       const struct shown *shown, const double *zero,
-		       struct line *clipped)
+		       struct recording_line *clipped)
 {
 	const char *folder = r->figure->folder;
 	struct ArrowArray batch;
-	struct line lines[3];
+	struct recording_line lines[3];
 	int64_t last_seq = 0;
 	double last_s = 0;
 
@@ -302,7 +303,7 @@ static void read_force(struct recorded *r)
 {
 	static const struct shown force = {FORCE, PANEL_FORCE, 1, 3, {"force.dat"}};
 	struct ArrowArrayStream stream = open_stream(r, "force");
-	struct line clipped;
+	struct recording_line clipped;
 
 	line_open(&clipped, &r->span, r->figure->folder, "clipped.dat");
 	read_lines(r, &stream, &force, NULL, &clipped);
@@ -327,7 +328,7 @@ static void read_depth(struct recorded *r)
 {
 	struct ArrowArrayStream stream = open_stream(r, "depth");
 	const char *folder = r->figure->folder;
-	struct line depth, speed;
+	struct recording_line depth, speed;
 	struct ArrowArray batch;
 	int64_t seq = -1;
 	bool inside = false;
@@ -574,12 +575,12 @@ static void place_recording_plot(FILE *script, int top, int height, int gap)
 }
 
 /* A margin above and below, and some height where all values are one. */
-static void round_range(struct range *range)
+static void round_range(struct recording_range *range)
 {
 	double margin;
 
 	if (!(range->high >= range->low))
-		*range = (struct range){0, 0};
+		*range = (struct recording_range){0, 0};
 	margin = 0.06 * (range->high - range->low);
 	if (!(margin > 0))
 		margin = fmax(0.06 * fabs(range->high), 0.05);
@@ -609,7 +610,7 @@ static void put_panel(FILE *script, const struct recorded *r, int i, int top, in
 	static const char *const names[] = {"force-lost.dat", "tracker-lost.dat",
 					    "camera-lost.dat"};
 	const struct panel *panel = &panels[i];
-	const struct range *range = &r->range[i];
+	const struct recording_range *range = &r->range[i];
 	bool first = i == PANEL_FORCE;
 
 	place_recording_plot(script, top, panel->height, 8);
@@ -754,7 +755,7 @@ FILE *figure_of_recording(const struct figure *figure)
 	if (incise_recording_info(r->recording, &r->info, &err))
 		cli_fail_with(&err);
 	for (int i = 0; i < PANELS; i++)
-		r->range[i] = (struct range){INFINITY, -INFINITY};
+		r->range[i] = (struct recording_range){INFINITY, -INFINITY};
 	find_span(r);
 	r->rows = r->rows_read + r->info.force + r->info.tracker + r->info.depth;
 	read_force(r);

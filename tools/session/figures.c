@@ -13,11 +13,11 @@
 
 static const char *const colours[] = {"grey", "blue", "green", "purple"};
 
-struct range {
+struct figures_range {
 	double low[2], high[2];
 };
 
-static void widen_figures(struct range *range, const double at_mm[3])
+static void widen_figures(struct figures_range *range, const double at_mm[3])
 {
 	for (int i = 0; i < 2; i++) {
 		range->low[i] = fmin(range->low[i], at_mm[i] - MARGIN_MM);
@@ -26,7 +26,7 @@ static void widen_figures(struct range *range, const double at_mm[3])
 }
 
 /* Lengths are the same on both axes: show more where the plot has place for it. */
-static void fill_plot(struct range *range)
+static void fill_plot(struct figures_range *range)
 {
 	double size[2] = {range->high[0] - range->low[0], range->high[1] - range->low[1]};
 	int i = size[1] < SHAPE * size[0];
@@ -37,9 +37,9 @@ static void fill_plot(struct range *range)
 }
 
 /* Range of all shown points except the way through the air. */
-static struct range range_of_figures(const struct session *s)
+static struct figures_range range_of_figures(const struct session *s)
 {
-	struct range range = {{NAN, NAN}, {NAN, NAN}};
+	struct figures_range range = {{NAN, NAN}, {NAN, NAN}};
 
 	for (int i = 0; i < s->n_trace; i++)
 		if (s->trace[i].tool != INCISE_TOOL_AUTO)
@@ -115,7 +115,7 @@ static void put_membrane(FILE *script, const struct incise_scene_membrane *membr
 
 static void put_axes(FILE *script, const struct session *s)
 {
-	struct range range = range_of_figures(s);
+	struct figures_range range = range_of_figures(s);
 
 	fprintf(script,
 		"set size ratio -1\nset xlabel 'x / mm'\nset ylabel 'y / mm'\n"

@@ -334,13 +334,14 @@ json_t *session_json(const struct session *session)
 /* --- reading --------------------------------------------------------------------------- */
 
 /* For messages: "NAME: cuts[3].length_mm: expected …". */
-struct reader {
+struct session_file_reader {
 	const char *name;
 	char place[40]; /* of the object: "", "end.", "cuts[3]." */
 	struct incise_error *err;
 };
 
-static int expected(const struct reader *reader, const char *key, const char *what)
+static int expected(const struct session_file_reader *reader, const char *key,
+		    const char *what)
 {
 	return incise_error_set(reader->err, EINVAL,
 				"%s: %s%s: expected %s; the file is damaged, or not a "
@@ -348,8 +349,8 @@ static int expected(const struct reader *reader, const char *key, const char *wh
 				reader->name, reader->place, key, what);
 }
 
-static int take_number(const struct reader *reader, const struct member *member,
-		       const json_t *json, double *value)
+static int take_number(const struct session_file_reader *reader,
+		       const struct member *member, const json_t *json, double *value)
 {
 	bool whole_only = member->kind == COUNT || member->kind == INDEX;
 	char what[80];
@@ -366,8 +367,8 @@ static int take_number(const struct reader *reader, const struct member *member,
 	return expected(reader, member->key, what);
 }
 
-static int take_vector(const struct reader *reader, const struct member *member,
-		       const json_t *json, double *to)
+static int take_vector(const struct session_file_reader *reader,
+		       const struct member *member, const json_t *json, double *to)
 {
 	int rc = 0;
 
@@ -387,7 +388,7 @@ static bool is_clean(const char *text, size_t n)
 	return true;
 }
 
-static int take_session_file_text(const struct reader *reader,
+static int take_session_file_text(const struct session_file_reader *reader,
 				  const struct member *member, const json_t *json,
 				  char *to)
 {
@@ -406,8 +407,9 @@ static int take_session_file_text(const struct reader *reader,
 	return expected(reader, member->key, what);
 }
 
-static int take_tool(const struct reader *reader, const struct member *member,
-		     const json_t *json, enum incise_tool *to)
+static int take_tool(const struct session_file_reader *reader,
+		     const struct member *member, const json_t *json,
+		     enum incise_tool *to)
 {
 	for (int i = 0; i <= INCISE_TOOL_TUBE && json_is_string(json); i++)
 		if (!strcmp(json_string_value(json), loop_tool_names[i])) {
@@ -417,8 +419,8 @@ static int take_tool(const struct reader *reader, const struct member *member,
 	return expected(reader, member->key, "auto, blade, handle or tube");
 }
 
-static int take_member(const struct reader *reader, const struct member *member,
-		       const json_t *json, void *object)
+static int take_member(const struct session_file_reader *reader,
+		       const struct member *member, const json_t *json, void *object)
 {
 	void *at = (char *)object + member->offset;
 	double value = NAN;
@@ -453,8 +455,8 @@ static int take_member(const struct reader *reader, const struct member *member,
 	return 0;
 }
 
-static int take_members(const struct reader *reader, const struct member *members,
-			const json_t *json, void *object)
+static int take_members(const struct session_file_reader *reader,
+			const struct member *members, const json_t *json, void *object)
 {
 	int rc = 0;
 
@@ -466,7 +468,7 @@ static int take_members(const struct reader *reader, const struct member *member
 	return rc;
 }
 
-static int take_group(struct reader *reader, const char *key,
+static int take_group(struct session_file_reader *reader, const char *key,
 		      const struct member *members, const json_t *json,
 		      struct session *session)
 {
@@ -475,7 +477,7 @@ static int take_group(struct reader *reader, const char *key,
 }
 
 /* At most @most objects of a list. */
-static int take_objects(struct reader *reader, const char *key,
+static int take_objects(struct session_file_reader *reader, const char *key,
 			const struct member *members, const json_t *json, void *to,
 			size_t size, int most, int *n)
 {
@@ -497,7 +499,7 @@ static int take_objects(struct reader *reader, const char *key,
 	return rc;
 }
 
-static int take_criteria(struct reader *reader, const json_t *json,
+static int take_criteria(struct session_file_reader *reader, const json_t *json,
 			 struct session *session)
 {
 	const json_t *object = json_object_get(json, "criteria");
@@ -526,7 +528,7 @@ static int take_criteria(struct reader *reader, const json_t *json,
 	return rc;
 }
 
-static int take_session_file_row(struct reader *reader, const json_t *row,
+static int take_session_file_row(struct session_file_reader *reader, const json_t *row,
 				 struct session_sample *to)
 {
 	size_t i = 0;
@@ -539,7 +541,8 @@ static int take_session_file_row(struct reader *reader, const json_t *row,
 	return rc;
 }
 
-static int take_trace(struct reader *reader, const json_t *json, struct session *session)
+static int take_trace(struct session_file_reader *reader, const json_t *json,
+		      struct session *session)
 {
 	const json_t *rows = json_object_get(json_object_get(json, "trace"), "rows");
 	int rc = 0;
@@ -560,7 +563,7 @@ static int take_trace(struct reader *reader, const json_t *json, struct session 
 }
 
 /* Checks beyond the tables' checks. */
-static int check_session_file(struct reader *reader, struct session *session)
+static int check_session_file(struct session_file_reader *reader, struct session *session)
 {
 	reader->place[0] = 0;
 	if (strspn(session->scene.crc32c, "0123456789abcdef") != 8)
@@ -585,7 +588,7 @@ static int check_session_file(struct reader *reader, struct session *session)
 	return 0;
 }
 
-static int take_session(struct reader *reader, const json_t *json,
+static int take_session(struct session_file_reader *reader, const json_t *json,
 			struct session *session)
 {
 	const json_t *form = json_object_get(json, "incise_session");
@@ -623,7 +626,7 @@ static int take_session(struct reader *reader, const json_t *json,
 struct session *session_parse(const char *text, size_t n, const char *name,
 			      struct incise_error *err)
 {
-	struct reader reader = {.name = name, .err = err};
+	struct session_file_reader reader = {.name = name, .err = err};
 	json_t *json = json_parse(text, n, name, err);
 	struct session *session = json ? calloc(1, sizeof(*session)) : NULL;
 	int rc = session ? take_session(&reader, json, session) : -EINVAL;

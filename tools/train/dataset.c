@@ -19,7 +19,7 @@
 #define GROUPS_MIN 5	 /* of fewer, none stands out */
 #define MAD_TO_SD 1.4826 /* of a normal distribution */
 
-struct row {
+struct dataset_row {
 	const struct incise_corpus_survey *source;
 	const struct incise_corpus_group *group;
 	double mean[INCISE_MODEL_INPUTS_MAX + 1];
@@ -33,7 +33,7 @@ struct dataset {
 	const struct incise_trained *trained;
 	const struct incise_corpus *corpus;
 	int n_columns;
-	struct row *rows;
+	struct dataset_row *rows;
 	int n;
 	double min[INCISE_MODEL_INPUTS_MAX + 1], max[INCISE_MODEL_INPUTS_MAX + 1];
 };
@@ -52,7 +52,7 @@ static void find_outliers(struct dataset *data)
 			values[i] = fabs(data->rows[i].mean[c] - middle);
 		spread = MAD_TO_SD * median(values, data->n);
 		for (int i = 0; i < data->n && spread > 0; i++) {
-			struct row *row = &data->rows[i];
+			struct dataset_row *row = &data->rows[i];
 
 			row->distance[c] = (row->mean[c] - middle) / spread;
 			row->outlier |= fabs(row->distance[c]) > LIMIT;
@@ -72,7 +72,7 @@ static void collect(struct dataset *data)
 			incise_corpus_source(data->corpus, s);
 
 		for (int g = 0; g < survey->n_groups; g++) {
-			struct row *row = &data->rows[data->n++];
+			struct dataset_row *row = &data->rows[data->n++];
 
 			row->source = survey;
 			row->group = &survey->groups[g];
@@ -87,7 +87,7 @@ static void collect(struct dataset *data)
 }
 
 /* A group by its name, which a whole source has as its hash. */
-static const char *name_of(const struct dataset *data, const struct row *row)
+static const char *name_of(const struct dataset *data, const struct dataset_row *row)
 {
 	return strcmp(data->trained->group, "recording") ? row->group->name
 							 : row->source->text;
@@ -138,7 +138,7 @@ static void show_text(const struct dataset *data)
 		print_source(survey->text);
 	}
 	for (int i = 0; i < data->n && data->trained->group; i++) {
-		const struct row *row = &data->rows[i];
+		const struct dataset_row *row = &data->rows[i];
 
 		outliers += row->outlier;
 		for (int c = 0; c < data->n_columns && row->outlier; c++)
@@ -177,7 +177,7 @@ static void show_json(const struct dataset *data)
 					   data->trained->group ? survey->n_groups : 0));
 	}
 	for (int i = 0; i < data->n && data->trained->group; i++) {
-		const struct row *row = &data->rows[i];
+		const struct dataset_row *row = &data->rows[i];
 
 		json_array_append_new(
 			groups,

@@ -125,7 +125,7 @@ void view_rig(struct view_job *job)
 
 /* --- in simulated time ----------------------------------------------------------------- */
 
-struct run {
+struct sources_run {
 	struct view_job *job;
 	int64_t first_ns, next_ns,
 		period_ns; /* of the simulated clock; first 0: no tick yet */
@@ -134,13 +134,14 @@ struct run {
 	struct procedure procedure; /* with --procedure */
 };
 
-static struct run run_of(struct view_job *job)
+static struct sources_run run_of(struct view_job *job)
 {
-	return (struct run){.job = job, .period_ns = INCISE_NS_PER_S / job->output.fps};
+	return (struct sources_run){.job = job,
+				    .period_ns = INCISE_NS_PER_S / job->output.fps};
 }
 
 /* Feed a tick, and draw the frame that is due. Returns not 0 to end. */
-static int show_tick(struct run *run, const struct incise_tick *tick)
+static int show_tick(struct sources_run *run, const struct incise_tick *tick)
 {
 	struct view_job *job = run->job;
 	double t_s;
@@ -171,7 +172,7 @@ static int show_tick(struct run *run, const struct incise_tick *tick)
 
 static int procedure_tick(void *context, const struct incise_tick *tick)
 {
-	struct run *run = context;
+	struct sources_run *run = context;
 	int rc = show_tick(run, tick);
 
 	procedure_ticked(&run->procedure, tick);
@@ -180,7 +181,7 @@ static int procedure_tick(void *context, const struct incise_tick *tick)
 
 void view_procedure(struct view_job *job)
 {
-	struct run run = run_of(job);
+	struct sources_run run = run_of(job);
 	struct incise_loop_options loop = {
 		.rate_hz = job->rate_hz, .ticked = procedure_tick, .context = &run};
 	static struct incise_loop_stats stats;
@@ -201,7 +202,7 @@ void view_procedure(struct view_job *job)
 static int replay_tick(void *context, const struct incise_replay_tick *tick,
 		       struct incise_error *err)
 {
-	struct run *run = context;
+	struct sources_run *run = context;
 
 	if (!show_tick(run, tick->tick))
 		return 0;
@@ -223,7 +224,7 @@ static double recorded_s(const struct view_job *job, struct incise_recording *re
 
 void view_recording(struct view_job *job)
 {
-	struct run run = run_of(job);
+	struct sources_run run = run_of(job);
 	struct incise_replay_options replay = {.ticked = replay_tick, .context = &run};
 	static struct incise_loop_stats stats;
 	struct incise_replay_report report;

@@ -33,7 +33,7 @@ struct bin {
 };
 
 /* A row of a table. */
-struct row {
+struct export_row {
 	int64_t cut; /* its name */
 	struct bin bin;
 	double sd_N;
@@ -97,7 +97,7 @@ static int cut_name(struct pass *pass)
 }
 
 /* Add a row, with the uncertainties of bin number @at, which is emptied. */
-static int add_export_row(struct pass *pass, struct row *row, size_t at)
+static int add_export_row(struct pass *pass, struct export_row *row, size_t at)
 {
 	double part[INCISE_BUDGET_PARTS];
 	int rc;
@@ -270,7 +270,7 @@ static int each_cut(struct pass *pass, const struct visitor *visitor)
 
 /* --- force samples, or means over 1/rate --------------------------------------------- */
 
-#define COLUMN(member, ...) INCISE_COLUMN(struct row, member, __VA_ARGS__)
+#define COLUMN(member, ...) INCISE_COLUMN(struct export_row, member, __VA_ARGS__)
 #define CUT COLUMN(cut, NAME, 0, "cut", "1", "recording and number of the cut")
 
 static const struct incise_table_column raw_columns[] = {
@@ -294,7 +294,7 @@ struct raw {
 static int put_row(struct pass *pass)
 {
 	struct raw *raw = pass->state;
-	struct row row = {.bin = raw->bin};
+	struct export_row row = {.bin = raw->bin};
 
 	raw->bin = (struct bin){0};
 	return row.bin.n ? add_export_row(pass, &row, 0) : 0;
@@ -390,7 +390,7 @@ static int put_bins(struct pass *pass)
 	int rc = 0;
 
 	for (size_t i = 0; i < n; i++) {
-		struct row row = {.bin = bins[i]};
+		struct export_row row = {.bin = bins[i]};
 
 		row.sd_N = row.bin.n > 1 ? sqrt(row.bin.m2 / (row.bin.n - 1)) : 0.0;
 		if (row.bin.n >= enough && !rc)
@@ -517,9 +517,11 @@ static int write_cuts(struct incise_export_pass *all)
 }
 
 static const struct incise_row_kind raw_rows = {raw_columns, COLUMNS(raw_columns),
-						offsetof(struct row, extra), write_cuts};
+						offsetof(struct export_row, extra),
+						write_cuts};
 static const struct incise_row_kind bin_rows = {bin_columns, COLUMNS(bin_columns),
-						offsetof(struct row, extra), write_cuts};
+						offsetof(struct export_row, extra),
+						write_cuts};
 
 /* The kind of rows that is asked for, with their columns. Returns 0 or -errno. */
 static int choose_rows(struct incise_export_pass *pass, struct incise_row_kind *kind)

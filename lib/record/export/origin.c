@@ -48,13 +48,14 @@ int incise_origin_text(const struct incise_origin *origin, char *text)
 
 /* --- reading ---------------------------------------------------------------------------- */
 
-struct reader {
+struct origin_reader {
 	const char *at, *end;
 	bool bad;
 };
 
 /* The next field, of bytes of this set, up to @stop. */
-static void field(struct reader *in, const char *set, char stop, char *to, size_t size)
+static void field(struct origin_reader *in, const char *set, char stop, char *to,
+		  size_t size)
 {
 	size_t n = 0;
 
@@ -66,7 +67,7 @@ static void field(struct reader *in, const char *set, char stop, char *to, size_
 		in->at++;
 }
 
-static void read_origin_number(struct reader *in, uint64_t *value)
+static void read_origin_number(struct origin_reader *in, uint64_t *value)
 {
 	char text[21];
 
@@ -78,7 +79,7 @@ static void read_origin_number(struct reader *in, uint64_t *value)
 	in->bad |= *text == '0' && text[1];
 }
 
-static void name(struct reader *in, char *to, size_t size)
+static void name(struct origin_reader *in, char *to, size_t size)
 {
 	size_t n = 0;
 
@@ -107,7 +108,7 @@ static void name(struct reader *in, char *to, size_t size)
 	in->at += !in->bad;
 }
 
-static bool parse_origin(struct reader *in, struct incise_origin *origin)
+static bool parse_origin(struct origin_reader *in, struct incise_origin *origin)
 {
 	uint64_t depth;
 
@@ -130,11 +131,11 @@ bool incise_origin_next(const char *bytes, size_t n, size_t *at,
 
 	while (*at < n) {
 		const char *start = memmem(bytes + *at, n - *at, START, length);
-		struct reader in;
+		struct origin_reader in;
 
 		if (!start)
 			break;
-		in = (struct reader){start + length, bytes + n, false};
+		in = (struct origin_reader){start + length, bytes + n, false};
 		*at = (size_t)(start - bytes) + length;
 		if (!parse_origin(&in, origin))
 			continue;

@@ -11,7 +11,7 @@
 #include "writers.h"
 #include "interpolators.h"
 
-struct row {
+struct resample_row {
 	int64_t recording; /* its name */
 	double t_s;
 	struct incise_blade_pose_value blade;
@@ -20,7 +20,7 @@ struct row {
 	struct incise_row_extra extra;
 };
 
-#define COLUMN(member, ...) INCISE_COLUMN(struct row, member, __VA_ARGS__)
+#define COLUMN(member, ...) INCISE_COLUMN(struct resample_row, member, __VA_ARGS__)
 #define POSITION "position of the tip"
 #define ORIENTATION "orientation, unit quaternion"
 
@@ -132,7 +132,8 @@ static double least_resample(double a, double b)
 }
 
 /* Find the uncertainties of a row. */
-static void find_uncertainties(const struct resample *r, int64_t t_ns, struct row *to)
+static void find_uncertainties(const struct resample *r, int64_t t_ns,
+			       struct resample_row *to)
 {
 	struct incise_budget_row row = {
 		.force_N = to->force.force_N,
@@ -148,7 +149,7 @@ static void find_uncertainties(const struct resample *r, int64_t t_ns, struct ro
 }
 
 /* Count a row in the report. */
-static void report_row(struct resample *r, const struct row *row)
+static void report_row(struct resample *r, const struct resample_row *row)
 {
 	struct incise_export_report *report = &r->pass->report;
 
@@ -167,7 +168,7 @@ static int put_row(struct resample *r, int64_t t_ns,
 		   const struct incise_force_value *force)
 {
 	struct incise_export_pass *pass = r->pass;
-	struct row row = {
+	struct resample_row row = {
 		.recording = r->name,
 		.t_s = (double)(t_ns - r->first_ns) * 1e-9,
 		.force = *force,
@@ -384,5 +385,5 @@ static int write_resampled(struct incise_export_pass *pass)
 
 const struct incise_row_kind incise_resample = {columns,
 						sizeof(columns) / sizeof(*columns),
-						offsetof(struct row, extra),
+						offsetof(struct resample_row, extra),
 						write_resampled};

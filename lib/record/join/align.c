@@ -118,7 +118,7 @@ static bool tracker_sudden(void *state, const struct incise_rows *rows, struct s
 	return true;
 }
 
-struct walk {
+struct align_walk {
 	const char *table, *columns;
 	sudden_at at;
 	void *state;
@@ -127,7 +127,7 @@ struct walk {
 };
 
 /* The largest value, and the typical one. */
-static int find_scale(struct incise_recording *recording, const struct walk *walk,
+static int find_scale(struct incise_recording *recording, const struct align_walk *walk,
 		      double *largest, double *noise, struct incise_error *err)
 {
 	struct incise_rows rows;
@@ -168,7 +168,7 @@ static void mark_of(const struct sudden last[3], bool centroid, struct incise_ma
 		mark->t_ns += llrint(sum / weight);
 }
 
-static int find_marks(struct incise_recording *recording, const struct walk *walk,
+static int find_marks(struct incise_recording *recording, const struct align_walk *walk,
 		      struct incise_mark marks[INCISE_MARKS_MAX],
 		      struct incise_error *err)
 {
@@ -234,9 +234,9 @@ int incise_align_marks(struct incise_recording *recording,
 {
 	struct rise rise;
 	struct bend bend;
-	const struct walk force = {"force", "seq, t_ns, code", force_sudden,
-				   &rise,   sizeof(rise),      false};
-	const struct walk tracker = {
+	const struct align_walk force = {"force", "seq, t_ns, code", force_sudden,
+					 &rise,	  sizeof(rise),	     false};
+	const struct align_walk tracker = {
 		"tracker",	"seq, t_ns, x_mm, y_mm, z_mm, status",
 		tracker_sudden, &bend,
 		sizeof(bend),	true};

@@ -560,7 +560,7 @@ static struct incise_frames_writer *writer_new(
 
 #define NS_PER_MS 1000000
 
-struct reader {
+struct frames_mkv_reader {
 	struct incise_frames_reader reader;
 	char *path;
 	AVFormatContext *format; /* NULL: there is no frame */
@@ -572,13 +572,13 @@ struct reader {
 	uint64_t next_seq; /* for a file without notes */
 };
 
-static struct reader *reader_of(struct incise_frames_reader *reader)
+static struct frames_mkv_reader *reader_of(struct incise_frames_reader *reader)
 {
-	return (struct reader *)reader;
+	return (struct frames_mkv_reader *)reader;
 }
 
 /* Read the packet's note. False: there is none, and the note is made up from the packet. */
-static bool read_note(struct reader *r, struct note *note)
+static bool read_note(struct frames_mkv_reader *r, struct note *note)
 {
 	size_t size = 0;
 	const uint8_t *side = av_packet_get_side_data(
@@ -596,7 +596,7 @@ static bool read_note(struct reader *r, struct note *note)
 	return false;
 }
 
-static int bad(struct reader *r, const struct note *note, const char *why,
+static int bad(struct frames_mkv_reader *r, const struct note *note, const char *why,
 	       struct incise_error *err)
 {
 	return incise_error_set(err, EBADMSG, "%.300s: picture %llu: %s", r->path,
@@ -622,7 +622,8 @@ static bool is_size(int width, int height)
 }
 
 /* The codec's pixels to the camera's pixels. 0, -EBADMSG, -ENOMEM; sets no error text. */
-static int decode_frames_mkv(struct reader *r, struct incise_camera_frame *frame)
+static int decode_frames_mkv(struct frames_mkv_reader *r,
+			     struct incise_camera_frame *frame)
 {
 	size_t row, size;
 	int rc = avcodec_send_packet(r->codec, r->packet);
@@ -678,7 +679,7 @@ static int reader_next(struct incise_frames_reader *reader,
 		       struct incise_camera_frame *frame,
 		       struct incise_frames_stored *stored, struct incise_error *err)
 {
-	struct reader *r = reader_of(reader);
+	struct frames_mkv_reader *r = reader_of(reader);
 	const AVCodecParameters *codec;
 	struct note note;
 	bool noted;
@@ -733,7 +734,7 @@ static int reader_next(struct incise_frames_reader *reader,
 
 static void reader_close(struct incise_frames_reader *reader)
 {
-	struct reader *r = reader_of(reader);
+	struct frames_mkv_reader *r = reader_of(reader);
 
 	avcodec_free_context(&r->codec);
 	av_frame_free(&r->planes);
@@ -744,7 +745,7 @@ static void reader_close(struct incise_frames_reader *reader)
 	free(r);
 }
 
-static int open_decoder(struct reader *r, const AVCodecParameters *parameters)
+static int open_decoder(struct frames_mkv_reader *r, const AVCodecParameters *parameters)
 {
 	const AVCodec *codec = avcodec_find_decoder(parameters->codec_id);
 	int rc;
@@ -765,7 +766,7 @@ static int open_decoder(struct reader *r, const AVCodecParameters *parameters)
 }
 
 /* 0, or a code of libav. */
-static int open_frames_mkv_file(struct reader *r)
+static int open_frames_mkv_file(struct frames_mkv_reader *r)
 {
 	const AVCodecParameters *codec;
 	AVDictionary *options = NULL;
@@ -807,7 +808,7 @@ static int open_frames_mkv_file(struct reader *r)
 static struct incise_frames_reader *reader_new(const char *path, struct incise_error *err)
 {
 	static const struct incise_frames_reader_ops ops = {reader_next, reader_close};
-	struct reader *r = calloc(1, sizeof(*r));
+	struct frames_mkv_reader *r = calloc(1, sizeof(*r));
 	int rc = AVERROR(ENOMEM);
 
 	av_log_set_level(AV_LOG_QUIET);

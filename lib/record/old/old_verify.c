@@ -17,7 +17,7 @@
 
 #define REPORT_ROWS 4096
 
-struct walk {
+struct old_verify_walk {
 	struct incise_verify_walk *of;
 	struct incise_old_rows rows; /* at the next one */
 	struct incise_ledger
@@ -26,7 +26,7 @@ struct walk {
 };
 
 /* Read the next row into walk->row. Returns 0; -EIO: SQLite cannot, -ECANCELED. */
-static int next_old_verify_row(struct walk *walk)
+static int next_old_verify_row(struct old_verify_walk *walk)
 {
 	struct incise_verify_walk *w = walk->of;
 	struct incise_verification *verify = w->verify;
@@ -41,7 +41,7 @@ static int next_old_verify_row(struct walk *walk)
 }
 
 /* Add the row to the chains, and read the next. Returns as next_row(). */
-static int take_old_verify_row(struct walk *walk, bool *good)
+static int take_old_verify_row(struct old_verify_walk *walk, bool *good)
 {
 	struct incise_verify_walk *w = walk->of;
 
@@ -62,7 +62,8 @@ static int take_old_verify_row(struct walk *walk, bool *good)
  * Entries from the next to @block are missing. The rows before @block are treated as one block:
  * if they were one, the chain continues.
  */
-static int skip_blocks(struct walk *walk, const struct incise_ledger_block *block)
+static int skip_blocks(struct old_verify_walk *walk,
+		       const struct incise_ledger_block *block)
 {
 	struct incise_verify_walk *w = walk->of;
 	struct incise_verify_finding found =
@@ -104,8 +105,8 @@ static int skip_blocks(struct walk *walk, const struct incise_ledger_block *bloc
 }
 
 /* Recompute a block from its rows. Returns as next_row(). */
-static int take_block(struct walk *walk, const struct incise_ledger_block *block,
-		      bool good)
+static int take_block(struct old_verify_walk *walk,
+		      const struct incise_ledger_block *block, bool good)
 {
 	struct incise_verify_walk *w = walk->of;
 	uint64_t before = w->out->present;
@@ -150,7 +151,7 @@ static int take_block(struct walk *walk, const struct incise_ledger_block *block
 }
 
 /* Rows behind the last block. */
-static int take_extra(struct walk *walk)
+static int take_extra(struct old_verify_walk *walk)
 {
 	struct incise_verify_walk *w = walk->of;
 	struct incise_verify_finding found =
@@ -179,7 +180,7 @@ static int take_extra(struct walk *walk)
 	return rc;
 }
 
-static int walk_through(struct walk *walk)
+static int walk_through(struct old_verify_walk *walk)
 {
 	struct incise_verify_walk *w = walk->of;
 	struct incise_ledger_block block;
@@ -217,7 +218,7 @@ static int walk_through(struct walk *walk)
 
 int incise_old_verify_stream(struct incise_verify_walk *of)
 {
-	struct walk walk = {.of = of, .chains = 1};
+	struct old_verify_walk walk = {.of = of, .chains = 1};
 	int rc;
 
 	incise_ledger_init(&walk.chain[0]);

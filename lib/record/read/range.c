@@ -24,7 +24,7 @@
 /* Behind the end, for filters that look ahead. */
 #define BEHIND_NS 1000000000LL
 
-struct walk {
+struct range_walk {
 	int64_t settled_ns;
 	struct place {
 		int64_t t_ns;
@@ -39,7 +39,7 @@ struct walk {
  * Note a place outside, where the blade has been clear of the tissue for a while, so that its smoothed depth is,
  * too; in a cut the one before it stays.
  */
-static void note_range(struct walk *walk, int64_t t_ns, double depth_mm)
+static void note_range(struct range_walk *walk, int64_t t_ns, double depth_mm)
 {
 	const int64_t apart_ns = walk->settled_ns / (PLACES / 4);
 
@@ -59,16 +59,16 @@ static void note_range(struct walk *walk, int64_t t_ns, double depth_mm)
 	walk->place[walk->n++] = (struct place){t_ns, walk->cut.count};
 }
 
-static void init_walk(struct walk *walk, double tracker_hz)
+static void init_walk(struct range_walk *walk, double tracker_hz)
 {
-	*walk = (struct walk){.settled_ns = SETTLED_NS, .begin.t_ns = INT64_MIN};
+	*walk = (struct range_walk){.settled_ns = SETTLED_NS, .begin.t_ns = INT64_MIN};
 	if (tracker_hz > 0 && SETTLED_RECORDS / tracker_hz * 1e9 > SETTLED_NS)
 		walk->settled_ns =
 			(int64_t)fmin(SETTLED_RECORDS / tracker_hz * 1e9, 1e12);
 }
 
 /* Add a depth. Returns whether the range begins there, or the cut that is asked for has ended. */
-static bool step_range(struct walk *walk, struct incise_recording_range *range,
+static bool step_range(struct range_walk *walk, struct incise_recording_range *range,
 		       int64_t from_ns, int64_t t_ns, double depth_mm)
 {
 	const bool inside = walk->cut.inside;
@@ -85,7 +85,7 @@ static bool step_range(struct walk *walk, struct incise_recording_range *range,
 }
 
 /* Follow the depths behind a time, when the blade was outside, to where the range begins. */
-static int follow_range(struct incise_recording *recording, struct walk *walk,
+static int follow_range(struct incise_recording *recording, struct range_walk *walk,
 			int64_t behind_ns, struct incise_recording_range *range,
 			int64_t from_ns, struct incise_error *err)
 {
@@ -138,7 +138,7 @@ static int find_begin(struct incise_recording *recording,
 		      struct incise_recording_range *range, int64_t from_ns,
 		      struct incise_error *err)
 {
-	struct walk walk;
+	struct range_walk walk;
 	int64_t *ends_ns;
 	size_t n = read_cut_ends(recording, &ends_ns), at = 0;
 	int rc = 0;

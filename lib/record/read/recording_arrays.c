@@ -257,7 +257,7 @@ int incise_recording_lengths(struct incise_recording *recording,
 
 /* --- pairs of depths by camera and tracker --------------------------------------------- */
 
-struct place {
+struct recording_arrays_place {
 	int64_t t_ns; /* -1: none */
 	double position_mm[3];
 };
@@ -266,7 +266,7 @@ struct pairs {
 	struct incise_recording *recording;
 	struct incise_rows tracker;
 	struct array frames; /* a pair for each that is one */
-	struct place before, after;
+	struct recording_arrays_place before, after;
 	struct incise_depth depth;
 	double axis[2][3]; /* along the surface */
 };
@@ -311,7 +311,7 @@ static int seek(struct pairs *p, int64_t t_ns, struct incise_error *err)
 /* Fill the tracker's side of a pair; false: no record is near, or the depth is too small. */
 static bool pair_up(const struct pairs *p, struct incise_depth_pair *pair)
 {
-	const struct place *a = &p->before, *b = &p->after;
+	const struct recording_arrays_place *a = &p->before, *b = &p->after;
 	double span = (double)(b->t_ns - a->t_ns), share, position[3];
 
 	if (a->t_ns < 0 || span <= 0 || span > INCISE_DEPTH_GAP_NS)

@@ -21,13 +21,13 @@
 #include "../read/source.h"
 #include "verify.h"
 
-struct row {
+struct verify_camera_row {
 	int64_t seq, t_ns, pts_ms, bytes, crc;
 	const uint8_t *sha256;
 };
 
 /* Consecutive frames that are wrong in the same way. */
-struct run {
+struct verify_camera_run {
 	enum fault { NONE, MISSING, ALTERED, EXTRA } what;
 	const char *why; /* of ALTERED */
 	int64_t first_seq, last_seq;
@@ -35,18 +35,18 @@ struct run {
 	uint64_t count;
 };
 
-struct walk {
+struct verify_camera_walk {
 	struct incise_verification *verify;
 	struct incise_verify_frames *out;
 	struct incise_source rows;
-	size_t at;	/* next row of the batch */
-	struct row row; /* the same, where has_row */
+	size_t at;		      /* next row of the batch */
+	struct verify_camera_row row; /* the same, where has_row */
 	bool has_row;
 	int64_t last_ns;  /* of the row before */
 	bool timestamped; /* rows have the frames' times, less the delay */
 	int64_t delay_ns;
 	bool ended; /* it died, maybe in mid-frame */
-	struct run run;
+	struct verify_camera_run run;
 };
 
 static struct incise_verify_finding finding(enum incise_verify_kind kind)
@@ -59,9 +59,9 @@ static struct incise_verify_finding finding(enum incise_verify_kind kind)
 
 /* --- findings --------------------------------------------------------------------- */
 
-static void flush_run(struct walk *walk)
+static void flush_run(struct verify_camera_walk *walk)
 {
-	const struct run *run = &walk->run;
+	const struct verify_camera_run *run = &walk->run;
 	struct incise_verify_finding found = finding(INCISE_VERIFY_FRAMES);
 	char where[120];
 
@@ -97,15 +97,15 @@ static void flush_run(struct walk *walk)
 	walk->run.what = NONE;
 }
 
-static void add_to_run(struct walk *walk, enum fault what, const char *why, int64_t seq,
-		       int64_t t_ns)
+static void add_to_run(struct verify_camera_walk *walk, enum fault what, const char *why,
+		       int64_t seq, int64_t t_ns)
 {
-	struct run *run = &walk->run;
+	struct verify_camera_run *run = &walk->run;
 
 	if (run->what != NONE && (run->what != what || run->why != why))
 		flush_run(walk);
 	if (run->what == NONE)
-		*run = (struct run){what, why, seq, seq, t_ns, t_ns, 0};
+		*run = (struct verify_camera_run){what, why, seq, seq, t_ns, t_ns, 0};
 	run->last_seq = seq;
 	run->last_ns = t_ns;
 	run->count++;
@@ -113,16 +113,17 @@ static void add_to_run(struct walk *walk, enum fault what, const char *why, int6
 
 /* --- rows ------------------------------------------------------------------------- */
 
-static struct row row_of(const struct incise_batch *batch, size_t at)
+static struct verify_camera_row row_of(const struct incise_batch *batch, size_t at)
 {
 	const union incise_column *column = batch->column;
 
-	return (struct row){column[0].i[at], column[1].i[at], column[3].i[at],
-			    column[4].i[at], column[5].i[at], column[10].h[at]};
+	return (struct verify_camera_row){column[0].i[at], column[1].i[at],
+					  column[3].i[at], column[4].i[at],
+					  column[5].i[at], column[10].h[at]};
 }
 
 /* Returns 0 or -EIO, which verify_stream.c has reported; a block that it has reported is passed. */
-static int next_verify_camera_row(struct walk *walk)
+static int next_verify_camera_row(struct verify_camera_walk *walk)
 {
 	int rc = 1;
 
@@ -140,7 +141,7 @@ static int next_verify_camera_row(struct walk *walk)
 	return rc < 0 ? -EIO : 0;
 }
 
-static int skip_row(struct walk *walk)
+static int skip_row(struct verify_camera_walk *walk)
 {
 	walk->out->missing++;
 	add_to_run(walk, MISSING, NULL, walk->row.seq, walk->row.t_ns);
@@ -156,14 +157,14 @@ struct frame {
 	bool good; /* by the reader */
 };
 
-static bool is_like(const struct row *row, const struct frame *frame)
+static bool is_like(const struct verify_camera_row *row, const struct frame *frame)
 {
 	return row->pts_ms == frame->stored.pts_ms ||
 	       (row->crc == frame->stored.crc && row->bytes == frame->stored.bytes);
 }
 
 /* Whether a later row is this frame's: the rows between have no frame. */
-static bool is_further_on(struct walk *walk, const struct frame *frame)
+static bool is_further_on(struct verify_camera_walk *walk, const struct frame *frame)
 {
 	const int64_t seq = (int64_t)frame->head.seq;
 	struct incise_source source;
@@ -175,7 +176,7 @@ static bool is_further_on(struct walk *walk, const struct frame *frame)
 				   seq, NULL) &&
 	    incise_source_next(&source, NULL) > 0)
 		for (size_t k = 0; k < source.batch.n && !is; k++) {
-			struct row row = row_of(&source.batch, k);
+			struct verify_camera_row row = row_of(&source.batch, k);
 
 			is = row.seq == seq && is_like(&row, frame);
 		}
@@ -184,7 +185,7 @@ static bool is_further_on(struct walk *walk, const struct frame *frame)
 }
 
 /* A repeated timestamp was increased by 1 ns; see timeline.h. */
-static bool is_time(const struct walk *walk, int64_t t_ns)
+static bool is_time(const struct verify_camera_walk *walk, int64_t t_ns)
 {
 	int64_t late_ns;
 
@@ -197,9 +198,10 @@ static bool is_time(const struct walk *walk, int64_t t_ns)
 }
 
 /* The part of the frame that differs from walk->row; NULL: none. */
-static const char *difference(const struct walk *walk, const struct frame *frame)
+static const char *difference(const struct verify_camera_walk *walk,
+			      const struct frame *frame)
 {
-	const struct row *row = &walk->row;
+	const struct verify_camera_row *row = &walk->row;
 
 	if (row->bytes != frame->stored.bytes)
 		return "its size is";
@@ -214,7 +216,7 @@ static const char *difference(const struct walk *walk, const struct frame *frame
 }
 
 /* Compare a frame with its row, after the rows without a frame. Returns 0 or -EIO. */
-static int take_frame(struct walk *walk, const struct frame *frame)
+static int take_frame(struct verify_camera_walk *walk, const struct frame *frame)
 {
 	const struct incise_camera_frame *head = &frame->head;
 	const char *why;
@@ -255,7 +257,8 @@ static int take_frame(struct walk *walk, const struct frame *frame)
 }
 
 /* Returns 0, -ECANCELED, -EIO. */
-static int walk_through(struct walk *walk, struct incise_frames_reader *reader)
+static int walk_through(struct verify_camera_walk *walk,
+			struct incise_frames_reader *reader)
 {
 	struct incise_verification *verify = walk->verify;
 	struct incise_error err = {0};
@@ -311,7 +314,7 @@ static void report_unopened(struct incise_verification *verify, const char *path
 			    err->text);
 }
 
-static int prepare(struct walk *walk)
+static int prepare(struct verify_camera_walk *walk)
 {
 	struct incise_recording *recording = walk->verify->recording;
 
@@ -329,7 +332,8 @@ static int prepare(struct walk *walk)
 
 int incise_verify_camera(struct incise_verification *verify)
 {
-	struct walk walk = {.verify = verify, .out = &verify->report->frames};
+	struct verify_camera_walk walk = {.verify = verify,
+					  .out = &verify->report->frames};
 	struct incise_frames_reader *reader = NULL;
 	struct incise_error err = {0};
 	char *path = NULL;

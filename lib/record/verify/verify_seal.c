@@ -12,7 +12,7 @@
 #include "seal_walk.h"
 #include "verify.h"
 
-struct walk {
+struct verify_seal_walk {
 	struct incise_verification *verify;
 	struct incise_verify_finding wrong; /* commits in a row; first_block -1: none */
 	bool bad;			    /* any commit was */
@@ -31,7 +31,7 @@ static struct incise_verify_finding finding(const char *part)
 
 /* --- the chain ------------------------------------------------------------------------ */
 
-static void flush_wrong(struct walk *walk)
+static void flush_wrong(struct verify_seal_walk *walk)
 {
 	struct incise_verify_finding *found = &walk->wrong;
 	char commits[80];
@@ -54,7 +54,7 @@ static void flush_wrong(struct walk *walk)
 
 static int step_verify_seal(void *user, struct incise_seal_walk *commit)
 {
-	struct walk *walk = user;
+	struct verify_seal_walk *walk = user;
 	struct incise_verification *verify = walk->verify;
 	const bool tables =
 		commit->number == commit->last && verify->recording->meta.complete;
@@ -77,7 +77,7 @@ static int step_verify_seal(void *user, struct incise_seal_walk *commit)
 	return incise_verify_progress(verify, false);
 }
 
-static void report_behind(struct walk *walk)
+static void report_behind(struct verify_seal_walk *walk)
 {
 	struct incise_verify_finding found = finding("");
 
@@ -173,7 +173,8 @@ static int compare_parts(struct incise_verification *verify,
 	return n;
 }
 
-static void compare_statement(struct walk *walk, const struct incise_seal_statement *was,
+static void compare_statement(struct verify_seal_walk *walk,
+			      const struct incise_seal_statement *was,
 			      const struct incise_seal_statement *is)
 {
 	struct incise_verification *verify = walk->verify;
@@ -246,7 +247,8 @@ int incise_verify_seal(struct incise_verification *verify)
 {
 	const uint64_t before = verify->report->findings;
 	const struct incise_seal_statement *was = verify->statement;
-	struct walk walk = {.verify = verify, .wrong = finding(""), .last = -1};
+	struct verify_seal_walk walk = {
+		.verify = verify, .wrong = finding(""), .last = -1};
 	struct incise_seal_statement is;
 	struct incise_error err = {0};
 	/* With rows that the ledger does not have, blocks are not those of the digests. */
