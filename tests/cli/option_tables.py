@@ -67,6 +67,7 @@ VALUES = """
 --frames | folder |
 --from | any |
 --from export | 0s 90s 1.5min | -1s 5kg {}
+--from train | 0s 90s 1.5min | -1s 5kg {}
 --gauge-u | 0 100 | -1 101 fine {}
 --gravity | 9.81 | 0 -9.81 strong {}
 --grid | 2x2 20x15 | 20 3x 1x5 x 3x3x3 99999x2 -2x3 {}

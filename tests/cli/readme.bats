@@ -27,7 +27,7 @@ rounded() {
 	commands_in "$root/README.md" path >session
 	grep -q 'build/bin' session
 	commands_in "$root/README.md" session >>session
-	[ "$(grep -c '^incise ' session)" -ge 8 ]
+	[ "$(grep -c '^incise ' session)" -ge 7 ]
 	sed -i 's/#.*//' session
 	run -0 bash -euo pipefail session
 	rounded <<<"$output" >printed

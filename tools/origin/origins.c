@@ -17,10 +17,11 @@ static const char *kind_of(enum file_kind kind)
 	static const struct {
 		enum file_kind kind;
 		const char *name;
-	} names[] = {{FILE_MODEL, "model"},	    {FILE_COMPILED, "compiled"},
-		     {FILE_TABLE, "table"},	    {FILE_SESSION, "session"},
-		     {FILE_EXPORT, "export"},	    {FILE_IMAGE, "figure"},
-		     {FILE_DEVIATION, "deviation"}, {FILE_CALIBRATION, "calibration"}};
+	} names[] = {{FILE_RECORDING, "recording"},    {FILE_MODEL, "model"},
+		     {FILE_COMPILED, "compiled"},      {FILE_TABLE, "table"},
+		     {FILE_SESSION, "session"},	       {FILE_EXPORT, "export"},
+		     {FILE_IMAGE, "figure"},	       {FILE_DEVIATION, "deviation"},
+		     {FILE_CALIBRATION, "calibration"}};
 
 	for (size_t i = 0; i < sizeof(names) / sizeof(*names); i++)
 		if (names[i].kind == kind)
@@ -31,24 +32,21 @@ static const char *kind_of(enum file_kind kind)
 void origins_add(struct incise_origins *origins, const char *path)
 {
 	/* An interrupted recording, and one that is named without its extension. */
-	static const char *const ends[] = {"", ".part", ".rec"};
+	static const char *const ends[] = {".part", ".rec"};
+	enum file_kind kind = file_kind_of(path);
+	char *whole = cli_text("%s", path);
 	struct incise_error err = {0};
-	bool is = false;
-	int rc = 0;
 
-	for (int i = 0; i < 3 && !is; i++) {
-		char *whole = cli_text("%s%s", path, ends[i]);
-
-		is = file_kind_of(whole) == FILE_RECORDING;
-		if (is)
-			rc = incise_origins_recording(origins, whole, &err);
+	for (int i = 0; i < 2 && kind != FILE_RECORDING; i++) {
 		free(whole);
+		whole = cli_text("%s%s", path, ends[i]);
+		if (file_kind_of(whole) == FILE_RECORDING)
+			kind = FILE_RECORDING;
 	}
-	if (!is)
-		rc = incise_origins_file(origins, path, kind_of(file_kind_of(path)),
-					 &err);
-	if (rc)
+	if (incise_origins_add(origins, kind == FILE_RECORDING ? whole : path,
+			       kind_of(kind), &err))
 		cli_fail_with(&err);
+	free(whole);
 }
 
 /* Their tokens, each between @before and @after. */

@@ -100,22 +100,14 @@ INCISE_API int incise_origins_read(struct incise_origins *origins, const char *p
 				   bool model, struct incise_error *err);
 
 /**
- * Add a file as one that something is made of, and below it those that it carries.
+ * Add a file as one that something is made of, and below it those that it carries; or a recording at its
+ * present commit, each member of a joined one, as incise_recording_origins(). Thread safe.
  *
- * @param kind "model", "table", "export", …, as of struct incise_origin
+ * @param kind "recording", "model", "table", "export", …, as of struct incise_origin
  * @return as incise_origins_read()
  */
-INCISE_API int incise_origins_file(struct incise_origins *origins, const char *path,
-				   const char *kind, struct incise_error *err);
-
-/**
- * Add a recording at its present commit, or each member of a joined one, as
- * incise_recording_origins(); nothing of one without a seal.
- *
- * @return 0; -ENOENT, -ENOMEM
- */
-INCISE_API int incise_origins_recording(struct incise_origins *origins, const char *path,
-					struct incise_error *err);
+INCISE_API int incise_origins_add(struct incise_origins *origins, const char *path,
+				  const char *kind, struct incise_error *err);
 
 /** Free what origins hold. */
 INCISE_API void incise_origins_free(struct incise_origins *origins);

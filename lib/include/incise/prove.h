@@ -45,8 +45,7 @@ struct incise_prove_options {
 	/** Signers that are trusted, ALLOWED SIGNERS of ssh-keygen(1): compare statements and check. */
 	const char *signers;
 	const char *revoked; /**< keys that are not accepted, ssh-keygen -k; or NULL */
-	const char *
-		authorities; /**< certificates in PEM, to check time-stamps by; or NULL */
+	const char *authorities; /**< certificates in PEM, for time-stamps; or NULL */
 	const struct incise_verify_watch *watch; /**< of the verification; or NULL */
 	/** Verify, make a statement and sign it: a private key, or the public one of one in the agent. */
 	const char *key;
@@ -66,6 +65,7 @@ enum incise_proof_kind {
 	INCISE_PROOF_TIMESTAMP,
 };
 
+/** The state of a signature or a time-stamp. */
 enum incise_proof_verdict {
 	INCISE_PROOF_UNCHECKED, /**< nobody to trust was given */
 	INCISE_PROOF_GOOD,
@@ -119,6 +119,7 @@ struct incise_proof_seal {
 	int bad;      /**< number of vouchers and statements that are not good */
 };
 
+/** Result of incise_prove(). */
 struct incise_proof {
 	struct incise_verify_report report; /**< of the verification */
 	/** The first finding by which it is not what was recorded; "": none. */

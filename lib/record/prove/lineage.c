@@ -133,8 +133,8 @@ int incise_origins_read(struct incise_origins *origins, const char *path, bool m
 
 /* --- adding ----------------------------------------------------------------------------- */
 
-int incise_origins_recording(struct incise_origins *origins, const char *path,
-			     struct incise_error *err)
+static int add_recording(struct incise_origins *origins, const char *path,
+			 struct incise_error *err)
 {
 	size_t size = INCISE_SESSION_MEMBERS_MAX * INCISE_ORIGIN_TEXT, at = 0, n = 0;
 	char *folder = incise_proof_folder(path, err), *all = NULL, *text = malloc(size);
@@ -158,14 +158,16 @@ int incise_origins_recording(struct incise_origins *origins, const char *path,
 	return rc;
 }
 
-int incise_origins_file(struct incise_origins *origins, const char *path,
-			const char *kind, struct incise_error *err)
+int incise_origins_add(struct incise_origins *origins, const char *path, const char *kind,
+		       struct incise_error *err)
 {
 	struct incise_origins below = {0};
 	struct incise_origin origin = {.depth = 1};
 	struct stat st;
 	int rc;
 
+	if (!strcmp(kind, "recording"))
+		return add_recording(origins, path, err);
 	/* A pipe was read by others, and is gone. */
 	if (stat(path, &st) || !S_ISREG(st.st_mode))
 		return 0;

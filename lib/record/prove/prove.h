@@ -16,8 +16,8 @@
 #include <incise/prove.h>
 #include "../../base/crypto/sha256.h"
 
-#define INCISE_SEAL_STATEMENT_MAX \
-	(16 * INCISE_STATEMENT_MAX)	  /* bytes, with calibrations */
+/* With calibrations. */
+#define INCISE_SEAL_STATEMENT_MAX (16 * INCISE_STATEMENT_MAX)
 #define INCISE_SIGNATURE_MAX 65536	  /* bytes */
 #define INCISE_TIMESTAMP_MAX (256 * 1024) /* bytes of a reply */
 
@@ -43,8 +43,7 @@ struct incise_seal_file {
 };
 
 struct incise_seal_files {
-	struct incise_seal_file
-		*all; /* by number: the statement, signatures, time-stamps */
+	struct incise_seal_file *all; /* by number, statements first */
 	int n;
 };
 

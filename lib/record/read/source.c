@@ -72,6 +72,8 @@ static const char *does_not_follow(struct incise_source *source,
 
 	if (source->last_seq >= seq[0])
 		return "its numbers are not behind those of the block before";
+	if (source->last_seq >= 0 && source->last_ns >= batch->column[1].i[0])
+		return "its times are not behind those of the block before";
 	if (source->last_seq >= 0)
 		lost += (uint64_t)(seq[0] - source->last_seq - 1);
 	return source->next < 0 || lost == (uint64_t)block->lost
@@ -89,6 +91,7 @@ static const char *take_block(struct incise_source *source,
 		why = does_not_follow(source, block);
 	source->next = why || block->block == INT64_MAX ? -1 : block->block + 1;
 	source->last_seq = why ? -1 : block->last_seq;
+	source->last_ns = block->last_ns;
 	return why;
 }
 

@@ -41,8 +41,8 @@ struct incise_source {
 	size_t rows_max; /* of a batch, where the file has no blocks */
 	bool ended;	 /* another step would begin anew */
 	bool held; /* the statement is at a row that did not fit, or a block that did not follow */
-	/* Of blocks: the number of the next one, -1: not known; and the last number of the one before. */
-	int64_t next, last_seq;
+	/* Of blocks: the number of the next one, -1: not known; and the last number and time of the one before. */
+	int64_t next, last_seq, last_ns;
 	struct incise_source_depth *depth; /* what it is made of */
 	double scale; /* of depths by vision, of another calibration */
 };

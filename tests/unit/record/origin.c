@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Tests of lib/record/export/origin.c: tokens against a table written by hand, found in other bytes,
+ * Tests of incise/origin.h: tokens against a table written by hand, found in other bytes and files,
  * and each single change of one.
  */
+#include <errno.h>
+#include <unistd.h>
 #include "../unit.h"
 #include <incise/origin.h>
 
@@ -119,4 +121,51 @@ TEST(changed_tokens_are_others_or_none)
 				free(text);
 			}
 	}
+}
+
+static void write_text(const char *path, const char *text)
+{
+	FILE *file = fopen(path, "w");
+
+	assert_non_null(file);
+	fputs(text, file);
+	fclose(file);
+}
+
+TEST(a_file_is_added_with_what_it_was_made_of)
+{
+	struct incise_origin origin = {.depth = 1, .kind = "recording", .commit = 97};
+	char path[] = "/tmp/incise-origin-XXXXXX", token[INCISE_ORIGIN_TEXT], text[3000];
+	struct incise_origins origins = {0};
+	struct incise_error err = {0};
+	int fd = mkstemp(path);
+
+	assert_true(fd >= 0);
+	close(fd);
+	memset(origin.sha256, 'a', 64);
+	strcpy(origin.identity, "0123");
+	strcpy(origin.name, "liver.rec");
+	assert_true(incise_origin_text(&origin, token) > 0);
+	/* Said twice, in a file of any form. */
+	snprintf(text, sizeof(text), "# %s\n# incise:1:bad;\n%s,1,2\n", token, token);
+	write_text(path, text);
+	assert_int_equal(incise_origins_read(&origins, path, false, &err), 0);
+	assert_int_equal(origins.n, 1);
+	assert_same(&origins.all[0], &origin);
+	incise_origins_free(&origins);
+
+	assert_int_equal(incise_origins_add(&origins, path, "table", &err), 0);
+	assert_int_equal(origins.n, 2);
+	assert_string_equal(origins.all[0].kind, "table");
+	assert_string_equal(origins.all[0].name, path + 5);
+	assert_int_equal(origins.all[0].depth, 1);
+	origin.depth = 2;
+	assert_same(&origins.all[1], &origin);
+	incise_origins_free(&origins);
+
+	unlink(path);
+	assert_int_equal(incise_origins_read(&origins, path, false, &err), -ENOENT);
+	/* A pipe, say, is gone by then. */
+	assert_int_equal(incise_origins_add(&origins, path, "table", &err), 0);
+	assert_int_equal(origins.n, 0);
 }

@@ -340,6 +340,9 @@ TEST(damage_is_found, IN_FOLDER)
 		{"UPDATE force SET t_ns = 5 WHERE seq = 100", "row 100: its time"},
 		{"UPDATE force SET t_ns = (SELECT t_ns FROM force WHERE seq = 99) WHERE seq = 100",
 		 "row 100: its time"},
+		{"UPDATE force SET t_ns = t_ns - 150000000 WHERE seq > (SELECT last_seq FROM "
+		 "blocks WHERE stream = 'force' AND block = 0)",
+		 "stream force, block 1: its times are not behind those of the block before"},
 		{"DELETE FROM force WHERE seq = 100", "table force"},
 		{"DELETE FROM tracker WHERE seq = 10", "table tracker"},
 		{"DELETE FROM tracker WHERE seq > 10", "table tracker"},
