@@ -160,9 +160,9 @@ class Recordings(Case):
         report = incise.verify(path)
         self.assertFalse(report.intact)
         self.assertEqual(report.findings[0].kind, "altered")
-        self.sql(path, "UPDATE force SET t_ns = -1 WHERE seq = 70000")
+        self.sql(path, "UPDATE force SET t_ns = -1 WHERE seq = 70500")
         table = incise.open(path, damaged=True).force
-        self.says(incise.Invalid, "table force, row 70000: ", rows, table)
+        self.says(incise.Invalid, "table force, row 70500: ", rows, table)
         with open(os.path.join(path, "recording.db"), "r+b") as file:
             file.truncate(100000)
         self.says(incise.Error, "damaged", lambda: rows(incise.open(path, damaged=True).force))
