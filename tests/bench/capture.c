@@ -452,7 +452,7 @@ static double seal_percent(void)
 	struct incise_seal seal;
 	double start;
 
-	if (incise_seal_init(&seal, 5))
+	if (incise_seal_init(&seal))
 		cli_fail("libcrypto gives no SHA-256");
 	incise_seal_resume(&seal, digest);
 	start = stopwatch_of(CLOCK_PROCESS_CPUTIME_ID);

@@ -254,7 +254,7 @@ static struct normal normal_of(int from, int to)
 	struct normal normal = {.m = M};
 
 	for (int i = from; i < to; i++)
-		add_row(&normal, rows[i], right[i]);
+		add_calibrate_delay_row(&normal, rows[i], right[i]);
 	return normal;
 }
 
@@ -265,7 +265,7 @@ TEST(solution_is_that_of_the_rows)
 
 	make_rows();
 	normal = normal_of(0, ROWS);
-	assert_true(solve(&normal, x));
+	assert_true(solve_calibrate_delay(&normal, x));
 	memcpy(a, rows, sizeof(a));
 	memcpy(b, right, sizeof(b));
 	assert_int_equal(LAPACKE_dgels(LAPACK_ROW_MAJOR, 'N', ROWS, M, 1, *a, M, b, 1),
@@ -308,12 +308,12 @@ TEST(what_says_nothing_gets_nothing)
 	for (int i = 0; i < ROWS; i++)
 		rows[i][2] = 0;
 	normal = normal_of(0, ROWS);
-	assert_true(solve(&normal, x));
+	assert_true(solve_calibrate_delay(&normal, x));
 	assert_true(x[2] == 0 && x[0] != 0 && x[3] != 0);
 	normal.a[0] = NAN;
-	assert_false(solve(&normal, x));
+	assert_false(solve_calibrate_delay(&normal, x));
 	normal.a[0] = -1;
-	assert_false(solve(&normal, x));
+	assert_false(solve_calibrate_delay(&normal, x));
 }
 
 static int set_cases(void **state)

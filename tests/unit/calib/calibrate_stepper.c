@@ -313,7 +313,7 @@ static struct stroke strokes[2];
 static struct incise_calibrate_stepper_setup setup;
 
 /* Up on one line and down on another, 0.2 N apart; behind the turns anything. */
-static struct work make_lines(double noise_N)
+static struct calibrate_stepper_work make_lines(double noise_N)
 {
 	const uint64_t key = incise_random_key(3, INCISE_RANDOM_FORCE);
 
@@ -332,7 +332,7 @@ static struct work make_lines(double noise_N)
 	strokes[1] = (struct stroke){
 		.first = POINTS, .last = 2 * POINTS - 1, .way = -1, .from_mm = RANGE_MM};
 	incise_calibrate_stepper_init(&setup);
-	return (struct work){
+	return (struct calibrate_stepper_work){
 		.points = points,
 		.setup = &setup,
 		.n = 2 * POINTS,
@@ -345,7 +345,7 @@ static struct work make_lines(double noise_N)
 
 TEST(exact_lines_are_found)
 {
-	struct work w = make_lines(0);
+	struct calibrate_stepper_work w = make_lines(0);
 
 	assert_int_equal(fit_lines(&w, SKIP_MM), 0);
 	/* sums of some hundred doubles of size 1 */
@@ -364,7 +364,7 @@ TEST(exact_lines_are_found)
 /* A fifth of the points far off, all to one side; what is saturated is not even looked at. */
 TEST(outliers_do_not_bend_them)
 {
-	struct work w = make_lines(1e-3);
+	struct calibrate_stepper_work w = make_lines(1e-3);
 
 	for (int i = 15; i < 2 * POINTS; i += 5)
 		points[i].force_N += 0.5;
@@ -386,7 +386,7 @@ TEST(outliers_do_not_bend_them)
 
 TEST(too_few_are_no_line)
 {
-	struct work w = make_lines(0);
+	struct calibrate_stepper_work w = make_lines(0);
 
 	/* all of it is behind the turn */
 	assert_int_equal(fit_lines(&w, RANGE_MM), -EDOM);
