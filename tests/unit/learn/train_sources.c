@@ -133,7 +133,7 @@ TEST(test_stopped_at_any_call)
 	assert_int_equal(train(&options, &start, &err), 0);
 	for (enum way way = DEFAULT; way < WAYS; way++) {
 		struct stopping whole = {0};
-		int most = cases_of(100, 12);
+		int most = cases_of(100, 5);
 
 		options = make_options(way, start.model);
 		options.train.progress = stop_at;

@@ -165,10 +165,10 @@ TEST(after_a_failure_there_is_none, IN_FOLDER)
 	struct incise_recording_value *values;
 
 	record("a.rec", "sim:clock=simulated", 600 * MS);
-	change(DB, "UPDATE force SET t_ns = 7 WHERE seq = 5000");
+	change(DB, "UPDATE force SET t_ns = 7 WHERE seq = 5500");
 	assert_int_equal(values_of("force", &values, &err), -EINVAL);
 	assert_null(values);
-	assert_says(err.text, "table force, row 5000");
+	assert_says(err.text, "table force, row 5500");
 }
 
 /* --- lengths --------------------------------------------------------------- */
