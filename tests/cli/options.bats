@@ -46,4 +46,6 @@ setup() {
 	[[ "${stderr_lines[0]}" == *"name the column to learn with --target"* ]]
 	run -2 --separate-stderr incise capture --camera pictures
 	[[ "${stderr_lines[0]}" == *"auto, off, frames or depth"* ]]
+	run -2 --separate-stderr incise info m.fis --plot m
+	[ "${stderr_lines[0]}" = "incise info: --plot: this option is now called incise plot MODEL.fis -o NAME.png" ]
 }

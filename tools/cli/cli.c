@@ -67,6 +67,7 @@ static const struct {
 	{"demo", "--output", "--report"},
 	{"demo", "-o", "--report"},
 	{"export", "-r", "--rate"},
+	{"info", "--plot", "incise plot MODEL.fis -o NAME.png"},
 	{"replay", "--at", "--poses"},
 	{"replay", "--csv", "--log"},
 	{"stepper", "--for", "--duration"},
