@@ -381,6 +381,11 @@ def moved(value, chance):
     return (value or 0.0) + chance.choice((-1, 1)) * 10 ** chance.uniform(-6, 1)
 
 
+def grown(value, chance):
+    """A range at or below 0 is refused before anything is compared."""
+    return value + 10 ** chance.uniform(-6, 1)
+
+
 def swap_values(stream, column):
     def forge(recording, chance):
         rows = recording.rows[stream]
@@ -654,7 +659,7 @@ FORGERIES = {
     "tip": key("tip_z_mm", "calibration", moved),
     "configuration": key("rig_conf", "configuration", some_text),
     "surface": key("surface_point_z_mm", "configuration", moved),
-    "range": key("force_full_scale_V", "configuration", moved),
+    "range": key("force_full_scale_V", "configuration", grown),
     "key added": add_key,
     "key removed": remove_key,
     "host": key("host", "start", some_text),
