@@ -59,4 +59,10 @@ PY
 	done
 	[ "$(wc -l <22.values)" -gt 50000 ]
 	cmp 22.values 3970.values
+	# And a part is learnt from without the rest.
+	read -r bytes kB < <(cost incise train long.rec --from 5h --to 18060s -o part.fis)
+	echo "train: $bytes bytes, $kB kB"
+	grep -q 'pairs to train (7 cuts)' output.txt
+	[ "$bytes" -lt $((size / 6)) ]
+	[ "$kB" -lt 60000 ]
 }

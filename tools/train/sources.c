@@ -238,7 +238,8 @@ static void name_recording(struct incise_train_source *source)
 
 	own->database = cli_text("%s/recording.db", whole);
 	free(whole);
-	source->hashed = own->database;
+	/* A part is known by the name of its recording: its hash would read all of it. */
+	source->hashed = is_part(own->rows) ? NULL : own->database;
 	source->cuts = true;
 	source->stream = stream_recording;
 	source->open = open_recording;
