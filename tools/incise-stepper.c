@@ -511,7 +511,7 @@ static const struct subcommand *subcommand_named(const char *name)
 	cli_unknown("subcommand", name, names);
 }
 
-static void parse(struct stepper_job *job, int argc, char **argv)
+static void parse_stepper(struct stepper_job *job, int argc, char **argv)
 {
 	const struct subcommand *sub;
 	int operands;
@@ -543,7 +543,7 @@ int main(int argc, char **argv)
 	struct stepper_drive drive;
 	struct stepper_job job = {.axis = 1};
 
-	parse(&job, argc, argv);
+	parse_stepper(&job, argc, argv);
 	stepper_drive_open(&drive, job.rig, job.axis,
 			   job.subcommand->watch ? INCISE_RIG_WATCH : 0,
 			   job.subcommand->name);

@@ -176,8 +176,8 @@ static double *number_of_calibrate_board(struct calibrate_board_state *state, in
 	return i < BOARD_LENS ? &state->lens.number[i] : &state->pose[i - BOARD_LENS];
 }
 
-static double apart(const struct calibrate_board_state *state, const double a[2],
-		    const double b[2])
+static double find_distance(const struct calibrate_board_state *state, const double a[2],
+			    const double b[2])
 {
 	double from[2], to[2];
 
@@ -189,7 +189,7 @@ static double apart(const struct calibrate_board_state *state, const double a[2]
 static double axis_scale(const struct incise_board_views *views,
 			 const struct calibrate_board_state *state)
 {
-	return apart(state, views->axis_px[0], views->axis_px[1]);
+	return find_distance(state, views->axis_px[0], views->axis_px[1]);
 }
 
 /* Component k of the plane's normal as the camera has it. */
@@ -289,7 +289,7 @@ static void find_change(const struct incise_board_views *views,
 			a[k] = at - REACH_PX * way[k];
 			b[k] = at + REACH_PX * way[k];
 		}
-		scale = apart(state, a, b);
+		scale = find_distance(state, a, b);
 		fit->low_mm_px = fmin(fit->low_mm_px, scale);
 		fit->high_mm_px = fmax(fit->high_mm_px, scale);
 	}

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * How factors (incise/factor.h) are made, added up and solved. Sums are exact integers, so those of
+ * Factors (incise/factor.h): made, added up and solved. Sums are exact integers, so those of
  * shares, in any number and order, add up to the sums of all pairs, to the bit.
  */
 #ifndef INCISE_LEARN_FACTOR_H

@@ -27,7 +27,7 @@ static const struct format {
 	{name, extensions, lineage, NULL, #id, package},
 	INCISE_FORMATS(FORMAT, MODULE)};
 
-/* How many of them, the first ones, hold rows. */
+/* Number of the formats that hold rows: the first ones. */
 #define ONE(...) +1
 #define ROWS (0 INCISE_FORMATS_OF_ROWS(ONE, ONE))
 #define FORMATS (sizeof(formats) / sizeof(*formats))

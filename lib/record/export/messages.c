@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * What the profiles of messages share; see messages.h.
+ * Parts that all profiles of messages use; see messages.h.
  */
 #include <errno.h>
 #include <stdlib.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * What exports of all kinds share: a pass over recordings, with their names, wall times and budgets; see writers.h.
+ * A pass over recordings, which exports of all kinds use: with their names, wall times and budgets; see writers.h.
  */
 #include <stdlib.h>
 #include <string.h>

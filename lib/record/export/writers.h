@@ -48,7 +48,7 @@ struct incise_export_pass {
 
 #define INCISE_BUDGET_COLUMNS (INCISE_BUDGET_QUANTITIES + INCISE_BUDGET_PARTS)
 
-/* What rows have where it is asked for. */
+/* Values of a row that the options ask for. */
 struct incise_row_extra {
 	double u[INCISE_BUDGET_COLUMNS]; /* uncertainties: totals, then parts */
 	int64_t tai_ns;

@@ -76,7 +76,7 @@ static int check_tables(struct incise_recording *rec, struct incise_error *err)
 	return incise_schema_check(rec->db, rec->path, has, err);
 }
 
-/* What format 4 has: station 0, which is unknown, no button, no digest. Returns an SQLite code. */
+/* Columns as of format 4: station 0, which is unknown, no button, no digest. Returns an SQLite code. */
 static int make_views(struct incise_recording *rec)
 {
 	int rc = SQLITE_OK;

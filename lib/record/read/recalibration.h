@@ -29,7 +29,7 @@ struct incise_recalibrated {
  */
 int incise_recalibration_apply(struct incise_recording *rec, struct incise_error *err);
 
-/* What a calibration changes of the times of a source; one without its delay: nothing. */
+/* Move the times of a source by a calibration; one without its delay moves nothing. */
 void incise_recalibration_shift(const struct incise_calibration *calibration,
 				const struct incise_stream_source *source,
 				int64_t *shift_ns, double *variance_ns2);
