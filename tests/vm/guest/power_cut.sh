@@ -95,10 +95,14 @@ while [ $i -lt "$cuts" ]; do
 	i=$((i + 1))
 	cp empty cut
 	at=$((($(printf '%d' "0x$(echo "$seed $i" | sha256sum | cut -c1-7)")) % n))
-	t_ns=$(power_cut cut log cut $at $((seed * 1000 + i))) || break
+	t_ns=$(power_cut cut log cut $at $((seed * 1000 + i))) || good=-1000
 	# The first commit is due 100 ms after the first sample.
 	[ "$t_ns" -gt $((first + 200000000)) ] || continue
-	mount -o loop -t ext4 cut disk || break
+	mount -o loop -t ext4 cut disk || {
+		echo "# cut $i, mark $at: the disk does not mount"
+		good=-1000
+		break
+	}
 	if lost=$(judge); then
 		good=$((good + 1))
 		[ "$lost" -le $most ] || most=$lost
