@@ -29,7 +29,7 @@ $(O)/obj/fuzz/%.o: %.cc
 		$(fuzz_flags) -fsanitize=fuzzer-no-link -MMD -MP -c -o $@ $<
 
 # Further sources of a target.
-fuzz_vision_frame := lib/base/error.c lib/device/vision.c lib/device/module.c tests/vision/linked.c \
+fuzz_vision_frame := lib/base/error.c lib/device/vision.c lib/base/module.c tests/vision/linked.c \
 	$(wildcard lib/vision/*.c lib/vision/*.cc)
 fuzz_libs_vision_frame := $(libs_vision_opencv)
 fuzz_slcan_line := lib/device/can/bus/slcan_protocol.c
@@ -50,7 +50,7 @@ fuzz_wall_packets := $(addprefix lib/record/write/wall_,packets.c kernel.c)
 fuzz_statement := lib/base/error.c lib/record/statement.c
 fuzz_block := lib/record/batch.c lib/record/ledger.c lib/base/crc32c.c
 fuzz_libs_block = $(shell $(PKG_CONFIG) --libs sqlite3)
-fuzz_origin := lib/record/export/origin.c
+fuzz_origin := lib/record/prove/origin.c
 fuzz_timestamp_reply := lib/base/error.c lib/base/infile.c lib/base/crypto/sha256.c lib/record/prove/timestamp.c
 fuzz_libs_timestamp_reply = $(shell $(PKG_CONFIG) --libs libcrypto)
 

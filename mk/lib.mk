@@ -92,14 +92,6 @@ take_modules = $(foreach name,$(modules),$(call take_module,$(name),$1))
 add_ons :=
 $(foreach file,$(wildcard lib/*/module.mk lib/*/*/module.mk),$(eval include $(file))$(call take_modules,$(dir $(file))))
 
-# Pictures in a file, and HDF5: formats of lib/record.
-modules := frames_mkv
-pc_frames_mkv := libavformat libavcodec libavutil libcrypto
-$(call take_modules,lib/record/mkv/)
-modules := export_hdf5
-pc_export_hdf5 := hdf5 zlib
-$(call take_modules,lib/record/export/hdf5/)
-
 # The keys of rig.conf that an add-on brings, %_settings.c, are libincise's.
 define add_on
 objects_$1 := $$(patsubst %,$(O)/obj/%.o,$$(filter-out %_settings $$(addprefix $$(folder_$1),$$(not_$1) \

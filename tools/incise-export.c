@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <incise/recording.h>
-#include "../lib/record/export/formats.h"
+#include "../lib/publish/formats.h"
 #include "cli/calibration.h"
 #include "cli/cli.h"
 #include "cli/file_kind.h"

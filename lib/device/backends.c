@@ -12,7 +12,7 @@
 #include <string.h>
 #include <sys/stat.h>
 #include "backends.h"
-#include "module.h"
+#include "../base/module.h"
 
 #define BUILT_IN_SIM "sim" /* rig.c opens it, with the simulated world behind it */
 #define SYMBOL "incise_backend"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /* Loading the module outlet_lsl.so; see incise/outlet.h. It stays loaded. */
 #include <incise/outlet.h>
-#include "module.h"
+#include "../base/module.h"
 
 #define FILE_NAME "outlet_lsl.so"
 

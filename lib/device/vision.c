@@ -10,7 +10,7 @@
 #include <stdio.h>
 #include <incise/board.h>
 #include "backends.h"
-#include "module.h"
+#include "../base/module.h"
 
 /* Open the module @kind through its backend: NULL with errno. */
 static void *open_module(const char *kind, const char *packages,

@@ -6,7 +6,7 @@
  */
 #include <errno.h>
 #include <sys/stat.h>
-#include "../device/module.h"
+#include "../base/module.h"
 #include "frames.h"
 
 #define FILE_NAME "frames_mkv.so"

@@ -9,7 +9,7 @@
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
-#include "../device/module.h"
+#include "../base/module.h"
 #include "film.h"
 
 #define FILE_NAME "film_mkv.so"

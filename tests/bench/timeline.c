@@ -9,7 +9,7 @@
  */
 #include <stdio.h>
 #include <stdlib.h>
-#include "../../lib/record/time/timeline.h"
+#include "../../lib/signal/timeline.h"
 #include "program.h"
 #include "noise.h"
 

@@ -9,7 +9,7 @@
 #include <string.h>
 #include <incise/backend.h>
 #include <incise/error.h>
-#include "../../lib/record/export/formats.h"
+#include "../../lib/publish/formats.h"
 #include "cli.h"
 #include "features.h"
 

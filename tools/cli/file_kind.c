@@ -14,7 +14,7 @@
 #include <incise/calibration.h>
 #include <incise/rig.h>
 #include <incise/scene.h>
-#include "../../lib/record/export/formats.h"
+#include "../../lib/publish/formats.h"
 #include "cli.h"
 #include "file_kind.h"
 

@@ -2,7 +2,7 @@
 /*
  * The processes of an MPI job, for training on many computers. A module on Open MPI,
  * ranks_mpi.so, is loaded by incise_ranks_open(); nothing else maps it. All functions are called
- * by all ranks in the same order, from one thread. Part of libincise.
+ * by all ranks in the same order, from one thread. Part of libincise-learn.
  */
 #ifndef INCISE_RANKS_H
 #define INCISE_RANKS_H

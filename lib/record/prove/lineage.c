@@ -11,7 +11,11 @@
 #include <unistd.h>
 #include <incise/model.h>
 #include <incise/origin.h>
+#include <incise/seal.h>
 #include <incise/session.h>
+#include "../read/recalibration.h"
+#include "../read/recording.h"
+#include "../read/session.h"
 #include "prove.h"
 
 #define BLOCK (1 << 20)
@@ -129,6 +133,63 @@ int incise_origins_read(struct incise_origins *origins, const char *path, bool m
 			add_source(origins, line + 8);
 	free(notes);
 	return 0;
+}
+
+/* --- of a recording --------------------------------------------------------------------- */
+
+size_t incise_origin_put(const struct incise_origin *origin, char *text, size_t size,
+			 size_t at)
+{
+	char token[INCISE_ORIGIN_TEXT];
+
+	if (incise_origin_text(origin, token) <= 0 ||
+	    at + (at > 0) + strlen(token) >= size)
+		return at;
+	return at + (size_t)sprintf(text + at, "%s%s", at ? " " : "", token);
+}
+
+/*
+ * Append the head of a recording, and the calibration by which it is read, if it is not that of its
+ * capture. Nothing of one that has no head.
+ */
+static size_t put_origin(struct incise_recording *recording, const char *name, char *text,
+			 size_t size, size_t at)
+{
+	struct incise_origin origin = {.depth = 1, .kind = "recording"},
+			     calibration = {.depth = 2, .kind = "calibration"};
+	struct incise_seal_head head;
+
+	if (incise_seal_head(recording, origin.identity, &head, NULL))
+		return at;
+	strcpy(origin.sha256, head.head);
+	origin.commit = (uint64_t)head.commit;
+	snprintf(origin.name, sizeof(origin.name), "%s", name);
+	at = incise_origin_put(&origin, text, size, at);
+	if (!recording->recalibrated)
+		return at;
+	memcpy(calibration.sha256, recording->recalibrated->entry.sha256,
+	       sizeof(calibration.sha256));
+	snprintf(calibration.name, sizeof(calibration.name), "%s",
+		 basename(recording->recalibrated->entry.file));
+	return incise_origin_put(&calibration, text, size, at);
+}
+
+size_t incise_recording_origins(struct incise_recording *recording, char *text,
+				size_t size)
+{
+	const struct incise_session *session = recording->session;
+	const char *whole = basename(recording->path);
+	char name[512];
+	size_t at = 0;
+
+	*text = 0;
+	if (!session)
+		return put_origin(recording, whole, text, size, 0);
+	for (int i = 0; i < session->n; i++) {
+		snprintf(name, sizeof(name), "%s:%s", whole, session->info[i].name);
+		at = put_origin(session->members[i], name, text, size, at);
+	}
+	return at;
 }
 
 /* --- adding ----------------------------------------------------------------------------- */

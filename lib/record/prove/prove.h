@@ -13,6 +13,7 @@
 #define INCISE_PROVE_PRIVATE_H
 
 #include <limits.h>
+#include <incise/origin.h>
 #include <incise/prove.h>
 #include "../../base/crypto/sha256.h"
 
@@ -31,6 +32,12 @@ struct incise_bytes {
 
 /* The folder of a recording, without its choice: free(3). NULL and the reason. */
 char *incise_proof_folder(const char *path, struct incise_error *err);
+
+/* --- lineage.c -------------------------------------------------------------------------- */
+
+/* Append an origin at @at to @text, of @size; nothing if it does not fit. Returns the new length. */
+size_t incise_origin_put(const struct incise_origin *origin, char *text, size_t size,
+			 size_t at);
 
 /* --- seal_files.c ----------------------------------------------------------------------- */
 

@@ -18,7 +18,7 @@
 #include <incise/recording.h>
 #include "range.h"
 #include "../ledger.h"
-#include "../time/timeline.h"
+#include "../../signal/timeline.h"
 
 struct incise_old;
 struct incise_recalibrated;

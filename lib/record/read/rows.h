@@ -16,7 +16,7 @@
 #include <stdint.h>
 #include <incise/calibration.h>
 #include <incise/error.h>
-#include "../time/fit.h"
+#include "../../signal/fit.h"
 #include "source.h"
 
 /* --- the clock of a session -------------------------------------------------------------- */

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
  * The times of the tracker's rows compared with its arrivals: rows whose t_ns, or whose place on
- * the line in table knots, is not to be trusted; see lib/record/time/fit.h.
+ * the line in table knots, is not to be trusted; see lib/signal/fit.h.
  */
 #include <math.h>
 #include "../read/rows.h"

@@ -22,7 +22,7 @@
 #include "../../base/ring.h"
 #include "../read/cut.h"
 #include "../read/depth.h"
-#include "../time/timeline.h"
+#include "../../signal/timeline.h"
 #include "block_writer.h"
 #include "frame_pump.h"
 #include "wall_sampler.h"

@@ -11,7 +11,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 #include <incise/error.h>
-#include "../time/wall_follow.h"
+#include "../../signal/wall_follow.h"
 
 struct incise_wall_sampler;
 

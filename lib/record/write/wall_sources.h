@@ -7,7 +7,7 @@
 #define INCISE_WALL_SOURCES_H
 
 #include <stdint.h>
-#include "../time/wall_follow.h"
+#include "../../signal/wall_follow.h"
 #include "wall_packets.h"
 
 /*

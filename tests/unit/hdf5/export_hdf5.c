@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Tests of lib/record/export/hdf5/export_hdf5.c: what it wrote is read back through libhdf5's
+ * Tests of lib/publish/hdf5/export_hdf5.c: what it wrote is read back through libhdf5's
  * own interface.
  */
 #include "../unit.h"
@@ -8,7 +8,7 @@
 #include <signal.h>
 #include <hdf5.h>
 #include <incise/outfile.h>
-#include "../../../lib/record/export/table_writer.h"
+#include "../../../lib/publish/table_writer.h"
 
 struct row {
 	int64_t cut;
