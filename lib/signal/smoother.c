@@ -379,7 +379,7 @@ static double lengthen(struct incise_cut_progress *p, const double at_mm[3],
 }
 
 bool incise_cut_progress_add(struct incise_cut_progress *p,
-			 const struct incise_smooth_record *record, double noise_1_s)
+			     const struct incise_smooth_record *record, double noise_1_s)
 {
 	const double two = INCISE_INTERVAL95 * M_SQRT2; /* of a difference */
 	double depth_noise_mm =

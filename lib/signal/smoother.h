@@ -94,6 +94,6 @@ struct incise_cut_progress {
  * advances there. Without a known noise there is none.
  */
 bool incise_cut_progress_add(struct incise_cut_progress *progress,
-			 const struct incise_smooth_record *record, double noise_1_s);
+			     const struct incise_smooth_record *record, double noise_1_s);
 
 #endif
