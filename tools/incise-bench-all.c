@@ -286,7 +286,7 @@ static json_t *begin_report(const struct bench_all_job *job)
 				NULL);
 }
 
-/* Of a report of all benchmarks; that of one is itself. */
+/* The benchmarks in a report of all; a report of one benchmark is itself. */
 static const json_t *benchmarks_of(const json_t *report)
 {
 	const json_t *words = json_object_get(report, "benchmarks");

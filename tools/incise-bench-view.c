@@ -177,7 +177,7 @@ static void fed_view_close(struct fed_view *fed)
 /* The visual rate of paper 1, section 5 ("visual rendering (50Hz)"). */
 #define PAPER_HZ 50.0
 
-/* Of the frames of a run, ms; and the share of those within a period of that rate, %. */
+/* Times of the frames of a run, ms; and the share of frames within a period of that rate, %. */
 struct frame_times {
 	double median, p99, max, in_time;
 };

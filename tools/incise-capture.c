@@ -232,7 +232,7 @@ static void record_rig(const struct capture_options *options, struct incise_rig 
 
 /* --- signature of the rig ---------------------------------------------------------------- */
 
-/* Of a recording that is complete; "" where there is none. */
+/* The seal of a recording that is complete; "" where there is none. */
 struct signing {
 	char *key;		 /* path in rig.conf; NULL: none */
 	char by[160];		 /* kind and fingerprint of the key */

@@ -258,7 +258,7 @@ static json_t *run_command(const struct demo *demo, char *const *argv)
 
 #define RUN(demo, ...) run_command(demo, (char *const[]){__VA_ARGS__, NULL})
 
-/* Of the haptic scalpel: enough for the models of most seeds to come to rest on it. */
+/* Damping of the haptic scalpel: enough for the models of most seeds to come to rest on it. */
 #define DAMPING "0.015"
 
 static void write_scene(const struct demo *demo)

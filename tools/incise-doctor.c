@@ -44,7 +44,7 @@ struct doctor {
 	struct check check[CHECKS_MAX];
 	int n;
 
-	/* Of the rig: its steppers, and the devices that opened. */
+	/* The rig's steppers, and the devices that opened. */
 	char steppers[1000]; /* "kernel:… can:can0:0x10 …" */
 	struct incise_tracker_info tracker;
 	struct incise_force_info force;

@@ -64,7 +64,7 @@ struct evaluator {
 	bool parts;	       /* of the uncertainty */
 };
 
-/* Of the standard deviation, in the order in which they are printed. */
+/* Parts of the standard deviation, in the order in which they are printed. */
 static const char *const part_names[] = {"data", "model", "calibration"};
 
 static void find_parts(const struct evaluator *e, const double *x, double parts[3])
@@ -74,7 +74,7 @@ static void find_parts(const struct evaluator *e, const double *x, double parts[
 	incise_uncertainty_parts(e->uncertainty, e->model, x, &all);
 	parts[0] = all.data;
 	parts[1] = all.model;
-	/* Of the rigs that trained, and of the one that measures. */
+	/* The rigs that trained, and the rig that measures. */
 	parts[2] = hypot(all.calibration, all.rig);
 }
 
@@ -265,7 +265,7 @@ static void open_model(struct evaluator *e, const char *path, const char *arith,
 
 static void eval_file(struct evaluator *e, const char *path)
 {
-	/* Of any size: no line is kept. */
+	/* It may have any size: no line is kept. */
 	static const struct incise_infile_kind points = {
 		.name = "a file of points",
 		.advice = "give a file of lines 'depth velocity'",

@@ -187,7 +187,7 @@ static void export(char **paths, int n, const struct export_job *job,
 	for (int i = 0; i < n; i++) {
 		paths[i] = (char *)file_operand(paths[i], FILE_RECORDING);
 		recordings[i] = recording_open(paths[i]);
-		/* Of a part the blocks that are read are compared with their checksums. */
+		/* Where a part is exported, the blocks that are read are compared with their checksums. */
 		recording_intact(paths[i], !is_part(job), job->damaged, &err);
 		if (err.code)
 			cli_fail_with(&err);

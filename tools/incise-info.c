@@ -413,7 +413,7 @@ static void recording_json(const struct incise_recording_info *info, const char 
 		force && tracker ? json_number(info->force_max_N) : json_null()));
 }
 
-/* Those of a recording, or of a member, to a list. */
+/* Add the calibrations of a recording, or of a member, to a list. */
 static void add_calibrations(json_t *to, const char *path, const char *member)
 {
 	struct incise_recalibration *list;

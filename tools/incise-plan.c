@@ -184,7 +184,7 @@ static json_t *axes_json(struct incise_rig *rig, const struct incise_plan_stabil
 	return axes;
 }
 
-/* Of the model where the slowest of the hands comes to rest; false: not known. */
+/* Find the model's force where the slowest of the hands comes to rest; false: not known. */
 static bool rest_force(const struct plan_job *job, const struct incise_plan_stability *s,
 		       struct model_force *force)
 {
@@ -294,7 +294,7 @@ static void print_weakest(const struct incise_plan_weakest *w)
 		       w->paid);
 }
 
-/* What the search for swings found. */
+/* Print the result of the search for swings. */
 static void print_rest(const struct incise_plan_stability *s)
 {
 	const double *at = s->worst.place_mm;

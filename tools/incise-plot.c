@@ -22,7 +22,7 @@ struct plot_job {
 	bool range;
 };
 
-/* One of its ends may be missing. */
+/* Either end may be missing. */
 static void parse_range(void *whole, char *text)
 {
 	struct plot_job *job = whole;
@@ -90,7 +90,7 @@ static const struct drawn *find_drawn(const char *path)
 			return &drawn[i];
 	}
 	file_expect(path, all);
-	/* Of an interrupted one there is only NAME.rec.part, under the name as well. */
+	/* An interrupted capture left only NAME.rec.part, which opens under the name as well. */
 	if (kind == FILE_UNKNOWN &&
 	    file_kind_of(cli_text("%s.part", path)) == FILE_RECORDING)
 		return &drawn[0];

@@ -194,7 +194,7 @@ static char *path_beside(const char *output, const char *end)
 	return cli_text("%s%s", output, end);
 }
 
-/* Of one source NAME.rec, NAME.fis in this folder; NULL: none. */
+/* The model of one source NAME.rec: NAME.fis in this folder; NULL: none. */
 static const char *default_model(const struct train_options *options)
 {
 	const char *name = strrchr(options->paths[0], '/'), *end;

@@ -116,7 +116,7 @@ static int progress(void *user, double share)
 	return cli_stop;
 }
 
-/* Of the camera's file; null where the recording has none. */
+/* The state of the camera's file; null where the recording has none. */
 static json_t *pictures(const struct incise_verify_report *report)
 {
 	const struct incise_verify_frames *frames = &report->frames;

@@ -16,7 +16,7 @@ struct load {
 	double F_N;
 	double mean_mV; /* of the readings used */
 	int n;
-	/* Of the line: variance of the mean by scatter, common error, and weight. */
+	/* For the line: variance of the mean by scatter, common error, and weight. */
 	double own2, common_mV, weight;
 };
 

@@ -367,7 +367,7 @@ int incise_corpus_survey(struct incise_corpus *corpus,
 
 /* --- for other processes ------------------------------------------------------------- */
 
-/* Of one program on machines of one kind: structs as they are in memory. */
+/* A file for one program on machines of one kind: structs as they are in memory. */
 struct header {
 	char magic[8];
 	int32_t columns, n_surveys;
@@ -673,7 +673,7 @@ static void count_sides(struct incise_corpus *corpus)
 	check->sample.n_groups = check->n_groups;
 }
 
-/* Of all different rows, from those in the sample: keys are spread evenly. */
+/* The number of different rows, from those in the sample: keys are spread evenly. */
 static uint64_t scale_up(const struct incise_corpus *corpus, size_t n)
 {
 	if (corpus->limit == UINT64_MAX)

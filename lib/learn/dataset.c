@@ -306,7 +306,7 @@ static int read_rows(struct dataset_reader *in, struct sink *sink)
 	return rc;
 }
 
-/* Of any size: only the columns that are asked for are kept. */
+/* It may have any size: only the columns that are asked for are kept. */
 static const struct incise_infile_kind csv = {
 	.name = "a CSV file",
 	.advice = "give a CSV file with a header row",

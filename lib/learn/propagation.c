@@ -18,7 +18,7 @@
 /* The smallest share of the noise that is left to the scatter. */
 #define SCATTER_LEAST 0.2
 
-/* One of a source and a recording or calibration. */
+/* A source, with its recording or calibration. */
 struct origin {
 	int source, unit;
 	double sum;	  /* Σ w g */
@@ -47,7 +47,7 @@ struct incise_propagation {
 	double weights, least;			   /* Σ w, smallest w */
 	double own2, own2_least, own2_least_before;
 	uint64_t rows;
-	/* Of the end of the pass before: K, as a triangle of n rows, and the mean squares. */
+	/* The end of the pass before: K, as a triangle of n rows, and the mean squares. */
 	bool has_common;
 	double *common;
 	int n_common;
@@ -241,7 +241,7 @@ double incise_propagation_add(struct incise_propagation *p, const double *row)
 	double g[INCISE_UNCERTAINTY_SOURCES] = {0}, rig2 = 0;
 
 	incise_model_eval_many(p->model, row, 1, &y, slope);
-	/* Of the output less the model. */
+	/* The slopes are of the output less the model. */
 	for (int i = 0; i < p->n_inputs; i++)
 		slope[i] = -slope[i];
 	slope[p->n_inputs] = 1;
@@ -253,7 +253,7 @@ double incise_propagation_add(struct incise_propagation *p, const double *row)
 		else
 			g[p->part[i].source] += v;
 	}
-	/* Of alike pairs each has the weight 1. */
+	/* Each of alike pairs has the weight 1. */
 	w = (p->scatter * p->scatter + fmin(p->own2_least_before, own2)) /
 	    (p->scatter * p->scatter + own2);
 	incise_uncertainty_row(p->model, row, p->phi);

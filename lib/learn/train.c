@@ -225,7 +225,7 @@ static int train_classic(struct learner *l, struct incise_tuning *tuning)
 	return 0;
 }
 
-/* Those of the model, from scaled ones, which become raw. */
+/* Set the model's consequents from scaled ones, which become raw. */
 static int set_consequents(struct learner *l, double *consequents)
 {
 	int rc = incise_scaling_consequents(&l->scaling, l->basis.n_rules, consequents);

@@ -700,7 +700,7 @@ static double force_clock_s(struct incise_recording *force)
 	if (!map ||
 	    incise_source_end(force, "force", false, &seq, &t_ns, NULL, NULL) <= 0)
 		return 0;
-	/* Of a bounded error that is as likely anywhere within. */
+	/* The error is bounded, and as likely anywhere within. */
 	return incise_session_bound(map, t_ns) / sqrt(3) * 1e-9;
 }
 
@@ -745,7 +745,7 @@ static int measure_tracker(struct incise_budget *budget, const struct use *use,
 			      recording->meta.depth, err);
 	if (!rc && use->given)
 		incise_row_times_calibrate(&rows.times, use->given);
-	/* Of the calibration in use: another one has added the difference. */
+	/* The delay is known as the calibration in use says: another one has added the difference. */
 	delay_ns = rc ? 0 : rows.times.source->delay_sd_ns;
 	delay_ns = isnan(delay_ns) ? 0 : delay_ns;
 	delay_ns = sqrt(fmax(0, delay_ns * delay_ns + rows.times.variance_ns2));
@@ -1026,7 +1026,7 @@ void incise_budget_mean_parts(const struct incise_budget_mean *mean, double part
 		if (mean->past2[i] > 0)
 			part[i] = copysign(sqrt(mean->past2[i] + sum * sum), sum) / n;
 	}
-	/* Of fewer than hang together it is that of one. */
+	/* Fewer rows than hang together have the noise of one. */
 	part[FORCE_NOISE] = fmin(part[FORCE_NOISE], sqrt(mean->force2 / n));
 	part[DEPTH_NOISE] = sqrt(mean->depth2 + mean->depth[0] * mean->depth[0] +
 				 mean->depth[1] * mean->depth[1]) /

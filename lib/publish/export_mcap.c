@@ -31,7 +31,7 @@ static int find_start(struct incise_recording *recording, int64_t *start_ns,
 /* By the wall time, else from the wall clock at the start, in whole seconds. */
 static int find_wall(struct incise_messages *messages, struct incise_error *err)
 {
-	/* Of a joined recording that of its clock, whatever is read of it. */
+	/* A joined recording has the wall time of its clock, whatever is read of it. */
 	struct incise_recording *recording =
 		messages->recording->streams[INCISE_LEDGER_WALL]->file;
 	struct incise_error none = {0};
@@ -56,7 +56,7 @@ static int find_wall(struct incise_messages *messages, struct incise_error *err)
 	/* A recording that claims to have it, and has it not, is not to be trusted. */
 	if (!messages->wall && none.code != ENODATA)
 		return incise_error_set(err, none.code, "%s", none.text);
-	/* Of a joined recording, times may be far from the points; they go on from the last. */
+	/* In a joined recording, times may be far from the points; they go on from the last. */
 	if (messages->wall) {
 		const struct incise_wall_point *last;
 		size_t n = incise_wall_points(messages->wall, &last);

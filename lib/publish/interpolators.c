@@ -473,7 +473,7 @@ static double time_in_tissue(const struct incise_blade_pose *blade, int64_t t_ns
 	return before->inside ? (double)(t_ns - before->began_ns) * 1e-9 : 0;
 }
 
-/* Of the line between two values with this noise, and of the time at this speed. */
+/* The uncertainty on the line between two values with this noise, where the time is uncertain at this speed. */
 static double uncertainty(double noise, double share, double time_s, double speed)
 {
 	double line = (1 - share) * (1 - share) + share * share;
@@ -593,7 +593,7 @@ int incise_camera_interpolator_any(struct incise_recording *recording,
 /* Second derivative of the depth at a frame by its neighbours, mm/s²; NAN: not known. */
 static double bend_at(const struct incise_camera_depth *frame)
 {
-	/* Of no frame the time is far off, and the depth not a number. */
+	/* Where there is no frame, the time is far off, and the depth not a number. */
 	double before_s = ((double)frame->t_ns - (double)frame[-1].t_ns) * 1e-9;
 	double after_s = ((double)frame[1].t_ns - (double)frame->t_ns) * 1e-9;
 	double to = (frame[1].depth_mm - frame->depth_mm) / after_s;

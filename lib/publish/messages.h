@@ -29,7 +29,7 @@ struct incise_messages {
 	int64_t wall_ns; /* added to CLOCK_MONOTONIC: nanoseconds since 1970, or 0 */
 	char *text;	 /* of a message */
 	size_t capacity;
-	/* Of the camera: its file, and the frame that was read last. */
+	/* The camera's file, and the frame that was read last. */
 	struct incise_frames_reader *frames;
 	struct incise_camera_frame frame;
 	bool any_frame;

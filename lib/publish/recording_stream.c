@@ -698,7 +698,7 @@ static struct stream *make_stream(const char *path, const char *what,
 	};
 	pthread_mutex_init(&stream->lock, NULL);
 	pthread_cond_init(&stream->changed, NULL);
-	/* Of its own: a connection is for one thread at a time. */
+	/* It opens the recording again: a connection is for one thread at a time. */
 	stream->recording = incise_recording_open(path, err);
 	if (stream->recording)
 		return stream;

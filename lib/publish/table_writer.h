@@ -43,7 +43,7 @@ struct incise_table_column {
 	enum incise_column_type type;
 	int decimals; /* of a real in text; -1: nine digits in all */
 	size_t at;    /* of its value in a row, bytes */
-	/* Of an uncertainty: the column that it is of, and the rows that share it; else NULL. */
+	/* An uncertainty names its column, and the rows that share it; else NULL. */
 	const char *of, *correlation;
 	const struct incise_provenance *calibration; /* that enters the values, or NULL */
 };
@@ -103,7 +103,7 @@ struct incise_table {
 	int n_names;
 	char *texts; /* of the block, each with its NUL */
 	size_t texts_size, texts_used;
-	/* Of messages: what open() has opened, and the one that has the present row; see streams.h. */
+	/* For messages: the streams that open() has opened, and the one that has the present row; see streams.h. */
 	struct incise_stream_rows *streams, *stream;
 	int n_streams;
 	void *state; /* of the format */

@@ -96,7 +96,7 @@ int64_t incise_ledger_find(sqlite3 *db, const char *stream, bool by_time, int64_
 		const int64_t middle = low + (high - low) / 2;
 
 		sqlite3_bind_int64(stmt, 2, middle);
-		/* Of forged ones, too, the way gets shorter with each step. */
+		/* The way gets shorter with each step, with forged rows too. */
 		if (sqlite3_step(stmt) == SQLITE_ROW &&
 		    sqlite3_column_int64(stmt, 1) < value &&
 		    sqlite3_column_int64(stmt, 0) >= middle &&

@@ -27,7 +27,7 @@ struct incise_schema_table {
 	const char *name, *sql;
 };
 
-/* Of today's format; the last has no name. */
+/* Tables of today's format; the last has no name. */
 extern const struct incise_schema_table incise_schema_tables[];
 
 /* Check that it has these tables. Returns as incise_schema_form(). */

@@ -8,9 +8,9 @@
 #include "seal_chain.h"
 #include "statement.h"
 
-/* Of rows, or of blocks. */
+/* The first line of a chain over rows, or over blocks. */
 #define GENESIS(old) ((old) ? "incise seal 1\n" : "incise seal 2\n")
-/* Of table depth, which today's format has not. */
+/* Reads nothing in place of table depth, which today's format has not. */
 #define NO_ROWS "SELECT 1 WHERE 0"
 
 /*

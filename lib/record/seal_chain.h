@@ -88,7 +88,7 @@ int incise_seal_table(const struct incise_seal *seal, sqlite3 *db,
 		      enum incise_seal_number part, uint64_t *rows,
 		      uint8_t digest[INCISE_SEAL_BYTES]);
 
-/* That of camera.mkv: its head, and its length, 0 where it is not known. Returns 0 or -errno. */
+/* Compute the digest of camera.mkv: its head, and its length, 0 where it is not known. Returns 0 or -errno. */
 int incise_seal_file(int fd, int64_t length, uint8_t digest[INCISE_SEAL_BYTES]);
 
 #endif

@@ -175,6 +175,10 @@ void incise_plan_copy(struct incise_plan *copy, const struct incise_plan *plan,
 void incise_plan_input_range(const struct incise_plan *plan,
 			     enum incise_cutting_phase phase, int i, double ends[2]);
 
+/* The range of an input over the models that have it. Returns whether any has. */
+bool incise_plan_kind_range(const struct incise_plan *plan, enum incise_model_input kind,
+			    double ends[2]);
+
 /* Scale all numbers of a checked plan that go with the gain. incise_plan_set_numbers() takes it over. */
 void incise_plan_set_gain(struct incise_plan *plan, double gain);
 
@@ -216,12 +220,12 @@ char incise_plan_pose_flag(const struct incise_plan *plan) INCISE_REALTIME;
 const char *incise_plan_fault(const struct incise_plan *plan);
 
 /*
- * Compute the scene's stability on this device, and whether it is stable, with
- * the plan's predictor.
- * Returns 0; -EDOM (not stable: the message names the largest gain), -ENOMEM.
+ * Find the numbers of the scene's stability on this device.
+ * Returns 0; -EDOM (they are outside of what can be checked), -ENOMEM.
  */
-int incise_plan_check(struct incise_plan *plan, const struct incise_tracker_info *tracker,
-		      struct incise_error *err);
+int incise_plan_survey(struct incise_plan *plan,
+		       const struct incise_tracker_info *tracker,
+		       struct incise_error *err);
 
 /*
  * Of a plan that is ready to run: whether a scene with a model comes to rest, by a search.

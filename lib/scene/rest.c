@@ -12,6 +12,16 @@
 #include "../control/plant.h"
 #include "rest.h"
 
+void incise_plan_copy(struct incise_plan *copy, const struct incise_plan *plan,
+		      double gain)
+{
+	*copy = *plan;
+	copy->integers = NULL;
+	copy->ops = incise_double_ops;
+	incise_plan_set_gain(copy, gain);
+	incise_plan_set_numbers(copy);
+}
+
 /*
  * A run: in the air until the force's ramp has ended, then the hand leans. It ends when nothing moved for two
  * windows, or little and ever less, or with a quarter without a swing. If the swing of the last quarter is not less

@@ -123,7 +123,7 @@ static void find_fast(struct fit *fit)
 	}
 }
 
-/* Of a lower one: hardly any two are a period apart, nor do many arrive together. */
+/* Find a lower rate: hardly any two rows are a period apart, nor do many arrive together. */
 static void find_slow(struct fit *fit)
 {
 	size_t close = 0, together = 0, marked = 0;

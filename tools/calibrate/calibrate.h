@@ -45,7 +45,7 @@ struct calibrate {
 		0, "json", NULL, "report as JSON", CLI_FLAG(type, common.json)           \
 	}
 
-/* What is a calibration's own; @run is the command's struct. */
+/* The functions of one kind of calibration; @run is the command's struct. */
 struct calibrate_kind {
 	const char *name; /* of the record */
 	const struct cli_command *command;

@@ -123,7 +123,7 @@ bool depth_is_recording(const char *path)
 {
 	struct stat st;
 
-	/* One that is not there fails by its name. */
+	/* A recording that is not there fails by its name. */
 	return cli_ends_with(path, ".rec") || (!stat(path, &st) && S_ISDIR(st.st_mode));
 }
 

@@ -73,7 +73,7 @@ static double round_up(double value)
 #define DIVISIONS 4
 #define IGNORED 0.05 /* of the range: noise beyond a round number moves no end */
 
-/* Of the columns that are shown, with 0, between round numbers that seldom change. */
+/* The axis of the columns that are shown, with 0, between round numbers that seldom change. */
 static struct axis axis_of(const struct trace *trace, int dots)
 {
 	double low = 0, high = 0, range, step;

@@ -245,7 +245,7 @@ const char *cli_rig_passed_over(int i);
 /* Open that rig with some devices (INCISE_RIG_TRACKER, …), or fail. */
 struct incise_rig *cli_open_rig(const char *given, unsigned int devices);
 
-/* Of the command that runs, such as "calibrate force"; "" before cli_parse(). */
+/* Name of the command that runs, such as "calibrate force"; "" before cli_parse(). */
 const char *cli_command_name(void);
 
 /* The folder of this program, and of the other commands; lives as long as the program. */

@@ -13,7 +13,7 @@
 #include "scene_argument.h"
 #include "state_folder.h"
 
-/* Of the word that is completed, what stays in front: "--rig=", "force,". */
+/* The part of the word that is completed that stays in front: "--rig=", "force,". */
 static const char *front = "";
 
 void complete_word(const char *word, const char *description)

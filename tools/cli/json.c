@@ -11,7 +11,7 @@
 #include "cli.h"
 #include "json.h"
 
-/* Of every report; a report whose keys change their meaning gets another. */
+/* Version of every report; a report whose keys change their meaning gets another. */
 #define SCHEMA_VERSION 1
 
 #define READ_MOST (16 << 20) /* a report of all benches has less than 1 */

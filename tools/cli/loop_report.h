@@ -30,7 +30,7 @@ double loop_quantile(const uint64_t *histogram, double share, double unit);
 /* "< 74 us", or that it lies beyond the histogram; text is the caller's. */
 const char *loop_below(char *text, size_t size, double us);
 
-/* Of the wake-ups, µs, with the histogram. */
+/* Lateness of the wake-ups, µs, with the histogram. */
 json_t *loop_lateness_json(const struct incise_loop_stats *stats);
 
 /* The line "lateness". */

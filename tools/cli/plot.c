@@ -140,7 +140,7 @@ FILE *plot_begin(const char *folder, const char *name, int width, int height)
 {
 	FILE *script;
 
-	/* Of a folder for a while, or reserved already. */
+	/* The place of a folder for a while, or reserved already. */
 	reserve(folder, name, cli_output_part);
 	script = open_plot(folder, name, ".gp");
 	write_style(folder);

@@ -62,7 +62,7 @@ bool recording_intact(const char *path, bool samples, bool damaged,
 	return false;
 }
 
-/* Those of a joined recording: the folders in it with a recording, each with nothing else. */
+/* Remove the members of a joined recording: the folders in it with a recording, each with nothing else. */
 static void remove_members(const char *path)
 {
 	char *pattern = cli_text("%s/*/recording.db", path);
@@ -78,7 +78,7 @@ static void remove_members(const char *path)
 	free(pattern);
 }
 
-/* Those of incise recalibrate, in a folder of their own. */
+/* Remove the calibrations of incise recalibrate, in a folder of their own. */
 static void remove_calibrations(int folder, const char *path)
 {
 	struct incise_recalibration *list;

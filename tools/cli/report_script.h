@@ -12,7 +12,7 @@
 
 #define REPORT_PYTHON "/usr/bin/python3"
 
-/* Of a script, "measure": free(3). */
+/* Path of a script, "measure": free(3). */
 char *report_script_path(const char *name);
 
 /*

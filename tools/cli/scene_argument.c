@@ -89,7 +89,7 @@ void scene_argument_missing(const char *name)
 		names[n++] = one;
 		all = cli_text("%s%s%s", all, n > 1 ? ", " : "", one);
 	}
-	/* Of "liver.scen" only "liver". */
+	/* Compare "liver" only, for "liver.scen". */
 	nearest = incise_nearest_name(cli_text("%.*s", (int)strcspn(name, "."), name),
 				      names);
 	if (nearest)

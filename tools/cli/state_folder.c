@@ -53,7 +53,7 @@ int state_folder_choose(char *const list[STATE_FOLDERS])
 	for (int i = 0; i < STATE_FOLDERS; i++) {
 		if (!list[i])
 			continue;
-		/* That of the system has a group, so the package makes it. */
+		/* The system's folder has a group, so the package makes it. */
 		if (i != STATE_FOLDER_SYSTEM)
 			mkdir(list[i], 0700);
 		if (is_folder(list[i]) && state_folder_trusted(list, i) &&

@@ -23,10 +23,10 @@ void stopwatch_sort(double *times, int n);
  * takes 1000. The median takes one. */
 bool stopwatch_resolves(uint64_t n, double q);
 
-/* Of sorted times: nearest rank; q from 0 to 1. NaN if they are too few, see above. */
+/* Quantile of sorted times: nearest rank; q from 0 to 1. NaN if they are too few, see above. */
 double stopwatch_quantile(const double *sorted, int n, double q);
 
-/* Of sorted times: mean of the middle half, which is finer than the clock's steps. */
+/* Mean of the middle half of sorted times, which is finer than the clock's steps. */
 double stopwatch_middle(const double *sorted, int n);
 
 #endif

@@ -26,7 +26,7 @@ char *demo_path(const struct demo *demo, const char *name)
 	return cli_text("%s/%s", demo->folder, name);
 }
 
-/* Of pairs those that the models learned. */
+/* The pairs that the models learned. */
 #define ADVANCING "advancing"
 
 /* Without the rows whose number in the column @where is 0, if it is not NULL. */
@@ -290,7 +290,7 @@ static void figure_force(const struct demo *demo)
 
 /* ---- Figure 3: membership functions and the force surface ---- */
 
-/* Of the training of the paper, which moves them; the default one keeps them. */
+/* Draw the memberships of the paper's training, which moves them; the default one keeps them. */
 static void figure_membership(const struct demo *demo)
 {
 	struct incise_model *before = demo_model(demo, "paper-initial.fis");
@@ -351,7 +351,7 @@ static void figure_prediction(const struct demo *demo)
 {
 	static const char *const ticks[] = {"t_s", "depth_mm", "command_N", "rendered_N"};
 	static const char *const columns[] = {"t_s", "measured_N", "predicted_N"};
-	/* Of the ticks of a replay those in its cut. */
+	/* The ticks of a replay that are in its cut. */
 	struct incise_dataset *cut =
 		read_dataset(demo, "new-cut-replay.csv", columns, 3, NULL, "cut");
 	struct incise_dataset *log =

@@ -18,7 +18,7 @@
 #define CAPACITY 4096  /* of the ring: 4 s at 1 kHz */
 #define ALTERNATE_MM 5 /* a step that a tool makes at hardly any pose */
 #define LIMIT_MM 1e6
-/* Of products of columns: a sender may print three digits; a scale of 1 % is an error. */
+/* Limit of products of columns: a sender may print three digits; a scale of 1 % is an error. */
 #define ORTHONORMAL 2e-3
 #define WINDOW_NS INT64_C(5000000000)
 #define DELAY_MAX_NS INT64_C(1000000000) /* more is another clock, not a delay */
@@ -324,7 +324,7 @@ static int read_position(const struct incise_igtl_message *message, double matri
 	}
 	for (int i = 0; i < (int)message->n / 4 - 3; i++)
 		q[i] = position.quaternion[i];
-	/* Of a quaternion with three numbers, w is what makes it a unit. */
+	/* A quaternion with three numbers is a unit by its w. */
 	if (message->n == IGTL_POSITION_MESSAGE_WITH_QUATERNION3_SIZE)
 		q[3] = sqrt(fmax(0, 1 - q[0] * q[0] - q[1] * q[1] - q[2] * q[2]));
 	return set_rotation(matrix, q);

@@ -446,7 +446,7 @@ static int open_encoder(struct writer *w)
 	c->pix_fmt = planes_format(w->shape.pixels);
 	w->planes->format = c->pix_fmt;
 	c->time_base = (AVRational){1, 1000};
-	/* One that works ahead would keep frames. */
+	/* A decoder that works ahead would keep frames. */
 	c->thread_count = 1;
 	rc = avcodec_open2(c, codec, NULL);
 	return rc ? rc : av_frame_get_buffer(w->planes, 0);

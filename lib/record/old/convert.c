@@ -52,7 +52,7 @@ static int fail_convert(struct conversion *c, struct incise_error *err)
 {
 	const int code = incise_schema_errno(c->writer.db);
 
-	/* One that was just made is not damaged. */
+	/* A file that was just made is not damaged. */
 	if (code == EINVAL)
 		return incise_schema_fail(c->writer.db, c->old->path, err);
 	return incise_error_set(err, code,

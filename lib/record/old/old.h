@@ -23,7 +23,7 @@
 struct incise_verification;
 struct incise_verify_walk;
 
-/* Of an opened recording. */
+/* The part of an opened recording that is of an old format. */
 struct incise_old {
 	/* As in source.h: open a stream, its last rows first or from a number on; an SQLite code. */
 	int (*open)(struct incise_source *source, int64_t from_seq, bool from_end);
@@ -60,7 +60,7 @@ struct incise_old_rows {
 	uint8_t bytes[20 * 8];
 };
 
-/* Those of a stream, in order. Returns an SQLite code; close them in any case. */
+/* Open the rows of a stream, in order. Returns an SQLite code; close them in any case. */
 int incise_old_rows_open(struct incise_old_rows *rows, struct incise_recording *recording,
 			 int stream);
 

@@ -54,7 +54,7 @@ void incise_origins_free(struct incise_origins *origins)
 
 /* --- reading ---------------------------------------------------------------------------- */
 
-/* Those that stand in the bytes of a file. */
+/* Read the origins that stand in the bytes of a file. */
 static int read_tokens(struct incise_origins *origins, const char *path,
 		       struct incise_error *err)
 {

@@ -394,7 +394,7 @@ static int check_seal(struct prove *prove, struct incise_proof_seal *seal,
 	struct incise_error err = {.text = ""};
 	int rc = seal->join ? 0 : read_head(seal, &err);
 
-	/* One that cannot be read is a finding of its verification. */
+	/* A recording that cannot be read is a finding of its verification. */
 	if (rc && options->level == INCISE_PROVE_SEALS) {
 		*prove->err = err;
 		return rc;
@@ -457,7 +457,7 @@ static int find_seals(struct prove *prove)
 {
 	struct incise_proof *proof = prove->proof;
 	char *folder = incise_proof_folder(prove->path, prove->err);
-	/* One that does not open is plain, and says why later. */
+	/* A recording that does not open is plain, and says why later. */
 	struct incise_recording *recording =
 		folder ? incise_recording_open_as(folder, INCISE_RECORDING_ACTIVE, NULL)
 		       : NULL;

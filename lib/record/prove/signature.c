@@ -318,7 +318,7 @@ static int check_signers(struct check *check, struct incise_proof_voucher *vouch
 	for (char *save,
 	     *signer = keygen.good ? strtok_r(keygen.out, "\r\n", &save) : NULL;
 	     signer && !good && !rc; signer = strtok_r(NULL, "\r\n", &save)) {
-		/* Those that a pattern leaves out are listed, too. */
+		/* Signers that a pattern leaves out are listed, too. */
 		if (*signer == '!')
 			continue;
 		rc = check_signer(check, voucher, signer, check->fd[REVOKED] >= 0, &good,

@@ -205,7 +205,7 @@ static bool names_a_file(const char *journal)
 	return does;
 }
 
-/* What SQLite needs of the files beside a database: of one that is being written its log alone. */
+/* Whether SQLite needs a file beside a database: of one that is being written its log alone. */
 static bool needs(const struct found *found, enum beside with, bool written)
 {
 	return with == LOG ? written || found->beside_size[LOG]

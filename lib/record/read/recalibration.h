@@ -16,7 +16,7 @@
 #include <incise/recalibration.h>
 #include "recording.h"
 
-/* Of a recording that is read by another calibration than that of its capture. */
+/* The calibration by which a recording is read, if it is not the capture's. */
 struct incise_recalibrated {
 	struct incise_recalibration entry;
 	struct incise_calibration calibration; /* delays NAN: those of the capture */

@@ -19,7 +19,7 @@
 #define TIP_MAX_MM 1e6
 /* 146 years: times and their differences stay below 2^63. */
 #define TIME_MAX (INT64_MAX / 2)
-/* Of a tracker, as of incise_timeline_setup; and an hour. */
+/* Ranges of a tracker's rate, as in incise_timeline_setup, and of an hour. */
 #define RATE_MIN 1e-3
 #define RATE_MAX 1e7
 #define DELAY_MAX_MS 3.6e6
@@ -331,7 +331,7 @@ int incise_recording_streams(struct incise_recording *rec,
 						    &streams[i]);
 		return rec->n_table;
 	}
-	/* Those of a session: each of the member that it is of. */
+	/* The streams of a joined recording: each is one of a member. */
 	for (int i = 0; i < INCISE_STREAMS_MAX; i++) {
 		struct incise_stream of_member[INCISE_STREAMS_MAX];
 		int found =

@@ -33,7 +33,7 @@ struct incise_stream_source {
 	bool known; /* the rest; else a table is damaged: incise_stream_resolve() says which */
 	/* Subtracted while recording, NAN: not known; and of times without a line. */
 	double delay_ns, delay_sd_ns, offset_sd_ns;
-	/* Of times, by the active calibration. */
+	/* The active calibration changes times by this, with this variance. */
 	int64_t shift_ns;
 	double variance_ns2;
 	/* Its line; 0 knots: the times of the rows are the best. */
@@ -73,13 +73,13 @@ struct incise_recording {
 	/* The calibration that it is read by, if not that of its capture; see recalibration.h. */
 	struct incise_recalibrated *recalibrated;
 	struct incise_recording_range range; /* of rows that are opened */
-	/* Of a session: its members; then db has the events only, and path the choice too. */
+	/* A joined recording's members; then db has the events only, and path the choice too. */
 	struct incise_session *session;
 };
 
 /* --- one recording --------------------------------------------------------------------- */
 
-/* One whose folder this is, without anything read; NULL: no memory. */
+/* Make a recording with this folder, without anything read; NULL: no memory. */
 struct incise_recording *incise_recording_new(char *folder);
 
 /* Read it. Returns 0; 1: its database is that of a joined one, and open; -errno. */

@@ -15,7 +15,7 @@
 #include "rows.h"
 
 #define ROWS_MAX 100000000 /* of a stream: an hour at 27 kHz */
-/* Of pairs of depths: the least quality, and the least depth; a blade may be in the air above. */
+/* Least quality and depth of a pair of depths; a blade may be in the air above. */
 #define PAIR_QUALITY 0.5
 #define PAIR_DEPTH_MM 1.0
 

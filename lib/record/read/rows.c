@@ -362,7 +362,7 @@ double incise_row_times_sd(const struct incise_row_times *times, int64_t seq)
 		source && source->n_knots
 			? on_line_ns
 			: known(source ? source->offset_sd_ns : 0, known(on_line_ns, 0));
-	/* Of a bounded error that is as likely anywhere within. */
+	/* The error is bounded, and as likely anywhere within. */
 	double map_ns = times->map ? incise_session_bound(times->map, times->own_ns) : 0;
 	double variance = sd_ns * sd_ns + times->variance_ns2 + map_ns * map_ns / 3;
 
@@ -476,7 +476,7 @@ int incise_rows_first(const struct incise_rows *rows, int64_t *first_ns,
 	return rc < 0 ? rc : 0;
 }
 
-/* Of events no other than these types; of a stream the batch has checked them. */
+/* Take events of these types only; the batch has checked a stream's rows. */
 static bool take_rows(struct incise_rows *rows)
 {
 	if (rows->stmt && (sqlite3_column_type(rows->stmt, 1) != SQLITE_INTEGER ||
@@ -497,7 +497,7 @@ int incise_rows_next(struct incise_rows *rows, struct incise_error *err)
 	if (!rows->ended)
 		rc = step_rows(rows, err);
 
-	/* Of the first block, or of what a filter needs. */
+	/* Rows of the first block come before, or rows that a filter needs. */
 	while (rc > 0 && own_ns(rows) < rows->begin_ns) {
 		rows->live = true;
 		rc = step_rows(rows, err);

@@ -53,7 +53,7 @@ double incise_session_bound(const struct incise_session_map *map, int64_t t_ns);
 struct incise_row_times {
 	const struct incise_stream_source *source; /* NULL: of events */
 	struct incise_others *others; /* rows that are timed otherwise, or NULL */
-	/* Of the source, or by another calibration. */
+	/* As the source has it, or by another calibration. */
 	int64_t shift_ns;
 	double variance_ns2;
 	bool may_repeat;		      /* equal times are allowed */

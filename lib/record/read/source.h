@@ -27,7 +27,7 @@ int incise_source_find(const char *table);
 /* The columns of a stream's batches. */
 const struct incise_ledger_form *incise_source_form(int stream);
 
-/* That of a recording with the rows; those of depth are the tracker's. */
+/* The stream of a recording that has the rows; depth has the tracker's. */
 struct incise_stream_source *incise_source_stream(
 	const struct incise_recording *recording, int stream);
 
@@ -41,7 +41,7 @@ struct incise_source {
 	size_t rows_max; /* of a batch, where the file has no blocks */
 	bool ended;	 /* another step would begin anew */
 	bool held; /* the statement is at a row that did not fit, or a block that did not follow */
-	/* Of blocks: the number of the next one, -1: not known; and the last number and time of the one before. */
+	/* The number of the next block, -1: not known; and the last number and time of the block before. */
 	int64_t next, last_seq, last_ns;
 	struct incise_source_depth *depth; /* what it is made of */
 	double scale; /* of depths by vision, of another calibration */

@@ -91,7 +91,7 @@ static void check_names(struct incise_verification *verify)
 				    "the ledger has entries of unknown streams");
 }
 
-/* Of a stream's first or last entry with rows: entries follow one another, and all would be long to read. */
+/* A field of a stream's first or last entry with rows: entries follow one another, and all would be long to read. */
 #define END(field, order)                                                  \
 	"(SELECT " field " FROM blocks WHERE stream = name AND count > 0 " \
 	"ORDER BY block " order " LIMIT 1)"
@@ -125,7 +125,7 @@ static void report_ends(struct incise_verification *verify)
 	}
 }
 
-/* One that was converted as it was does not become good by that. */
+/* A damaged recording that was converted as it was does not become good by that. */
 static void report_conversion(struct incise_verification *verify)
 {
 	sqlite3_stmt *stmt = NULL;
@@ -402,7 +402,7 @@ int incise_verify_recording(struct incise_recording *recording,
 	if (rc)
 		return incise_error_set(err, ECANCELED, "%s: stopped; not verified",
 					recording->path);
-	/* Of altered rows nothing follows. */
+	/* Nothing follows from altered rows. */
 	if (!verify.altered && level != INCISE_VERIFY_TABLES)
 		incise_verify_times(&verify);
 	report_ends(&verify);

@@ -215,7 +215,7 @@ static void compare_statement(struct verify_seal_walk *walk,
 			incise_verify_s(verify, walk->last_ns),
 			incise_verify_s(verify, was->last.t_ns));
 	}
-	/* Of fewer commits all digests are others. */
+	/* With fewer commits all digests are others. */
 	n = fewer && !differs
 		    ? 0
 		    : compare_parts(verify, was, is, same, from, differs ? to : NULL);

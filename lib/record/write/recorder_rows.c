@@ -166,7 +166,7 @@ int incise_recorder_find_silence(struct incise_recorder *rec, struct incise_erro
 
 		if (!stream->rows || *stream->ended || !began_ns)
 			continue;
-		/* Of those at an end the device may have counted some. */
+		/* The device may have counted some of the rows that are missing at an end. */
 		counted = stream->device_lost > since ? stream->device_lost - since : 0;
 		late = missing_in(stream->first_row_ns - began_ns, rates_hz[i]);
 		early = camera ? 0

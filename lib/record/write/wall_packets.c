@@ -167,7 +167,7 @@ static bool read_properties(struct incise_ptp_state *state, const uint8_t *data)
 
 static bool read_port(struct incise_ptp_state *state, const uint8_t *data)
 {
-	/* One that runs free never becomes more than uncalibrated, as it sets no clock. */
+	/* A daemon that runs free never becomes more than uncalibrated, as it sets no clock. */
 	state->slave |= data[10] == PTP_SLAVE || data[10] == PTP_UNCALIBRATED;
 	state->master |= data[10] == PTP_MASTER;
 	return true;

@@ -21,7 +21,7 @@
 /* 2027-01-15 08:00 */
 #define SIMULATED_S 1.8e9
 #define CHRONY_PORT 323
-/* Of a program that was named, to answer once. */
+/* The time that a program that was named has to answer once. */
 #define ANSWER_NS (2 * INCISE_NS_PER_S)
 
 enum { PTP, CHRONY, KERNEL, KINDS };
@@ -30,7 +30,7 @@ struct incise_wall_sampler {
 	bool real;
 	bool use[KINDS];
 	struct incise_wall_peer ptp, chrony;
-	/* Of a simulated clock: TAI at its time 0, s; its rate; the bound. */
+	/* A simulated clock: TAI at its time 0, s; its rate; the bound. */
 	double tai_s, rate_ppm, bound_us;
 	int64_t next_ns;
 	struct incise_wall_follow follow;
@@ -322,7 +322,7 @@ static struct incise_wall_sampler *make(bool real)
 
 int incise_recorder_check_clock_source(const char *source, struct incise_error *err)
 {
-	/* Of the clock that the source is for. */
+	/* The sampler is for the clock that the source is for. */
 	struct incise_wall_sampler *made = make(strncmp(source, "sim", 3) != 0);
 	bool wanted;
 	int rc;
