@@ -2,7 +2,7 @@
 # Fuzz targets: tests/fuzz/NAME.c defines LLVMFuzzerTestOneInput() and is found by its name
 # (tests/fuzz/mutate.c runs them without libFuzzer, for `make check`);
 # tests/fuzz/NAME/ holds inputs that are always tried first: starting points, and those that
-# once failed. A target is linked to all of lib/fixed; fuzz_NAME names sources beside that.
+# once failed. A target is linked to what it uses of the library.
 #
 #   make check-fuzz FUZZ_RUNS=10000000    longer
 #   build/tests/fuzz/NAME FILE            one input again
@@ -20,66 +20,30 @@ $(O)/obj/fuzz/%.o: %.c
 	@mkdir -p $(@D)
 	$(call step,CC)
 	$(Q)$(CCACHE) $(CLANG) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) -Wno-missing-prototypes \
-		$(fuzz_flags) -fsanitize=fuzzer-no-link -MMD -MP -c -o $@ $<
+		$(test_cflags) $(fuzz_flags) -fsanitize=fuzzer-no-link -MMD -MP -c -o $@ $<
 
 $(O)/obj/fuzz/%.o: %.cc
 	@mkdir -p $(@D)
 	$(call step,CC)
 	$(Q)$(CCACHE) $(CLANG) $(cppflags) $(CPPFLAGS) $(cxxflags) $(flags_vision_opencv) \
-		$(fuzz_flags) -fsanitize=fuzzer-no-link -MMD -MP -c -o $@ $<
+		$(test_cflags) $(fuzz_flags) -fsanitize=fuzzer-no-link -MMD -MP -c -o $@ $<
 
-# Further sources of a target.
-fuzz_vision_frame := lib/base/error.c lib/device/vision.c lib/base/module.c tests/vision/linked.c \
-	$(wildcard lib/vision/*.c lib/vision/*.cc)
-fuzz_libs_vision_frame := $(libs_vision_opencv)
-fuzz_slcan_line := lib/device/can/bus/slcan_protocol.c
-fuzz_can_frames := lib/base/error.c $(wildcard lib/device/can/canopen/*.c lib/device/can/cia402/cia402*.c)
+# The library as unit tests link it, and the reader of sessions, by clang and with the fuzzer's own instructions; a target maps what it uses.
+fuzz_lib := $(O)/obj/fuzz/lib.a
+$(fuzz_lib): $(patsubst $(O)/obj/%,$(O)/obj/fuzz/%,$(unit_lib_objects)) \
+		$(addprefix $(O)/obj/fuzz/tools/,$(addprefix session/,digest.o judge.o session_file.o) \
+		$(addprefix cli/,json.o loop_report.o stopwatch.o))
+	@rm -f $@
+	$(call step,AR)
+	$(Q)$(AR) qcs $@ $^
 
-fuzz_polhemus_records := lib/base/error.c lib/base/ring.c lib/device/pose_flags.c lib/device/tracker_feed.c \
-	$(addprefix lib/device/polhemus/polhemus_,model.c records.c stream.c)
-fuzz_polhemus_status := lib/base/error.c lib/device/polhemus/polhemus_dialogue.c
+# It plays a function of the library; see $(O)/tests/kept/vision_frame.
+$(O)/tests/fuzz/vision_frame: $(O)/obj/fuzz/tests/vision/linked.o
 
-fuzz_igtl_stream := lib/device/igtl/igtl_message.c
-fuzz_igtl_poses := $(addprefix lib/base/,error.c ring.c) \
-	$(addprefix lib/device/,pace.c tracker_feed.c igtl/igtl_message.c igtl/igtl_poses.c)
-fuzz_libs_igtl_stream := $(libs_tracker_igtl)
-fuzz_libs_igtl_poses := $(libs_tracker_igtl)
-
-fuzz_wall_packets := $(addprefix lib/record/write/wall_,packets.c kernel.c)
-
-fuzz_statement := lib/base/error.c lib/record/statement.c
-fuzz_block := lib/record/batch.c lib/record/ledger.c lib/base/crc32c.c
-fuzz_libs_block = $(shell $(PKG_CONFIG) --libs sqlite3)
-fuzz_origin := lib/record/prove/origin.c
-fuzz_timestamp_reply := lib/base/error.c lib/base/infile.c lib/base/crypto/sha256.c lib/record/prove/timestamp.c
-fuzz_libs_timestamp_reply = $(shell $(PKG_CONFIG) --libs libcrypto)
-
-fuzz_state_page := lib/base/error.c $(addprefix lib/loop/state_,file.c page.c reader.c)
-
-# A scene is read with all that it names.
-fuzz_scene_file := $(filter-out lib/fixed/%,$(call sources,incise))
-fuzz_libs_scene_file = $(pc_libs_incise) $(libs_incise) -pthread
-fuzz_calibration_text := $(fuzz_scene_file)
-fuzz_libs_calibration_text = $(fuzz_libs_scene_file)
-fuzz_settings := $(fuzz_scene_file)
-fuzz_libs_settings = $(fuzz_libs_scene_file)
-fuzz_sd_file := $(fuzz_scene_file)
-fuzz_libs_sd_file = $(fuzz_libs_scene_file)
-fuzz_session_file := $(fuzz_scene_file) $(addprefix tools/session/,digest.c judge.c \
-	session_file.c) tools/cli/json.c tools/cli/loop_report.c tools/cli/stopwatch.c
-fuzz_libs_session_file = $(fuzz_libs_scene_file) $(shell $(PKG_CONFIG) --libs jansson)
-fuzz_factor_file := $(fuzz_scene_file) lib/base/crypto/sha256.c $(wildcard lib/learn/*.c)
-fuzz_libs_factor_file = $(fuzz_libs_scene_file) $(shell $(PKG_CONFIG) --libs $(pc_incise-learn))
-
-fuzz_core := $(patsubst %.c,$(O)/obj/fuzz/%.o,$(wildcard lib/fixed/*.c))
-define fuzz_program
-$(O)/tests/fuzz/$1: $(O)/obj/fuzz/tests/fuzz/$1.o $(fuzz_core) \
-		$$(addprefix $(O)/obj/fuzz/,$$(addsuffix .o,$$(basename $$(fuzz_$1))))
-	@mkdir -p $$(@D)
-	$$(call step,LD)
-	$$(Q)$$(CLANG) $$(fuzz_flags) -fsanitize=fuzzer -o $$@ $$^ $$(fuzz_libs_$1) -lm
-endef
-$(foreach name,$(fuzz_targets),$(eval $(call fuzz_program,$(name))))
+$(fuzz_programs): $(O)/tests/fuzz/%: $(O)/obj/fuzz/tests/fuzz/%.o $(fuzz_lib)
+	@mkdir -p $(@D)
+	$(call step,LD)
+	$(Q)$(CLANG) $(fuzz_flags) -fsanitize=fuzzer -o $@ $(filter %.o,$^) $(fuzz_lib) $(test_libs) -lm
 
 # Whether there is a clang, and its libFuzzer with it, which is a package of its own.
 has_fuzzer = $(if $(CLANG),$(shell echo 'int LLVMFuzzerTestOneInput(void) { return 0; }' | \

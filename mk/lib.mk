@@ -117,8 +117,9 @@ left-out-%:
 
 # For unit tests, which reach into what the shared objects hide.
 # q, not r: device/vision.c and vision/vision.cc are both vision.o.
-$(O)/lib/libincise-tests.a: $(foreach lib,$(libraries),$(call objects,$(lib))) $(crypto_objects) \
-		$(sort $(foreach name,$(add_ons),$(objects_$(name)))) $(O)/obj/tests/vision/scalpel_picture.o
+unit_lib_objects := $(foreach lib,$(libraries),$(call objects,$(lib))) $(crypto_objects) \
+	$(sort $(foreach name,$(add_ons),$(objects_$(name)))) $(O)/obj/tests/vision/scalpel_picture.o
+$(O)/lib/libincise-tests.a: $(unit_lib_objects)
 	@mkdir -p $(@D)
 	@rm -f $@
 	$(call step,AR)
