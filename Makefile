@@ -66,7 +66,7 @@ unbuilt_goals := help clean deps check check-full check-debian12 check-debian13 
 ifneq ($(filter-out $(unbuilt_goals),$(or $(MAKECMDGOALS),all)),)
 missing := $(foreach tool,$(firstword $(CC)) $(firstword $(AR)),$(if $(call there,$(tool)),,$(tool))) $(missing)
 ifeq ($(strip $(missing)),)
-needed := libconfig sqlite3 zlib libcrypto jansson
+needed := libconfig $(if $(filter-out core,$(or $(MAKECMDGOALS),all)),sqlite3 zlib libcrypto jansson)
 missing := $(if $(shell $(PKG_CONFIG) --exists $(needed) || echo some),$(foreach lib,$(needed),\
 	$(shell $(PKG_CONFIG) --exists $(lib) || echo $(lib))))
 endif
@@ -91,7 +91,7 @@ cflags := -std=gnu11 -fPIC -fvisibility=hidden -fno-math-errno -ffp-contract=off
 # command are not built.
 has_view := $(shell $(PKG_CONFIG) --exists sdl2 epoxy cairo egl && echo yes)
 libraries := incise incise-learn incise-record $(if $(has_view),incise-view)
-layers_incise := base fixed model surface tissue control sim device scene loop
+layers_incise := base fixed model surface tissue control sim rig device scene loop
 layers_incise-learn := learn calib
 layers_incise-record := signal record record/write record/read record/old record/join record/verify record/prove publish replay
 layers_incise-view := view
@@ -117,6 +117,9 @@ Q := $(if $(V),,@)
 step = $(if $(V),,@printf '  %-4s %s\n' $1 '$(patsubst $(O)/%,%,$@)')
 
 all: libs tools pages
+
+core: $(O)/lib/libincise.so ## what a loop needs: libincise.so, of libc and libconfig alone
+.PHONY: core
 
 .DEFAULT_GOAL := all
 .DELETE_ON_ERROR:

@@ -116,7 +116,7 @@ left-out-%:
 	@printf '  %-4s %s\n' OUT '$(strip $* $(commands_$*:%=and incise %)): not found: $(lacks_$*); make deps installs it'
 
 # For unit tests, which reach into what the shared objects hide.
-# q, not r: device/vision.c and vision/vision.cc are both vision.o.
+# q, not r: rig/vision.c and vision/vision.cc are both vision.o.
 unit_lib_objects := $(foreach lib,$(libraries),$(call objects,$(lib))) $(crypto_objects) \
 	$(sort $(foreach name,$(add_ons),$(objects_$(name)))) $(O)/obj/tests/vision/scalpel_picture.o
 $(O)/lib/libincise-tests.a: $(unit_lib_objects)

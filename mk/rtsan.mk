@@ -34,7 +34,7 @@ $(O)/lib/libincise-rtsan.a: $(call objects,incise) $(rtsan_objects)
 	$(Q)$(AR) qcs $@ $^
 
 rtsan_units := $(filter-out $(if $(filter stepper_can,$(left_out)),can/can_stepper),\
-	can/can_stepper device/motor device/stepper_kernel gpio/stepper_gpio loop/loop \
+	can/can_stepper rig/motor kernel/stepper_kernel gpio/stepper_gpio loop/loop \
 	loop/loop_control loop/state_page \
 	scene/actuate scene/extreme scene/felt_axes scene/plan scene/procedure sim/sim_stepper)
 rtsan_programs := $(patsubst tests/rtsan/%.c,$(O)/tests/rtsan/%,$(wildcard tests/rtsan/*.c))

@@ -8,8 +8,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include "../lib/device/actuator.h"
-#include "../lib/device/rig_plan.h"
+#include "../lib/rig/actuator.h"
+#include "../lib/rig/rig_plan.h"
 #include "../lib/scene/forces.h"
 #include "../lib/scene/scene.h"
 #include "../lib/sim/sim.h"

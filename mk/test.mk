@@ -31,8 +31,8 @@ $(O)/obj/tests/%.o: tests/%.c
 # tests/unit/layer.c. A test that defines __wrap_NAME plays NAME for all that it is linked to, so it is
 # a program of its own, as one is that plays a function of the library.
 wrapping := $(notdir $(shell grep -l __wrap_ tests/unit/*/*.h))
-unit_apart := $(patsubst tests/%.c,$(O)/tests/%,$(filter $(addprefix tests/unit/,device/vision.c \
-	device/foot_switch.c daq/iio_force.c),$(unit_sources)) \
+unit_apart := $(patsubst tests/%.c,$(O)/tests/%,$(filter $(addprefix tests/unit/,rig/vision.c \
+	rig/foot_switch.c daq/iio_force.c),$(unit_sources)) \
 	$(shell grep -l -e __wrap_ $(wrapping:%=-e 'include "%"') $(unit_sources)))
 unit_layers := $(sort $(patsubst tests/unit/%/,%,$(dir $(unit_sources))))
 unit_together := $(filter-out $(unit_apart),$(unit_programs))
@@ -206,7 +206,7 @@ check-python: all $(O)/tests/sql ## tests of incise for Python on libraries unde
 # Threads that share memory without a lock, under ThreadSanitizer; what is not of the page
 # comes from the library as it is.
 tsan_programs := $(O)/tests/tsan/loop/state_reader
-$(tsan_programs): tests/unit/loop/state_reader.c $(wildcard lib/loop/state_*.c) lib/device/thread.c $(O)/lib/libincise.so
+$(tsan_programs): tests/unit/loop/state_reader.c $(wildcard lib/loop/state_*.c) lib/rig/thread.c $(O)/lib/libincise.so
 	@mkdir -p $(@D)
 	$(call step,LD)
 	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) -Wno-missing-prototypes \

@@ -20,7 +20,7 @@
 #include <incise/state.h>
 #include "../base/monotonic.h"
 #include "../base/vector.h"
-#include "../device/thread.h"
+#include "../rig/thread.h"
 #include "state_file.h"
 #include "state_page.h"
 

@@ -19,7 +19,7 @@
 #include <unistd.h>
 #include <incise/arrow.h>
 #include "../base/utf8.h"
-#include "../device/thread.h"
+#include "../rig/thread.h"
 #include "streams.h"
 
 /* --- schema -------------------------------------------------------------------------- */

@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 #include "../base/vector.h"
-#include "../device/axes.h"
+#include "../rig/axes.h"
 #include "actuate.h"
 
 void incise_axes_take(struct incise_axes *axes, struct incise_rig *rig)

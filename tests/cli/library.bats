@@ -108,6 +108,23 @@ declared_by() {
 	done
 }
 
+# bats test_tags=full
+@test "make core needs libconfig alone, and its library maps nothing else" {
+	mkdir pc
+	cp "$(pkg-config --variable=pcfiledir libconfig)/libconfig.pc" pc
+	PKG_CONFIG_LIBDIR=$PWD/pc make -C "$root" core O="$PWD/core" >log 2>&1 || {
+		cat log
+		false
+	}
+	readelf -d core/lib/libincise.so | sed -n 's/.*NEEDED.*\[\(.*\)\]/\1/p' | sed 's/\.so.*//' | sort >found
+	diff - found <<-END
+		ld-linux-x86-64
+		libc
+		libconfig
+		libm
+	END
+}
+
 @test "the haptic loop maps no heavy library" {
 	heavy='sqlite|libcrypto|lapack|blas|gfortran|libopencv|libav|hdf5|libGL|epoxy|SDL|IGTL|stdc'
 	# names alone: a folder may be called blas

@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include "../../lib/device/actuator.h"
+#include "../../lib/rig/actuator.h"
 #include "../../lib/scene/scene.h"
 #include "../../lib/sim/sim.h"
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * In place of lib/device/backends.c, for programs that have vision's module linked into
- * them: lib/device/vision.c finds it here.
+ * In place of lib/rig/backends.c, for programs that have vision's module linked into
+ * them: lib/rig/vision.c finds it here.
  */
-#include "../../lib/device/backends.h"
+#include "../../lib/rig/backends.h"
 #include "../../lib/vision/vision_opencv.h"
 
 int incise_backend_find(struct incise_loaded *loaded, const char *kind, const char *name,

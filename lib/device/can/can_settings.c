@@ -5,7 +5,7 @@
  */
 #include <math.h>
 #include <stddef.h>
-#include "../actuator.h"
+#include "../../rig/actuator.h"
 
 #define US 1000.0 /* ns */
 #define NS_PER_US 1000

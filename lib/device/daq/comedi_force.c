@@ -20,9 +20,9 @@
 #include <unistd.h>
 #include <comedilib.h>
 #include "../../base/monotonic.h"
-#include "../backends.h"
-#include "../daq_feed.h"
-#include "../stable_path.h"
+#include "../../rig/backends.h"
+#include "../../rig/daq_feed.h"
+#include "../../rig/stable_path.h"
 
 /* --- card: subdevice, channel, range, and the command that samples them --- */
 

@@ -9,8 +9,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include "../backends.h"
-#include "../daq_feed.h"
+#include "../../rig/backends.h"
+#include "../../rig/daq_feed.h"
 #include "iio_source.h"
 
 /*

@@ -18,10 +18,10 @@
 #include <sys/mman.h>
 #include <incise/clock.h>
 #include "../../base/monotonic.h"
-#include "../backends.h"
-#include "../motor.h"
-#include "../pulser.h"
-#include "../thread.h"
+#include "../../rig/backends.h"
+#include "../../rig/motor.h"
+#include "pulser.h"
+#include "../../rig/thread.h"
 #include "gpio_lines.h"
 
 #define SLEEPS 64 /* of the self-test */

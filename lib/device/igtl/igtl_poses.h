@@ -22,8 +22,8 @@
 #include <stdatomic.h>
 #include <incise/tracker.h>
 #include "../../base/ring.h"
-#include "../pace.h"
-#include "../tracker_feed.h"
+#include "../../rig/pace.h"
+#include "../../rig/tracker_feed.h"
 #include "igtl_message.h"
 
 #define IGTL_NAMES 8 /* of devices that are remembered for a message */

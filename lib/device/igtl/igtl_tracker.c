@@ -21,9 +21,9 @@
 #include <sys/socket.h>
 #include <unistd.h>
 #include "../../base/monotonic.h"
-#include "../backends.h"
-#include "../thread.h"
-#include "../tracker_feed.h"
+#include "../../rig/backends.h"
+#include "../../rig/thread.h"
+#include "../../rig/tracker_feed.h"
 #include "igtl_poses.h"
 
 #define MS INT64_C(1000000)

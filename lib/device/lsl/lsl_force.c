@@ -16,9 +16,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include "../backends.h"
-#include "../daq_feed.h"
-#include "../pace.h"
+#include "../../rig/backends.h"
+#include "../../rig/daq_feed.h"
+#include "../../rig/pace.h"
 #include "liblsl.h"
 
 #define FIND_S 5.0

@@ -12,7 +12,7 @@
 #include <stdatomic.h>
 #include <incise/tracker.h>
 #include "../../base/ring.h"
-#include "../tracker_feed.h"
+#include "../../rig/tracker_feed.h"
 #include "polhemus_records.h"
 
 /*

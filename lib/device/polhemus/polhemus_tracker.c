@@ -8,8 +8,8 @@
 #include <stdlib.h>
 #include <time.h>
 #include "../../base/monotonic.h"
-#include "../thread.h"
-#include "../tracker_feed.h"
+#include "../../rig/thread.h"
+#include "../../rig/tracker_feed.h"
 #include "polhemus_setup.h"
 #include "polhemus_stream.h"
 #include "polhemus_tracker.h"

@@ -13,8 +13,8 @@
 #include <termios.h>
 #include <unistd.h>
 #include "../../base/monotonic.h"
-#include "../backends.h"
-#include "../tty.h"
+#include "../../rig/backends.h"
+#include "../../rig/tty.h"
 #include "polhemus_setup.h"
 #include "polhemus_tracker.h"
 #include "polhemus_tty.h"

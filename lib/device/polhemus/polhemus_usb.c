@@ -20,7 +20,7 @@
 #include <libusb.h>
 #include "../../base/hex.h"
 #include "../../base/monotonic.h"
-#include "../backends.h"
+#include "../../rig/backends.h"
 #include "polhemus_model.h"
 #include "polhemus_tracker.h"
 

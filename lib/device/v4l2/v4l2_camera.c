@@ -20,9 +20,9 @@
 #include <unistd.h>
 #include <linux/videodev2.h>
 #include "../../base/monotonic.h"
-#include "../backends.h"
-#include "../stable_path.h"
-#include "../thread.h"
+#include "../../rig/backends.h"
+#include "../../rig/stable_path.h"
+#include "../../rig/thread.h"
 #include "v4l2_controls.h"
 #include "v4l2_file.h"
 #include "v4l2_format.h"

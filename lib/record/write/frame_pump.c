@@ -18,7 +18,7 @@
 #include <time.h>
 #include <incise/camera.h>
 #include "../../base/ring.h"
-#include "../../device/thread.h"
+#include "../../rig/thread.h"
 #include "frame_pump.h"
 
 #define SLOTS_S 2.5 /* bridges several fdatasync(2) of 0.3 s */

@@ -11,7 +11,7 @@
 #include <incise/clock.h>
 #include <incise/recorder.h>
 #include "../../base/monotonic.h"
-#include "../../device/thread.h"
+#include "../../rig/thread.h"
 #include "wall_sampler.h"
 #include "wall_sources.h"
 

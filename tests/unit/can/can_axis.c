@@ -5,7 +5,7 @@
  */
 #include "../unit.h"
 #include "../../../lib/device/can/cia402/can_axis.h"
-#include "../../../lib/device/page.h"
+#include "../../../lib/rig/page.h"
 #include "led.h"
 
 #define MS DRIVE_MS

@@ -5,7 +5,7 @@
  * noticing is missing; homing by the drive; and no set-point is lost.
  */
 #include "../unit.h"
-#include "../device/conformance.h"
+#include "../rig/conformance.h"
 #include "rig.h"
 
 #define MS DRIVE_MS

@@ -8,7 +8,7 @@
 #include "../unit.h"
 #include <stdatomic.h>
 #include <time.h>
-#include "../../../lib/device/backends.h"
+#include "../../../lib/rig/backends.h"
 #include "../../../lib/device/gpio/gpio_lines.h"
 #include "../message.h"
 

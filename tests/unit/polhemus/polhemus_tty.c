@@ -5,7 +5,7 @@
  */
 #include "../unit.h"
 #include <fcntl.h>
-#include "../../../lib/device/backends.h"
+#include "../../../lib/rig/backends.h"
 #include "../../../lib/device/polhemus/polhemus_tty.h"
 #include "pty.h"
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/scene/actuate.c, and the duals of lib/device/axes.c: one actuator on a plan made by hand,
+ * lib/scene/actuate.c, and the duals of lib/rig/axes.c: one actuator on a plan made by hand,
  * then several against an independent least-squares solution.
  */
 #include "../unit.h"
 #include <incise/backend.h>
 #include "../../../lib/base/vector.h"
-#include "../../../lib/device/axes.h"
+#include "../../../lib/rig/axes.h"
 #include "../../../lib/scene/plan.h"
 #include "../message.h"
 

@@ -7,7 +7,7 @@
 #include <fcntl.h>
 #include <glob.h>
 #include <sys/stat.h>
-#include "../../../lib/device/backends.h"
+#include "../../../lib/rig/backends.h"
 #include "../message.h"
 #include "driver.h"
 

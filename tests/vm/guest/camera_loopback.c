@@ -17,8 +17,8 @@
 #include <time.h>
 #include <unistd.h>
 #include <linux/videodev2.h>
-#include "../../../lib/device/backends.h"
-#include "../../../lib/device/thread.h"
+#include "../../../lib/rig/backends.h"
+#include "../../../lib/rig/thread.h"
 #include "../../../lib/sim/sim.h"
 #include "../tap.h"
 

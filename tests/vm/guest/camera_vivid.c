@@ -18,7 +18,7 @@
 #include <unistd.h>
 #include <incise/scan.h>
 #include <linux/videodev2.h>
-#include "../../../lib/device/backends.h"
+#include "../../../lib/rig/backends.h"
 #include "../tap.h"
 
 extern const struct incise_backend incise_camera_v4l2;

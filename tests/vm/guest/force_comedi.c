@@ -23,7 +23,7 @@
 #include <unistd.h>
 
 #include <comedilib.h>
-#include "../../../lib/device/backends.h"
+#include "../../../lib/rig/backends.h"
 #include "../hold.h"
 #include "../tap.h"
 

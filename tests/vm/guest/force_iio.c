@@ -20,7 +20,7 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "../../../lib/device/backends.h"
+#include "../../../lib/rig/backends.h"
 #include "../../../lib/device/daq/iio_source.h"
 #include "../hold.h"
 #include "../simulator.h"

@@ -20,7 +20,7 @@
 #include <incise/backend.h>
 #include <incise/rig.h>
 #include "../../../driver/sim/incise_sim.h"
-#include "../../unit/device/conformance.h"
+#include "../../unit/rig/conformance.h"
 
 #define CARRIAGE                                                                      \
 	"number=0 step=0 dir=1 enable=2 min=3 max=4 home=5 min_at=-1 max_at=1000000 " \

@@ -17,7 +17,7 @@
 #include <sys/mman.h>
 #include <time.h>
 #include <incise/backend.h>
-#include "../../../lib/device/backends.h"
+#include "../../../lib/rig/backends.h"
 #include "../tap.h"
 
 #define MS INT64_C(1000000)

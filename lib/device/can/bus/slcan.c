@@ -25,7 +25,7 @@
 #include <unistd.h>
 #include <linux/can/error.h>
 #include "../../../base/monotonic.h"
-#include "../../tty.h"
+#include "../../../rig/tty.h"
 #include "can_bus.h"
 #include "slcan_protocol.h"
 

@@ -20,7 +20,7 @@
 #define INCISE_CAN_AXIS_H
 
 #include <stdatomic.h>
-#include "../../motion.h"
+#include "../../../rig/motion.h"
 #include "cia402.h"
 
 enum can_axis_phase {

@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <linux/can/netlink.h>
-#include "../../motor.h"
+#include "../../../rig/motor.h"
 #include "can_units.h"
 #include "can_session.h"
 

@@ -16,8 +16,8 @@
 #include <string.h>
 #include <sys/mman.h>
 #include "../../../base/monotonic.h"
-#include "../../motor.h"
-#include "../../thread.h"
+#include "../../../rig/motor.h"
+#include "../../../rig/thread.h"
 #include "can_session.h"
 #include "can_stepper.h"
 

@@ -5,7 +5,7 @@
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
-#include "../../motor.h"
+#include "../../../rig/motor.h"
 #include "can_units.h"
 
 #define MS 1000000LL

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/motor.c over lib/device/pulser.c, on lines and a clock that a test
+ * lib/rig/motor.c over lib/device/gpio/pulser.c, on lines and a clock that a test
  * makes: all cases of the conformance table, exactly in time and with a thread that is
  * late; the same table for the virtual rig.
  */
 #include "../unit.h"
 #include "../../../lib/base/random.h"
-#include "../../../lib/device/motor.h"
+#include "../../../lib/rig/motor.h"
 #include "../../../lib/sim/sim.h"
 #include "conformance.h"
 #include "machine.h"

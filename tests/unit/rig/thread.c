@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/thread.c: the thread runs with all signals blocked, and the caller's own mask
+ * lib/rig/thread.c: the thread runs with all signals blocked, and the caller's own mask
  * stays what it was.
  */
 #include "../unit.h"
 #include <signal.h>
-#include "../../../lib/device/thread.h"
+#include "../../../lib/rig/thread.h"
 
 static void *look(void *argument)
 {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Losses found by times alone (lib/device/pace.h): each source here knows what it left out.
+ * Losses found by times alone (lib/rig/pace.h): each source here knows what it left out.
  */
 #include "../unit.h"
-#include "../../../lib/device/pace.h"
+#include "../../../lib/rig/pace.h"
 
 struct source {
 	const char *name;

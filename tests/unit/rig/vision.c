@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/vision.c: the module is asked for by its name, every call reaches it with its
+ * lib/rig/vision.c: the module is asked for by its name, every call reaches it with its
  * arguments, and what is said where it is not installed. This file is the finder of modules.
  */
 #include "../unit.h"
-#include "../../../lib/device/backends.h"
+#include "../../../lib/rig/backends.h"
 #include "../message.h"
 
 /* A module that remembers what it was called with. */

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/pulser.c: what it does when something is wrong, on lines and a clock that
- * a test makes. What it does when all is well is in tests/unit/device/motor.c.
+ * lib/device/gpio/pulser.c: what it does when something is wrong, on lines and a clock that
+ * a test makes. What it does when all is well is in tests/unit/rig/motor.c.
  */
 #include "../unit.h"
-#include "../../../lib/device/page.h"
-#include "machine.h"
+#include "../../../lib/rig/page.h"
+#include "../rig/machine.h"
 
 #define MS 1000000LL
 

@@ -9,7 +9,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include <stdio.h>
-#include "../../../lib/device/actuator.h"
+#include "../../../lib/rig/actuator.h"
 
 #define NEEDED "spring_N_mm = 2.0; travel_mm = 20.0; lead_mm = 2.0; "
 

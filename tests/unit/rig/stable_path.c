@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/* lib/device/stable_path.c, with files and links that stand for those in /dev. */
+/* lib/rig/stable_path.c, with files and links that stand for those in /dev. */
 #include "../unit.h"
 #include <fcntl.h>
-#include "../../../lib/device/stable_path.h"
+#include "../../../lib/rig/stable_path.h"
 
 static char home[] = "/tmp/incise-test-XXXXXX";
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/rig_plan.c: what rig.conf and the shorthand set, each key with its range and default, and the
+ * lib/rig/rig_plan.c: what rig.conf and the shorthand set, each key with its range and default, and the
  * message for each that is wrong.
  */
 #include "../unit.h"
 #include <locale.h>
 #include <incise/rig.h>
 #include <incise/sim.h>
-#include "../../../lib/device/rig_plan.h"
+#include "../../../lib/rig/rig_plan.h"
 #include "../message.h"
 #include "../base/temp_file.h"
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/tty.c on pseudo terminals. A line's speed means nothing there, but is kept.
+ * lib/rig/tty.c on pseudo terminals. A line's speed means nothing there, but is kept.
  */
 #include "../unit.h"
 #include <fcntl.h>
 #include <sys/ioctl.h>
 #include <sys/stat.h>
-#include "../../../lib/device/tty.h"
+#include "../../../lib/rig/tty.h"
 
 static int master;
 static char path[64];

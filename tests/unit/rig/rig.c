@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/* lib/device/rig.c: what is asked for is opened, on one clock and in one world. */
+/* lib/rig/rig.c: what is asked for is opened, on one clock and in one world. */
 #include "../unit.h"
 #include <incise/rig.h>
 #include "../base/temp_file.h"

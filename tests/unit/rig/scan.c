@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/scan.c: what it says where there is nothing to scan. What it finds is in the
+ * lib/rig/scan.c: what it says where there is nothing to scan. What it finds is in the
  * tests of the backends that can.
  */
 #include "../unit.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Backends by their names, built in or in modules; see backends.h. Only a module that is
+ * Backends by their names, in modules; see backends.h. Only a module that is
  * named is loaded, as it brings its libraries into the process.
  */
 #include <dirent.h>
@@ -17,8 +17,6 @@
 #define BUILT_IN_SIM "sim" /* rig.c opens it, with the simulated world behind it */
 #define SYMBOL "incise_backend"
 
-static const struct incise_backend *const built_in[] = {&incise_stepper_kernel};
-
 /* Names become parts of paths. */
 static bool is_plain_backend(const char *name)
 {
@@ -27,7 +25,7 @@ static bool is_plain_backend(const char *name)
 	return length && length < 32 && !name[length];
 }
 
-/* "sim, kernel, gpio": all backends of a kind. */
+/* "sim, gpio, kernel": all backends of a kind. */
 static void list_backends(const char *kind, const char *in, char *text, size_t size)
 {
 	size_t prefix = strlen(kind), length;
@@ -35,11 +33,6 @@ static void list_backends(const char *kind, const char *in, char *text, size_t s
 	struct dirent *entry;
 
 	snprintf(text, size, BUILT_IN_SIM);
-	for (size_t i = 0; i < sizeof(built_in) / sizeof(*built_in); i++)
-		if (!strcmp(built_in[i]->kind, kind)) {
-			length = strlen(text);
-			snprintf(text + length, size - length, ", %s", built_in[i]->name);
-		}
 	while (dir && (entry = readdir(dir))) {
 		const char *name = entry->d_name;
 		size_t n = strlen(name);
@@ -105,12 +98,6 @@ int incise_backend_find(struct incise_loaded *loaded, const char *kind, const ch
 	bool has_folder = incise_module_folder(in, sizeof(in));
 	struct stat status;
 
-	for (size_t i = 0; i < sizeof(built_in) / sizeof(*built_in); i++)
-		if (!strcmp(built_in[i]->kind, kind) &&
-		    !strcmp(built_in[i]->name, name)) {
-			*loaded = (struct incise_loaded){built_in[i], NULL};
-			return 0;
-		}
 	if (has_folder && is_plain_backend(name)) {
 		snprintf(path, sizeof(path), "%s/%s_%s.so", in, kind, name);
 		if (!stat(path, &status) && S_ISREG(status.st_mode))

@@ -17,7 +17,7 @@
 
 #include <stdbool.h>
 #include <stdint.h>
-#include "motion.h"
+#include "../../rig/motion.h"
 
 struct incise_pulser;
 

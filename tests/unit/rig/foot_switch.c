@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/foot_switch.c: names of keys, refusals, and the bytes of an input device. A named pipe
+ * lib/rig/foot_switch.c: names of keys, refusals, and the bytes of an input device. A named pipe
  * takes its place, and this program answers the ioctls; tests/vm has the kernel's own.
  */
 #include "../unit.h"

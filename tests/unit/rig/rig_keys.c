@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/rig_keys.c: the list of a rig's keys, written as a rig.conf, makes the same rig
+ * lib/rig/rig_keys.c: the list of a rig's keys, written as a rig.conf, makes the same rig
  * again, and has every key that a rig.conf may have.
  */
 #include "../unit.h"
 #include <locale.h>
 #include <incise/rig.h>
-#include "../../../lib/device/actuator.h"
-#include "../../../lib/device/rig_plan.h"
+#include "../../../lib/rig/actuator.h"
+#include "../../../lib/rig/rig_plan.h"
 #include "../../../lib/sim/sim.h"
 #include "../message.h"
 #include "../base/temp_file.h"

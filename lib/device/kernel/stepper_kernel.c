@@ -18,9 +18,10 @@
 #include <time.h>
 #include <unistd.h>
 #include <incise/clock.h>
-#include "../base/monotonic.h"
-#include "motor.h"
-#include "page.h"
+#include "../../base/monotonic.h"
+#include "../../rig/backends.h"
+#include "../../rig/motor.h"
+#include "../../rig/page.h"
 
 #define REST_POLL_NS 10000000
 #define REST_POLLS 500
@@ -604,3 +605,5 @@ const struct incise_backend incise_stepper_kernel = {
 	.name = "kernel",
 	.open = kernel_open,
 };
+
+INCISE_MODULE(incise_stepper_kernel);

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/daq_feed.c: what is read, clipped, lost and reported at the end; what is asked
+ * lib/rig/daq_feed.c: what is read, clipped, lost and reported at the end; what is asked
  * for and cannot be; the thread.
  */
 #include "../unit.h"
-#include "../../../lib/device/daq_feed.h"
+#include "../../../lib/rig/daq_feed.h"
 #include "../message.h"
 
 static struct daq_feed *feed;

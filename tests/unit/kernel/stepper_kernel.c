@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/stepper_kernel.c on a kernel that a test makes: the linker hands its system
+ * lib/device/kernel/stepper_kernel.c on a kernel that a test makes: the linker hands its system
  * calls to functions here, behind which a pulser and a machine play the module, on a clock
  * that goes when one sleeps. The real module is asked in tests/vm.
  */
@@ -9,11 +9,13 @@
 #include <sys/ioctl.h>
 #include <sys/mman.h>
 #include <time.h>
-#include "../../../lib/device/backends.h"
-#include "../../../lib/device/motor.h"
+#include "../../../lib/rig/backends.h"
+#include "../../../lib/rig/motor.h"
 #include "../message.h"
-#include "conformance.h"
-#include "machine.h"
+#include "../rig/conformance.h"
+#include "../rig/machine.h"
+
+extern const struct incise_backend incise_stepper_kernel;
 
 #define FD 7777
 #define MOTOR 2

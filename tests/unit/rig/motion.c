@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/motion.c, on no lines and no bus: what it says to who owns it. What comes of
+ * lib/rig/motion.c, on no lines and no bus: what it says to who owns it. What comes of
  * that on lines is in pulser.c, on a bus in tests/unit/can/can_axis.c.
  */
 #include "../unit.h"
-#include "../../../lib/device/motion.h"
-#include "../../../lib/device/page.h"
+#include "../../../lib/rig/motion.h"
+#include "../../../lib/rig/page.h"
 
 #define MS 1000000LL
 #define TICK MS

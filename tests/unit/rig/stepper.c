@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/stepper.c: calls reach the backend; homing makes the count of a simulated machine the
+ * lib/rig/stepper.c: calls reach the backend; homing makes the count of a simulated machine the
  * position of the machine, wherever it started, or reports why not and stops it.
  */
 #include "../unit.h"

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/page.c: what is read is one that was written, whole, and nothing that makes
+ * lib/rig/page.c: what is read is one that was written, whole, and nothing that makes
  * no sense comes through; with a thread on the other side too.
  */
 #include "../unit.h"
 #include <pthread.h>
 #include <stdatomic.h>
 #include "../../../lib/fixed/profile.h"
-#include "../../../lib/device/page.h"
+#include "../../../lib/rig/page.h"
 
 TEST(a_set_point_is_taken_once)
 {

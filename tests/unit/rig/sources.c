@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/sources.c: every call reaches the backend with its arguments and returns what the
+ * lib/rig/sources.c: every call reaches the backend with its arguments and returns what the
  * backend returns.
  */
 #include "../unit.h"

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/actuator.c: what the group says becomes steps and limits, what does not fit
+ * lib/rig/actuator.c: what the group says becomes steps and limits, what does not fit
  * is refused with its line.
  */
 #include "../unit.h"
 #include "../message.h"
 #include "actuator_text.h"
-#include "../../../lib/device/motor.h"
+#include "../../../lib/rig/motor.h"
 
 TEST(defaults_are_those_of_the_manual)
 {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * The group actuator.can, lib/device/actuator.c: each key in its unit and up to its ends, each refusal with its
+ * The group actuator.can, lib/rig/actuator.c: each key in its unit and up to its ends, each refusal with its
  * line, and that the gain that csv may have is half of what a loop with that delay holds.
  */
 #include "../unit.h"
-#include "../../../lib/device/actuator.h"
+#include "../../../lib/rig/actuator.h"
 #include "../message.h"
 #include "actuator_text.h"
 

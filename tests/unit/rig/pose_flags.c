@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/pose_flags.c: which flags make a pose unusable, and how they are counted. The
+ * lib/rig/pose_flags.c: which flags make a pose unusable, and how they are counted. The
  * lists are those of rig.conf(5).
  */
 #include "../unit.h"

@@ -9,7 +9,7 @@
 
 #include <stdbool.h>
 #include <stdint.h>
-#include "../../../lib/device/pulser.h"
+#include "../../../lib/device/gpio/pulser.h"
 
 #define MACHINE_HOME 40 /* steps; up to there the home input is active */
 

@@ -1,9 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * The backends that rig.conf can name: built in, or in a module that is loaded when it is
- * named.
+ * The backends that rig.conf can name, each in a module that is loaded when it is named.
  *
- *   "kernel:/dev/…"     built in
  *   "gpio:…"            DIR/stepper_gpio.so, DIR: INCISE_MODULE_PATH, or the folder incise/
  *                       next to libincise.so
  */
@@ -11,8 +9,6 @@
 #define INCISE_BACKENDS_H
 
 #include <incise/backend.h>
-
-extern const struct incise_backend incise_stepper_kernel; /* built in */
 
 /*
  * Export a backend from its module as `incise_backend`; weak, as tests may link several, by
@@ -25,18 +21,18 @@ extern const struct incise_backend incise_stepper_kernel; /* built in */
 /* A backend and the module that it came from. */
 struct incise_loaded {
 	const struct incise_backend *backend;
-	void *handle; /* of dlopen(); NULL: built in */
+	void *handle; /* of dlopen() */
 };
 
 /*
- * Find a backend and load its module, if it is in one. @where starts the message. 0;
+ * Find a backend and load its module. @where starts the message. 0;
  * -ENODEV (the message lists the known ones); -ENOEXEC (its module is broken, or of
  * another version).
  */
 int incise_backend_find(struct incise_loaded *loaded, const char *kind, const char *name,
 			const char *where, struct incise_error *err);
 
-/* All backends of a kind, built in and in modules, without "sim"; how many. */
+/* All backends of a kind, without "sim"; how many. */
 int incise_backend_names(const char *kind, char names[][32], int capacity);
 
 void incise_backend_unload(struct incise_loaded *loaded);
