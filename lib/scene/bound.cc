@@ -46,6 +46,8 @@ struct T(opening) {
 #undef T_FRONT_CUTS
 #undef T_PUNCTURES
 #undef T_WITHDRAWS
+/* The certificate's own tick, which no other file calls. */
+namespace {
 #include "../tissue/tick.proto.h"
 
 /* Errors of a filter's state: mm, mm/s, mm/s². */
@@ -873,6 +875,8 @@ static double end_tick(struct tick *t, double bound_N)
 	free(t);
 	return end_paths(bound_N);
 }
+
+} // namespace
 
 double incise_front_bound(double unloading_N_mm, double friction, double most_N,
 			  double cutting_bound_N)

@@ -209,9 +209,13 @@ static void check_cuts(struct conversion *c, int cuts_most)
 			c->plan->scene->path, cuts_most, INCISE_FIXED_CUTS_MAX);
 }
 
-int incise_integers_numbers(const struct incise_plan *plan,
-			    struct incise_fixed_numbers *numbers,
-			    struct incise_error *err)
+/*
+ * Set the numbers of a plan, without actuators and without a surface that is a mesh: its shape is left a
+ * plane. Returns 0; -ERANGE: the message names the number that integers do not hold.
+ */
+static int set_fixed_numbers(const struct incise_plan *plan,
+			     struct incise_fixed_numbers *numbers,
+			     struct incise_error *err)
 {
 	const double top[3] = {0, 0, 1};
 	struct incise_double_numbers from = plan->doubles.plan.numbers;
@@ -336,7 +340,7 @@ int incise_integers_file(const struct incise_plan *plan,
 	struct conversion c = {.plan = plan, .err = err};
 
 	*heights = (struct incise_heights){0};
-	c.rc = incise_integers_numbers(plan, numbers, err);
+	c.rc = set_fixed_numbers(plan, numbers, err);
 	numbers->n_axes = plan->axes.n;
 	for (int i = 0; i < plan->axes.n; i++)
 		set_axis(&c, &plan->axes.axis[i], &numbers->axes[i]);
@@ -438,7 +442,7 @@ struct incise_integers *incise_integers_new(const struct incise_plan *plan,
 		incise_error_set(err, ENOMEM, "no memory for a plan");
 		return NULL;
 	}
-	rc = incise_integers_numbers(plan, &integers->plan.numbers, err);
+	rc = set_fixed_numbers(plan, &integers->plan.numbers, err);
 	if (rc) {
 		free(integers);
 		errno = -rc;

@@ -22,15 +22,7 @@ struct incise_integers {
 };
 
 /*
- * The numbers of a plan, without actuators and without a surface that is a mesh: its shape is left a
- * plane. Returns 0; -ERANGE: the message names the number that integers do not hold.
- */
-int incise_integers_numbers(const struct incise_plan *plan,
-			    struct incise_fixed_numbers *numbers,
-			    struct incise_error *err);
-
-/*
- * The same of a plan as a file: with its actuators and its certified error, and with heights in
+ * The numbers of a plan as a file: with its actuators and its certified error, and with heights in
  * place of a mesh. *heights is freed by the caller, also after an error.
  */
 int incise_integers_file(const struct incise_plan *plan,
@@ -38,7 +30,7 @@ int incise_integers_file(const struct incise_plan *plan,
 			 struct incise_heights *heights, struct incise_error *err);
 
 /*
- * Make the integers of a plan. Returns NULL with errno of incise_integers_numbers(), ENOMEM. Freed
+ * Make the integers of a plan. Returns NULL with ERANGE (the message names the number that integers do not hold), ENOMEM. Freed
  * with free().
  */
 struct incise_integers *incise_integers_new(const struct incise_plan *plan,

@@ -171,10 +171,6 @@ incise_stage_fn incise_stage_pose, incise_stage_fed, incise_stage_actuate;
 void incise_plan_copy(struct incise_plan *copy, const struct incise_plan *plan,
 		      double gain);
 
-/* The lower end of the support of an input of a phase's model, and the upper one. */
-void incise_plan_input_range(const struct incise_plan *plan,
-			     enum incise_cutting_phase phase, int i, double ends[2]);
-
 /* The range of an input over the models that have it. Returns whether any has. */
 bool incise_plan_kind_range(const struct incise_plan *plan, enum incise_model_input kind,
 			    double ends[2]);

@@ -203,9 +203,10 @@ static void set_plan(struct search *s, const struct incise_plan *plan,
 	s->rested_parts = s->parts;
 }
 
-void incise_plan_device(const struct incise_plan *plan,
-			const struct incise_tracker_info *tracker,
-			struct incise_device *device)
+/* The device of a plan, and the loop that it is in. */
+static void describe_device(const struct incise_plan *plan,
+			    const struct incise_tracker_info *tracker,
+			    struct incise_device *device)
 {
 	const struct incise_haptic_device *of = &plan->stability.device;
 
@@ -1077,7 +1078,7 @@ int incise_plan_rest(const struct incise_plan *plan,
 		free(s);
 		return -ENOMEM;
 	}
-	incise_plan_device(plan, tracker, &s->device);
+	describe_device(plan, tracker, &s->device);
 	/* As much as the tables of poses hold. */
 	s->device.pose_s = fmax(s->device.pose_s,
 				fmax(s->device.latency_s / (POSES_MOST - 2),

@@ -73,11 +73,6 @@ struct incise_device {
 	double continuous_N;   /* … and one that it keeps for ever */
 };
 
-/* The device of a plan, and the loop that it is in. */
-void incise_plan_device(const struct incise_plan *plan,
-			const struct incise_tracker_info *tracker,
-			struct incise_device *device);
-
 /* Take the other margin where it is weaker, and count its states. */
 void incise_rest_take_weakest(struct incise_plan_weakest *to,
 			      const struct incise_plan_weakest *other);

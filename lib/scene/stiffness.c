@@ -18,7 +18,8 @@
  */
 #define STEEPER 1.25
 
-void incise_plan_input_range(const struct incise_plan *plan,
+/* The lower end of the support of an input of a phase's model, and the upper one. */
+static void find_input_range(const struct incise_plan *plan,
 			     enum incise_cutting_phase phase, int i, double ends[2])
 {
 	const struct incise_variable *in;
@@ -57,7 +58,7 @@ bool incise_plan_kind_range(const struct incise_plan *plan, enum incise_model_in
 
 		if (i < 0)
 			continue;
-		incise_plan_input_range(plan, (enum incise_cutting_phase)phase, i, own);
+		find_input_range(plan, (enum incise_cutting_phase)phase, i, own);
 		ends[0] = fmin(ends[0], own[0]);
 		ends[1] = fmax(ends[1], own[1]);
 		any = true;
@@ -86,7 +87,7 @@ static double edge_slope(const struct incise_plan *plan, int i,
 		int depth = input_of(plan, INCISE_CUT, INCISE_INPUT_DEPTH);
 		double edge_mm;
 
-		incise_plan_input_range(plan, INCISE_CUT, depth, ends);
+		find_input_range(plan, INCISE_CUT, depth, ends);
 		edge_mm = EDGE * ends[1];
 		x[depth] = ends[1];
 		deep_N = incise_plan_model_force(plan, INCISE_CUT, x);
@@ -96,7 +97,7 @@ static double edge_slope(const struct incise_plan *plan, int i,
 	x[i] = 0;
 	if (cut->input[i] == INCISE_INPUT_DEPTH || cut->input[i] == INCISE_INPUT_SPEED)
 		return edge_slope(plan, i + 1, x);
-	incise_plan_input_range(plan, INCISE_CUT, i, ends);
+	find_input_range(plan, INCISE_CUT, i, ends);
 	for (int k = 0; k < PLACES; k++) {
 		x[i] = ends[0] + (ends[1] - ends[0]) * k / (PLACES - 1);
 		steepest = fmax(steepest, edge_slope(plan, i + 1, x));
@@ -114,7 +115,7 @@ static double largest_N(const struct incise_plan *plan, enum incise_cutting_phas
 
 	if (i == cut->n_inputs)
 		return sign * incise_plan_model_force(plan, phase, x);
-	incise_plan_input_range(plan, phase, i, ends);
+	find_input_range(plan, phase, i, ends);
 	if (cut->input[i] == INCISE_INPUT_DEPTH)
 		ends[0] = ends[1] = depth_mm;
 	for (int k = 0; k < (ends[1] > ends[0] ? PLACES : 1); k++) {
@@ -181,8 +182,8 @@ static int survey_model(struct incise_plan *plan)
 	struct incise_slope slope[INCISE_LOOP_INPUTS_MAX];
 	double x[INCISE_LOOP_INPUTS_MAX] = {0}, ends[2];
 
-	incise_plan_input_range(plan, INCISE_CUT,
-				input_of(plan, INCISE_CUT, INCISE_INPUT_DEPTH), ends);
+	find_input_range(plan, INCISE_CUT, input_of(plan, INCISE_CUT, INCISE_INPUT_DEPTH),
+			 ends);
 	plan->support_mm = ends[1];
 	plan->dissipates = plan->scene->tissue.dissipates;
 	plan->edge_N_mm = edge_slope(plan, 0, x);
@@ -402,7 +403,7 @@ void incise_plan_model(const struct incise_plan *plan, enum incise_cutting_phase
 	for (int i = 0; i < model->n_inputs; i++) {
 		double ends[2];
 
-		incise_plan_input_range(plan, phase, i, ends);
+		find_input_range(plan, phase, i, ends);
 		model->input[i] = incise_model_input_kinds[cut->input[i]].name;
 		model->min[i] = ends[0];
 		model->max[i] = ends[1];

@@ -156,6 +156,19 @@ size_t incise_surface_memory(const struct incise_surface *surface)
 	return sizeof(*surface) + (surface->mesh ? mesh_memory(surface->mesh) : 0);
 }
 
+static void touch_capsule_top(const struct capsule *capsule, struct incise_touch *touch)
+{
+	double a = capsule->a[2], b = capsule->b[2], top[3];
+
+	for (int i = 0; i < 3; i++)
+		top[i] = a > b	 ? capsule->a[i]
+			 : b > a ? capsule->b[i]
+				 : capsule->a[i] / 2 + capsule->b[i] / 2;
+	top[2] += capsule->radius;
+	capsule_nearest(capsule, top, (const double[3]){0, 0, 1}, touch);
+	touch->depth_mm = 0;
+}
+
 void incise_surface_top(const struct incise_surface *surface, struct incise_touch *touch)
 {
 	if (surface->kind == INCISE_SURFACE_PLANE)
@@ -163,7 +176,7 @@ void incise_surface_top(const struct incise_surface *surface, struct incise_touc
 	else if (surface->mesh)
 		mesh_top(surface->mesh, touch);
 	else
-		capsule_top(&surface->capsule, touch);
+		touch_capsule_top(&surface->capsule, touch);
 }
 
 bool incise_surface_size(const struct incise_surface *surface,
@@ -362,17 +375,4 @@ bool capsule_enters(const struct capsule *capsule, const double from[3],
 	capsule_nearest(capsule, point, up, touch);
 	touch->depth_mm = 0;
 	return true;
-}
-
-void capsule_top(const struct capsule *capsule, struct incise_touch *touch)
-{
-	double a = capsule->a[2], b = capsule->b[2], top[3];
-
-	for (int i = 0; i < 3; i++)
-		top[i] = a > b	 ? capsule->a[i]
-			 : b > a ? capsule->b[i]
-				 : capsule->a[i] / 2 + capsule->b[i] / 2;
-	top[2] += capsule->radius;
-	capsule_nearest(capsule, top, (const double[3]){0, 0, 1}, touch);
-	touch->depth_mm = 0;
 }

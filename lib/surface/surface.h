@@ -61,7 +61,6 @@ void capsule_nearest(const struct capsule *capsule, const double p[3],
 		     const double last[3], struct incise_touch *touch) INCISE_REALTIME;
 bool capsule_enters(const struct capsule *capsule, const double from[3],
 		    const double to[3], struct incise_touch *touch) INCISE_REALTIME;
-void capsule_top(const struct capsule *capsule, struct incise_touch *touch);
 
 struct incise_surface {
 	enum incise_surface_kind kind;
