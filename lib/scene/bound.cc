@@ -47,7 +47,8 @@ struct T(opening) {
 #undef T_PUNCTURES
 #undef T_WITHDRAWS
 /* The certificate's own tick, which no other file calls. */
-namespace {
+namespace
+{
 #include "../tissue/tick.proto.h"
 
 /* Errors of a filter's state: mm, mm/s, mm/s². */
