@@ -115,6 +115,9 @@ struct stepper_motor {
 	s64 position;	/* sum of steps, and the origin */
 	s64 home_position;
 	u64 steps_up, steps_down, late, shifted_ns;
+	u64 shifted_then_ns; /* at the begin of a window, see stepper_motor_lag() */
+	s64 window_ns;	     /* … which was then */
+	u32 lagging;	     /* windows in a row */
 
 	/* Set-point */
 	struct stepper_setpoint setpoint; /* in force, with its seq */
@@ -147,7 +150,7 @@ struct stepper_motor {
 	/* Evidence */
 	struct stepper_histogram lateness, cost;
 	struct stepper_histogram tick_cost; /* of its ticks alone */
-	u64 edges;
+	u64 edges, waits;		    /* pulses that the timer waited for */
 };
 
 #define STEPPER_EVENTS 1024 /* a power of two */

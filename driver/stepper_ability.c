@@ -8,17 +8,23 @@
  *   due ─────── lateness ──────▶│◀─ inputs ─▶│◀─ write ─▶│
  *                              fires                     line has changed
  *
+ * Then it fires SHOTS times more, each PULSE_NS behind the write of the one before, as edges
+ * of pulses do: with C the median of what a firing costs then, from when it is due to its write,
+ * and a 32nd more, a step takes
+ *
+ *   high + low + 2C        with two firings
+ *   high + low + C + E     with one that waits for the end of the pulse
+ *
  * With L the lateness that 99 % of shots keep, M its median and E the median cost of a
  * shot, the shortest pulse is p = E + M: below that most edges would be late by more than
  * their own length. The largest rate is
  *
- *                  10⁹
- *   rate = ─────────────────────       n motors
- *          max(2p + L, 4n(E + M))
+ *                   10⁹
+ *   rate = ────────────────────────       n motors
+ *          max(2p + S, 2n(S + p))
  *
- * First: high and low last p each, and an edge may be late by L. Second: a step is two
- * firings, each of which costs the processor a shot and the way into the interrupt; n
- * motors share one processor, and their steps shall take half of it at most.
+ * with S the shorter of the two costs of a step. First: high and low last p each. Second: n motors share
+ * one processor, and their steps, with a pulse that is waited for, shall take half of it at most.
  *
  * Motors that stand cost ticks. With T the median cost of a shot and of what a tick
  * computes, and W the least lateness, the way into the interrupt and about that out of it, the
@@ -46,6 +52,7 @@
 #define SHOT_NS 100000
 #define ROUNDS 3
 #define QUIET_NS 20000
+#define PULSE_NS 2000
 
 struct stepper_trial {
 	struct hrtimer timer;
@@ -54,7 +61,8 @@ struct stepper_trial {
 	u32 late_ns[SHOTS];
 	u32 edge_ns[SHOTS];
 	u32 tick_ns[SHOTS];
-	u32 seen; /* inputs: their reading is not left out */
+	u32 close_ns[SHOTS]; /* of firings one pulse behind another */
+	u32 seen;	     /* inputs: their reading is not left out */
 	struct incise_profile_slot slot;
 	struct stepper_setpoint setpoint;
 };
@@ -90,7 +98,19 @@ static enum hrtimer_restart stepper_ability_fire(struct hrtimer *timer)
 	s64 due = ktime_to_ns(hrtimer_get_expires(timer));
 	struct stepper_motor *motor = &stepper->motor[trial->n % stepper->n_motors];
 	s64 fired = ktime_get_ns(), written, ticked;
+	int close = trial->n - SHOTS;
 
+	if (close >= 0) {
+		stepper_ability_shot(trial, &motor->lines);
+		written = ktime_get_ns();
+		trial->close_ns[close] = min(written - due, (s64)U32_MAX);
+		/* The side that waits for the last reads them. */
+		smp_store_release(&trial->n, trial->n + 1);
+		if (close == SHOTS - 1)
+			return HRTIMER_NORESTART;
+		hrtimer_set_expires(timer, ns_to_ktime(written + PULSE_NS));
+		return HRTIMER_RESTART;
+	}
 	stepper_ability_shot(trial, &motor->lines);
 	written = ktime_get_ns();
 	stepper_ability_tick(trial, motor);
@@ -98,10 +118,7 @@ static enum hrtimer_restart stepper_ability_fire(struct hrtimer *timer)
 	trial->late_ns[trial->n] = min(fired - due, (s64)U32_MAX);
 	trial->edge_ns[trial->n] = min(written - fired, (s64)U32_MAX);
 	trial->tick_ns[trial->n] = min(ticked - fired, (s64)U32_MAX);
-	/* The side that waits for the last reads them. */
-	smp_store_release(&trial->n, trial->n + 1);
-	if (trial->n == SHOTS)
-		return HRTIMER_NORESTART;
+	trial->n++;
 	/* From now: a shot that was very late must not make the next ones late too. */
 	hrtimer_forward(timer, ns_to_ktime(ticked), ns_to_ktime(SHOT_NS));
 	return HRTIMER_RESTART;
@@ -121,12 +138,13 @@ static void stepper_ability_round(struct stepper_trial *trial)
 	hrtimer_start(&trial->timer, ktime_add_ns(ktime_get(), SHOT_NS),
 		      HRTIMER_MODE_ABS_PINNED_HARD);
 	/* Pairs with the release in the timer. */
-	while (smp_load_acquire(&trial->n) < SHOTS)
+	while (smp_load_acquire(&trial->n) < 2 * SHOTS)
 		usleep_range(2000, 5000);
 	hrtimer_cancel(&trial->timer);
 	sort(trial->late_ns, SHOTS, sizeof(u32), stepper_ability_compare, NULL);
 	sort(trial->edge_ns, SHOTS, sizeof(u32), stepper_ability_compare, NULL);
 	sort(trial->tick_ns, SHOTS, sizeof(u32), stepper_ability_compare, NULL);
+	sort(trial->close_ns, SHOTS, sizeof(u32), stepper_ability_compare, NULL);
 }
 
 /* Fill in the results of the self-test in info. Sleeps. */
@@ -140,7 +158,7 @@ int stepper_ability_measure(struct stepper *stepper)
 		.jerk = 0,
 	};
 	struct incise_stepper_controller *info = &stepper->info;
-	u64 pulse = U32_MAX, tick = U32_MAX, late = U32_MAX, period;
+	u64 pulse = U32_MAX, tick = U32_MAX, late = U32_MAX, close = U32_MAX, period;
 	struct stepper_trial *trial;
 	int round, ret = 0;
 	unsigned int i;
@@ -173,11 +191,15 @@ int stepper_ability_measure(struct stepper *stepper)
 		info->edge_ns = trial->edge_ns[SHOTS / 2];
 		pulse = (u64)info->edge_ns + trial->late_ns[SHOTS / 2];
 		tick = (u64)trial->tick_ns[SHOTS / 2] + 2ULL * trial->late_ns[0];
+		close = (u64)trial->close_ns[SHOTS / 2] * 33 / 32;
 	}
 	stepper_latency_release(stepper);
 	kfree(trial);
 
-	period = max(2 * pulse + late, 4 * stepper->n_motors * pulse);
+	info->step_ns = min(2 * close, (u64)U32_MAX);
+	info->wait_step_ns = min(close + info->edge_ns, (u64)U32_MAX);
+	period = min(info->step_ns, info->wait_step_ns);
+	period = max(2 * pulse + period, 2 * stepper->n_motors * (period + pulse));
 	info->rate_max = clamp(div64_u64(NSEC_PER_SEC, max(period, 1ULL)), 1ULL,
 			       (u64)INCISE_PROFILE_VELOCITY_MAX);
 	info->resolution_ns = hrtimer_resolution;

@@ -98,7 +98,7 @@ static int counters_show(struct seq_file *file, void *data)
 
 	for (i = 0; i < stepper->n_motors; i++) {
 		struct stepper_motor *motor = &stepper->motor[i];
-		u64 edges, up, down, late, shifted;
+		u64 edges, up, down, late, shifted, waits;
 		u32 faults;
 
 		raw_spin_lock_irqsave(&motor->lock, flags);
@@ -107,12 +107,13 @@ static int counters_show(struct seq_file *file, void *data)
 		down = motor->steps_down;
 		late = motor->late;
 		shifted = motor->shifted_ns;
+		waits = motor->waits;
 		faults = motor->faults;
 		raw_spin_unlock_irqrestore(&motor->lock, flags);
 		seq_printf(file, "motor=%u edges=%llu steps_up=%llu steps_down=%llu", i,
 			   edges, up, down);
-		seq_printf(file, " late=%llu shifted_ns=%llu faults=%#x\n", late, shifted,
-			   faults);
+		seq_printf(file, " late=%llu shifted_ns=%llu waits=%llu faults=%#x\n",
+			   late, shifted, waits, faults);
 	}
 	return 0;
 }

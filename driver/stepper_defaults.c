@@ -127,8 +127,7 @@ static void stepper_defaults_fit(struct stepper_motor *motor,
 	}
 	c->high_ns = max(c->high_ns, info->pulse_ns);
 	c->low_ns = max(c->low_ns, info->pulse_ns);
-	velocity = min_t(u64, info->rate_max,
-			 div_u64(NSEC_PER_SEC, max(c->high_ns + c->low_ns, 1U)));
+	velocity = min(info->rate_max, stepper_page_velocity(c, info));
 	if (c->velocity > velocity) {
 		dev_warn(dev,
 			 "motor %u: %u steps/s exceed the limit of this machine: %u\n",

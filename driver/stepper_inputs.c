@@ -20,8 +20,10 @@ static bool stepper_inputs_towards(const struct stepper_motor *motor,
 {
 	int direction = limit == STEPPER_LIMIT_MAX ? 1 : -1;
 
+	/* Whether a way is left: the last step of a motion may end on the switch. */
 	return motor->powered && motor->slot.dir == direction &&
-	       (motor->given < motor->slot.n || !incise_profile_resting(&motor->profile));
+	       (motor->given < motor->slot.n ||
+		incise_profile_ahead(&motor->profile, direction));
 }
 
 static void stepper_inputs_act(struct stepper_motor *motor, enum stepper_input input,

@@ -22,7 +22,9 @@
 #include <linux/hrtimer.h>
 #include <linux/kernel.h>
 #include <linux/ktime.h>
+#include <linux/math64.h>
 #include <linux/minmax.h>
+#include <linux/percpu.h>
 
 #include "compat.h"
 #include "stepper.h"
@@ -30,6 +32,24 @@
 
 /* Intervals may be 1/2^CATCH_UP shorter than the profile has them. */
 #define CATCH_UP 3
+
+/*
+ * A motion whose time line is put off by more than 1/64 in each of so many windows in a row does
+ * not recover.
+ */
+#define LAG_WINDOW_NS (128 * NSEC_PER_MSEC)
+#define LAG_SHARE 64
+#define LAG_WINDOWS 8
+
+/* Timers of other motors that expired with this one wait for their pulses too: so much in all. */
+#define WAIT_SUM_NS 10000
+
+struct stepper_waited {
+	s64 since_ns;
+	s64 sum_ns;
+};
+
+static DEFINE_PER_CPU(struct stepper_waited, stepper_waited);
 
 /* The next action and its time: only from the state of the motor, so that it may be asked
  * for as often as one likes, after whatever has come between.
@@ -107,6 +127,44 @@ static void stepper_motor_late(struct stepper_motor *motor, s64 late, u32 shorte
 		stepper_stop_fault(motor, INCISE_STEPPER_FAULT_LATE, now);
 }
 
+static void stepper_motor_trail(struct stepper_motor *motor, s64 now, s64 due)
+{
+	motor->high = false;
+	motor->trail_ns =
+		stepper_motor_write(motor, STEPPER_STEP, motor->lines.step, false, due);
+	if (motor->powered)
+		stepper_motor_late(motor, now - due, motor->config.high_ns,
+				   motor->trail_ns);
+}
+
+/*
+ * End a short pulse here, which costs less than another interrupt. The sum is of waits that follow one
+ * another in less time than a pulse: of one interrupt.
+ */
+static void stepper_motor_wait(struct stepper_motor *motor)
+{
+	struct stepper_waited *waited = this_cpu_ptr(&stepper_waited);
+	u32 high_ns = motor->config.high_ns;
+	s64 end = motor->lead_ns + high_ns;
+	s64 now;
+
+	if (!motor->high || high_ns > INCISE_STEPPER_WAIT_MAX_NS ||
+	    motor->config.flags & INCISE_STEPPER_CONFIG_NO_WAIT)
+		return;
+	if (motor->lead_ns - waited->since_ns > WAIT_SUM_NS)
+		waited->sum_ns = 0;
+	if (waited->sum_ns + high_ns > WAIT_SUM_NS)
+		return;
+	do {
+		cpu_relax();
+		now = ktime_get_ns();
+	} while (now < end);
+	waited->sum_ns += high_ns;
+	waited->since_ns = now;
+	motor->waits++;
+	stepper_motor_trail(motor, now, end);
+}
+
 static void stepper_motor_lead(struct stepper_motor *motor, s64 now, s64 due, s64 want)
 {
 	int direction = motor->slot.dir;
@@ -140,16 +198,7 @@ static void stepper_motor_lead(struct stepper_motor *motor, s64 now, s64 due, s6
 		motor->shifted_ns += lag;
 	}
 	stepper_motor_late(motor, now - due, motor->config.low_ns, motor->lead_ns);
-}
-
-static void stepper_motor_trail(struct stepper_motor *motor, s64 now, s64 due)
-{
-	motor->high = false;
-	motor->trail_ns =
-		stepper_motor_write(motor, STEPPER_STEP, motor->lines.step, false, due);
-	if (motor->powered)
-		stepper_motor_late(motor, now - due, motor->config.high_ns,
-				   motor->trail_ns);
+	stepper_motor_wait(motor);
 }
 
 static void stepper_motor_dir(struct stepper_motor *motor, s64 due)
@@ -221,6 +270,23 @@ static void stepper_motor_aim(struct stepper_motor *motor, s64 now)
 	motor->asked = false;
 }
 
+/* A motion that falls behind for good is a fault, where single edges are in time as well. */
+static void stepper_motor_lag(struct stepper_motor *motor, s64 now)
+{
+	s64 window = now - motor->window_ns;
+
+	if (window < LAG_WINDOW_NS)
+		return;
+	if (motor->shifted_ns - motor->shifted_then_ns > div_s64(window, LAG_SHARE))
+		motor->lagging++;
+	else
+		motor->lagging = 0;
+	motor->window_ns = now;
+	motor->shifted_then_ns = motor->shifted_ns;
+	if (motor->lagging >= LAG_WINDOWS)
+		stepper_stop_fault(motor, INCISE_STEPPER_FAULT_LATE, now);
+}
+
 static void stepper_motor_tick(struct stepper_motor *motor, s64 now, s64 due)
 {
 	bool resting;
@@ -228,6 +294,8 @@ static void stepper_motor_tick(struct stepper_motor *motor, s64 now, s64 due)
 	stepper_inputs_sample(motor, now);
 	if (motor->powered)
 		stepper_motor_listen(motor, now, due);
+	if (motor->powered)
+		stepper_motor_lag(motor, now);
 	if (!motor->powered)
 		return;
 

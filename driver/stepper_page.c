@@ -111,6 +111,18 @@ static bool stepper_page_within(__u64 value, __u64 min, __u64 max)
 	return value >= min && value <= max;
 }
 
+/* The largest velocity with the pulses of a config: steps/s. */
+__u32 stepper_page_velocity(const struct incise_stepper_config *config,
+			    const struct incise_stepper_controller *info)
+{
+	bool waits = config->high_ns <= INCISE_STEPPER_WAIT_MAX_NS &&
+		     !(config->flags & INCISE_STEPPER_CONFIG_NO_WAIT);
+	__u64 step = (__u64)config->high_ns + config->low_ns +
+		     (waits ? info->wait_step_ns : info->step_ns);
+
+	return div64_u64(1000000000ULL, step ? step : 1);
+}
+
 /**
  * stepper_page_config() - whether a config can be held on this machine
  * @config:	from a user
@@ -124,7 +136,9 @@ static bool stepper_page_within(__u64 value, __u64 min, __u64 max)
 int stepper_page_config(const struct incise_stepper_config *config,
 			const struct incise_stepper_controller *info)
 {
-	const __u32 flags = INCISE_STEPPER_CONFIG_INVERT | INCISE_STEPPER_CONFIG_RETRACT;
+	const __u32 flags = INCISE_STEPPER_CONFIG_INVERT | INCISE_STEPPER_CONFIG_RETRACT |
+			    INCISE_STEPPER_CONFIG_VOLATILE |
+			    INCISE_STEPPER_CONFIG_NO_WAIT;
 	const __s64 most = INCISE_PROFILE_POSITION_MAX;
 	unsigned int i;
 
@@ -152,8 +166,7 @@ int stepper_page_config(const struct incise_stepper_config *config,
 	    config->tick_ns < info->tick_min_ns)
 		return -ERANGE;
 	if (config->high_ns < info->pulse_ns || config->low_ns < info->pulse_ns ||
-	    (__u64)config->high_ns + config->low_ns >
-		    div_u64(1000000000ULL, config->velocity))
+	    config->velocity > stepper_page_velocity(config, info))
 		return -ERANGE;
 	return 0;
 }

@@ -35,6 +35,8 @@ enum stepper_page_answer stepper_page_take(const struct incise_stepper_setpoint 
 					   struct stepper_setpoint *setpoint);
 __s64 stepper_page_clamp(const struct stepper_setpoint *setpoint,
 			 const struct incise_stepper_config *config);
+__u32 stepper_page_velocity(const struct incise_stepper_config *config,
+			    const struct incise_stepper_controller *info);
 int stepper_page_config(const struct incise_stepper_config *config,
 			const struct incise_stepper_controller *info);
 

@@ -11,6 +11,9 @@
  *   READY/MOVING ──▶ STOPPING ──▶ FAULT ──(clear)──▶ DISABLED
  *        └───────── at once ───────▲
  *
+ * HOMED goes with e-stop, driver and suspend, with or without power before, and with each power
+ * off where the config says so.
+ *
  * All under motor->lock, in any context.
  */
 #include "compat.h"
@@ -21,6 +24,10 @@
 	(INCISE_STEPPER_FAULT_LIMIT_MIN | INCISE_STEPPER_FAULT_LIMIT_MAX | \
 	 INCISE_STEPPER_FAULT_ESTOP | INCISE_STEPPER_FAULT_ALARM |         \
 	 INCISE_STEPPER_FAULT_LATE | INCISE_STEPPER_FAULT_LINE)
+/* With these the power stage loses its supply, and the rotor may turn unseen. */
+#define UNHOME                                                     \
+	(INCISE_STEPPER_FAULT_ESTOP | INCISE_STEPPER_FAULT_ALARM | \
+	 INCISE_STEPPER_FAULT_SUSPEND)
 #define RETRACT                                                      \
 	(INCISE_STEPPER_FAULT_DEADMAN | INCISE_STEPPER_FAULT_OWNER | \
 	 INCISE_STEPPER_FAULT_PLAN)
@@ -30,6 +37,8 @@ void stepper_stop_off(struct stepper_motor *motor, s64 now)
 {
 	motor->powered = false;
 	motor->disabling = false;
+	if (motor->config.flags & INCISE_STEPPER_CONFIG_VOLATILE)
+		motor->flags &= ~INCISE_STEPPER_FLAG_HOMED;
 	compat_gpiod_set_value(motor->lines.enable, 0);
 	trace_incise_stepper_edge(motor->stepper->id, motor->index, STEPPER_ENABLE, 0,
 				  now, now);
@@ -79,6 +88,10 @@ static void stepper_stop_gently(struct stepper_motor *motor, u32 fault, s64 now)
 /* Latch a fault of a motor that has power, and stop it as the fault asks for. */
 void stepper_stop_fault(struct stepper_motor *motor, u32 fault, s64 now)
 {
+	if (fault & UNHOME && motor->flags & INCISE_STEPPER_FLAG_HOMED) {
+		motor->flags &= ~INCISE_STEPPER_FLAG_HOMED;
+		stepper_status_publish(motor, now);
+	}
 	if (!motor->powered)
 		return;
 	/* It was disabled before the file was closed. */

@@ -121,7 +121,10 @@ struct incise_stepper_setpoint {
 };
 
 /* incise_stepper_motor_status.flags */
-/* Position is the machine's; a stop at once while moving takes it away. */
+/*
+ * Position is the machine's. A stop at once while moving takes it away, and so do e-stop, ALARM, suspend and,
+ * with INCISE_STEPPER_CONFIG_VOLATILE, each power off.
+ */
 #define INCISE_STEPPER_FLAG_HOMED (1U << 0)
 #define INCISE_STEPPER_FLAG_HELD (1U << 1)	/* the last set-point was clamped */
 #define INCISE_STEPPER_FLAG_HOME_SEEN (1U << 2) /* home_position is of this enable */
@@ -286,8 +289,7 @@ struct incise_stepper_event {
  * @capabilities: INCISE_STEPPER_CAP_… bits
  * @n_motors: 1 … INCISE_STEPPER_MOTORS_MAX
  * @rate_max: steps/s that this machine's self-test allows a motor when all of them move;
- *            config.velocity and its pulse times are refused beyond. Cruising at it may be
- *            slower, by what edges are late
+ *            config.velocity is refused beyond
  * @edge_ns: self-test: median cost of reading a motor's inputs and writing a line
  * @lateness_ns: self-test: 99 % of timers were at most this late, in the best of its rounds
  * @lateness_max_ns: self-test: the latest
@@ -298,6 +300,9 @@ struct incise_stepper_event {
  *               most a quarter of a processor
  * @polled: per motor, the inputs whose chip gives no interrupt: they are looked at when power
  *          is asked for, at each tick, and e-stop and the limit ahead before each step
+ * @step_ns: self-test: time that a step takes besides config.high_ns and low_ns, where the timer
+ *           ends its pulse: 10⁹ / (high_ns + low_ns + step_ns) is the largest velocity with these
+ * @wait_step_ns: the same where the timer waits for the end of a pulse
  * @reserved: zero
  */
 struct incise_stepper_controller {
@@ -313,13 +318,20 @@ struct incise_stepper_controller {
 	__u32 pulse_ns;
 	__u32 tick_min_ns;
 	__u32 polled[INCISE_STEPPER_MOTORS_MAX];
-	__u64 reserved[15];
+	__u32 step_ns;
+	__u32 wait_step_ns;
+	__u64 reserved[14];
 };
 
 /* incise_stepper_config.flags */
 #define INCISE_STEPPER_CONFIG_INVERT (1U << 0) /* a step up sets dir inactive */
 /* On DEADMAN and OWNER, a homed motor goes to safe_position before it is disabled. */
 #define INCISE_STEPPER_CONFIG_RETRACT (1U << 1)
+/* Without power the machine moves: it is not homed any more. */
+#define INCISE_STEPPER_CONFIG_VOLATILE (1U << 2)
+/* The timer ends each pulse; else it waits for the end of one of at most INCISE_STEPPER_WAIT_MAX_NS. */
+#define INCISE_STEPPER_CONFIG_NO_WAIT (1U << 3)
+#define INCISE_STEPPER_WAIT_MAX_NS 2000
 
 /**
  * struct incise_stepper_config - a motor's limits and times, 128 bytes
@@ -338,15 +350,16 @@ struct incise_stepper_controller {
  * @setup_ns: from a change of dir to the step after it, 0 … 1000000
  * @hold_ns: from a step's leading edge to a change of dir, 0 … 1000000
  * @enable_ns: from enable to the first step, 0 … 1000000000
- * @late_max: edges in a row, each late by its shortest time, until the fault LATE; 1 … 1000. Of
+ * @late_max: edges in a row, each late by its shortest time, until the fault LATE; 1 … 1000. A
+ *            motion that is put off by more than 1/64 of its time for a second is the same fault. Of
  *            a plan's first motor also ticks of the plan in a row, each late by its tick_ns, or
  *            taking more than half of it
  * @reserved: zero
  *
  * SET_CONFIG gives EBUSY while the motor is enabled, EINVAL for a value out of its range
  * and ERANGE for what this machine or a step cannot hold: velocity beyond info.rate_max,
- * tick_ns below info.tick_min_ns, high_ns or low_ns below info.pulse_ns, high_ns + low_ns
- * longer than a step at velocity, and a jerk so low that the profile would take more than 256
+ * tick_ns below info.tick_min_ns, high_ns or low_ns below info.pulse_ns, high_ns + low_ns and
+ * info.step_ns or wait_step_ns longer than a step at velocity, and a jerk so low that the profile would take more than 256
  * ticks for it.
  */
 struct incise_stepper_config {

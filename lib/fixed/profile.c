@@ -243,6 +243,21 @@ bool incise_profile_resting(const struct incise_profile *profile)
 	return profile->still >= profile->average;
 }
 
+bool incise_profile_ahead(const struct incise_profile *profile, int32_t direction)
+{
+	int64_t next = (profile->whole + (int64_t)direction) * STEP;
+	int64_t far = profile->ramp.top ? profile->ramp.target : profile->ramp.position;
+
+	/* It goes on until it has braked, beyond its target if need be. */
+	if (profile->ramp.velocity * direction > 0)
+		return true;
+	/* Positions that the average has not reached. */
+	for (uint32_t i = 0; i < profile->average; i++)
+		if (direction > 0 ? profile->history[i] > far : profile->history[i] < far)
+			far = profile->history[i];
+	return direction > 0 ? far >= next : far <= next;
+}
+
 int32_t incise_profile_position(const struct incise_profile *profile)
 {
 	return profile->whole;

@@ -137,6 +137,12 @@ int incise_profile_init(struct incise_profile *profile,
 int64_t incise_profile_target(struct incise_profile *profile,
 			      enum incise_profile_mode mode, int64_t target);
 
+/*
+ * Whether a step in a direction, +1 or -1, may still come without another target. It may not once the
+ * last step of a motion was given, though the profile is not at rest yet.
+ */
+bool incise_profile_ahead(const struct incise_profile *profile, int32_t direction);
+
 /* Brake to rest at the limits, wherever that is: velocity 0. */
 void incise_profile_stop(struct incise_profile *profile);
 

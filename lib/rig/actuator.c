@@ -38,6 +38,8 @@ const struct incise_setting incise_actuator_settings[] = {
 	SETTING_TRUTH(retract, retract, "false",
 		      "after the deadman, move to rest_mm before power goes off, if "
 		      "the position is known"),
+	SETTING_TRUTH(volatile_home, volatile_home, "false",
+		      "without power the nut can move: home again after each power off"),
 	SETTING_NUMBER(tick_us, tick_ns, "µs", 50, 2000, "250",
 		       "period in which the driver reads targets", .scale = US),
 	SETTING_NUMBER(high_us, high_ns, "µs", 0.5, 1000, "(5 or more)",
@@ -54,7 +56,8 @@ const struct incise_setting incise_actuator_settings[] = {
 		       "(2, or velocity_mm_s)", "speed of homing; at most velocity_mm_s"),
 	SETTING_NUMBER(home_mm, home_mm, "mm", -1000, 1000, "0",
 		       "position of the edge of the home input, from a quarter of the "
-		       "travel below 0 to its end"),
+		       "travel below 0 to its end; where the lower limit is the home, 0 "
+		       "stands for -0.5, so that the motor does not rest on it"),
 	SETTING_NUMBER(origin_mm, origin_mm, "mm", -1e6, 1e6, "0",
 		       "the handle's 0 along direction, in the frame of the tracker"),
 	SETTING_NUMBER(rest_mm, rest_mm, "mm", 0, 1000, "0",

@@ -7,6 +7,8 @@
 #include "page.h"
 
 #define RETRACTS (INCISE_STEPPER_FAULT_DEADMAN | INCISE_STEPPER_FAULT_OWNER)
+/* With these the power stage loses its supply, and the rotor may turn unseen. */
+#define UNHOME (INCISE_STEPPER_FAULT_ESTOP | INCISE_STEPPER_FAULT_ALARM)
 #define FORBIDS (INCISE_STEPPER_LINE_ESTOP | INCISE_STEPPER_LINE_ALARM)
 
 int incise_motion_init(struct incise_motion *m,
@@ -56,6 +58,8 @@ int incise_motion_power_on(struct incise_motion *m, int64_t now_ns)
 void incise_motion_power_off(struct incise_motion *m)
 {
 	m->powered = m->ending = false;
+	if (m->config.flags & INCISE_STEPPER_CONFIG_VOLATILE)
+		m->status.flags &= ~INCISE_STEPPER_FLAG_HOMED;
 	m->status.state = m->status.faults ? INCISE_STEPPER_STATE_FAULT
 					   : INCISE_STEPPER_STATE_DISABLED;
 }
@@ -86,6 +90,8 @@ void incise_motion_brake(struct incise_motion *m, uint32_t fault)
 
 bool incise_motion_fault(struct incise_motion *m, uint32_t fault)
 {
+	if (fault & UNHOME)
+		m->status.flags &= ~INCISE_STEPPER_FLAG_HOMED;
 	if (!m->powered || !fault)
 		return false;
 	m->status.faults |= fault;

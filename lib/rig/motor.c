@@ -15,6 +15,7 @@
 #define UNREAD_MAX 100	    /* failed reads until -EIO */
 #define POLL_NS INCISE_NS_PER_S / 1000
 #define DISABLE_NS (2 * INCISE_NS_PER_S) /* more than a drive is given to stop */
+#define CLEARANCE_MM 0.5		 /* from a limit that is the home, too */
 #define LATE_MAX 20			 /* edges in a row */
 #define TICK_MOST_S 0.002		 /* between writes of a status with power */
 
@@ -338,6 +339,9 @@ static int motor_homing(struct incise_stepper *stepper,
 		homing->home_at = INCISE_STEPPER_LINE_LIMIT_MIN;
 	else
 		return -EOPNOTSUPP;
+	/* Rest beside the switch, not on it. */
+	if (homing->home_at == INCISE_STEPPER_LINE_LIMIT_MIN && homing->home_mm == 0)
+		homing->home_mm = -fmin(CLEARANCE_MM, motor->actuator.travel_mm / 4);
 	return 0;
 }
 
@@ -391,7 +395,8 @@ void incise_motor_config(const struct incise_actuator *actuator, unsigned int in
 	*config = (struct incise_stepper_config){
 		.motor = index,
 		.flags = (actuator->invert ? INCISE_STEPPER_CONFIG_INVERT : 0) |
-			 (actuator->retract ? INCISE_STEPPER_CONFIG_RETRACT : 0),
+			 (actuator->retract ? INCISE_STEPPER_CONFIG_RETRACT : 0) |
+			 (actuator->volatile_home ? INCISE_STEPPER_CONFIG_VOLATILE : 0),
 		.tick_ns = limits.tick_ns,
 		.velocity = limits.velocity,
 		.acceleration = limits.acceleration,
@@ -409,7 +414,8 @@ void incise_motor_config(const struct incise_actuator *actuator, unsigned int in
 }
 
 int incise_motor_fit(struct incise_actuator *actuator, const char *where,
-		     uint32_t rate_max, uint32_t pulse_ns, struct incise_error *err)
+		     uint32_t rate_max, uint32_t pulse_ns, uint32_t step_ns,
+		     struct incise_error *err)
 {
 	double step_mm = incise_actuator_step_mm(actuator);
 	double rate = actuator->velocity_mm_s / step_mm, most = rate_max, own;
@@ -426,7 +432,7 @@ int incise_motor_fit(struct incise_actuator *actuator, const char *where,
 			"at least %g; correct or remove them in rig.conf",
 			where, actuator->high_ns / 1e3, actuator->low_ns / 1e3,
 			pulse_ns / 1e3);
-	own = 1e9 / ((double)actuator->high_ns + actuator->low_ns);
+	own = 1e9 / ((double)actuator->high_ns + actuator->low_ns + step_ns);
 	most = fmin(most, own);
 	if (rate <= most * (1 + 1e-9))
 		return 0;

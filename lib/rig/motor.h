@@ -84,6 +84,7 @@ void incise_motor_config(const struct incise_actuator *actuator, unsigned int in
  * or -ERANGE.
  */
 int incise_motor_fit(struct incise_actuator *actuator, const char *where,
-		     uint32_t rate_max, uint32_t pulse_ns, struct incise_error *err);
+		     uint32_t rate_max, uint32_t pulse_ns, uint32_t step_ns,
+		     struct incise_error *err);
 
 #endif

@@ -59,9 +59,16 @@ static int64_t write_line(struct incise_pulser *p, enum incise_pulser_output out
 	return now;
 }
 
+/* Whether a way is left: the last step of a motion may end on a limit switch. */
+static bool goes_on(const struct incise_pulser *p, int direction)
+{
+	return p->motion.powered && p->steps.dir == direction &&
+	       (p->given < p->steps.n ||
+		incise_profile_ahead(&p->motion.profile, direction));
+}
+
 static void look_pulser(struct incise_pulser *p, int64_t now)
 {
-	bool moves = p->motion.powered && (p->given < p->steps.n || !p->motion.resting);
 	int inputs = p->ops->inputs(p->world);
 	uint32_t rising;
 
@@ -80,9 +87,9 @@ static void look_pulser(struct incise_pulser *p, int64_t now)
 	if (inputs & INCISE_STEPPER_LINE_ALARM)
 		fault_at(p, INCISE_STEPPER_FAULT_ALARM, now);
 	/* Motion away from a limit is allowed. */
-	if (moves && inputs & INCISE_STEPPER_LINE_LIMIT_MIN && p->steps.dir < 0)
+	if (inputs & INCISE_STEPPER_LINE_LIMIT_MIN && goes_on(p, -1))
 		fault_at(p, INCISE_STEPPER_FAULT_LIMIT_MIN, now);
-	if (moves && inputs & INCISE_STEPPER_LINE_LIMIT_MAX && p->steps.dir > 0)
+	if (inputs & INCISE_STEPPER_LINE_LIMIT_MAX && goes_on(p, 1))
 		fault_at(p, INCISE_STEPPER_FAULT_LIMIT_MAX, now);
 }
 

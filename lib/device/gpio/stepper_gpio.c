@@ -328,7 +328,7 @@ static int set_up_stepper_gpio(struct gpio_stepper *g,
 		return incise_error_set(
 			err, -rc, "%s: gpio chip %.60s: its lines cannot be used: %s",
 			request->where, request->arguments, strerror(-rc));
-	rc = incise_motor_fit(&g->motor.actuator, request->where, rate_max, pulse_ns,
+	rc = incise_motor_fit(&g->motor.actuator, request->where, rate_max, pulse_ns, 0,
 			      err);
 	if (rc)
 		return rc;

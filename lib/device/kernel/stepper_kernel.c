@@ -454,11 +454,16 @@ static int configure(struct kernel_stepper *k,
 		     const struct incise_stepper_controller *info,
 		     const struct incise_backend_request *asked, struct incise_error *err)
 {
+	uint32_t high_ns = k->motor.actuator.high_ns;
 	struct incise_stepper_config config;
 	int rc;
 
 	rc = incise_motor_fit(&k->motor.actuator, asked->where, info->rate_max,
-			      info->pulse_ns, err);
+			      info->pulse_ns,
+			      high_ns && high_ns <= INCISE_STEPPER_WAIT_MAX_NS
+				      ? info->wait_step_ns
+				      : info->step_ns,
+			      err);
 	if (rc)
 		return rc;
 	incise_motor_config(&k->motor.actuator, k->index, &config);

@@ -233,6 +233,7 @@ struct incise_actuator {
 	double jerk_mm_s3; /**< 0: no limit */
 	double deadman_s;
 	bool retract; /**< after the deadman, move to rest_mm before power goes off */
+	bool volatile_home; /**< not homed any more after each power off */
 	uint32_t tick_ns;
 	uint32_t high_ns, low_ns; /**< 0: not given: the shortest of the machine */
 	uint32_t setup_ns, hold_ns;
@@ -248,7 +249,7 @@ struct incise_actuator {
 };
 
 /** Version of the structs and values that backends use. */
-#define INCISE_BACKEND_ABI 9
+#define INCISE_BACKEND_ABI 10
 
 /** Settings of rig.conf for a backend. */
 struct incise_backend_request {

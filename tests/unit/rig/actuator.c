@@ -142,22 +142,22 @@ TEST(the_machine_must_hold_the_rate)
 	struct incise_stepper_config config;
 
 	/* 16 000 steps/s asked, and pulses that are not given become the shortest. */
-	assert_int_equal(incise_motor_fit(&a, "m", 16000, 8000, &err), 0);
+	assert_int_equal(incise_motor_fit(&a, "m", 16000, 8000, 0, &err), 0);
 	assert_true(a.high_ns == 8000 && a.low_ns == 8000);
 	incise_motor_config(&a, 3, &config);
 	assert_true(config.motor == 3 && config.velocity == 16000 &&
 		    config.high_ns == 8000);
 	assert_true(config.deadman_ns == 100000000 && config.position_max == 32000);
 	a = actuator_good("", NEEDED);
-	assert_int_equal(incise_motor_fit(&a, "m", 20000, 100, &err), 0);
+	assert_int_equal(incise_motor_fit(&a, "m", 20000, 100, 0, &err), 0);
 	assert_true(a.high_ns == 5000 && a.low_ns == 5000);
 	a = actuator_good("", NEEDED);
-	assert_error(incise_motor_fit(&a, "m", 15999, 100, &err), ERANGE, &err,
+	assert_error(incise_motor_fit(&a, "m", 15999, 100, 0, &err), ERANGE, &err,
 		     "16000 steps/s", "15999", "9.9993 mm/s");
 	/* Pulses so long that the rate does not fit: 2·40 µs are 12 500 steps/s. */
 	a = actuator_good("", NEEDED);
-	assert_error(incise_motor_fit(&a, "m", 20000, 40000, &err), ERANGE, &err,
+	assert_error(incise_motor_fit(&a, "m", 20000, 40000, 0, &err), ERANGE, &err,
 		     "12500");
 	a = actuator_good("", NEEDED "high_us = 7.0;");
-	assert_error(incise_motor_fit(&a, "m", 20000, 8000, &err), ERANGE, &err, "8");
+	assert_error(incise_motor_fit(&a, "m", 20000, 8000, 0, &err), ERANGE, &err, "8");
 }
