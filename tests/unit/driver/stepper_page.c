@@ -203,6 +203,8 @@ static const struct incise_stepper_controller machine = {
 	.rate_max = 100000,
 	.pulse_ns = 600,
 	.tick_min_ns = 60000,
+	.step_ns = 3000,
+	.wait_step_ns = 1000,
 };
 
 static const struct incise_stepper_config good = {
@@ -230,8 +232,8 @@ TEST(test_config)
 #define FIELD(name) offsetof(struct incise_stepper_config, name), sizeof(good.name)
 		{FIELD(motor), 0, 0},
 		{FIELD(motor), 2, -EINVAL},
-		{FIELD(flags), 3, 0},
-		{FIELD(flags), 4, -EINVAL},
+		{FIELD(flags), 15, 0},
+		{FIELD(flags), 16, -EINVAL},
 		{FIELD(tick_ns), 60000, 0}, /* what the self-test found */
 		{FIELD(tick_ns), 59999, -ERANGE},
 		{FIELD(tick_ns), 50000, -ERANGE},
@@ -240,7 +242,8 @@ TEST(test_config)
 		{FIELD(tick_ns), 2000001, -EINVAL},
 		{FIELD(velocity), 1, 0},
 		{FIELD(velocity), 0, -EINVAL},
-		{FIELD(velocity), 100000, 0},
+		{FIELD(velocity), 76923, 0}, /* 10 µs of a pulse, 3 of the machine */
+		{FIELD(velocity), 76924, -ERANGE},
 		{FIELD(velocity), 100001, -ERANGE},
 		{FIELD(velocity), 0xffffffff, -ERANGE},
 		{FIELD(acceleration), 0, -EINVAL},
@@ -269,13 +272,13 @@ TEST(test_config)
 		{FIELD(high_ns), 600, 0}, /* what the self-test found */
 		{FIELD(high_ns), 599, -ERANGE},
 		{FIELD(high_ns), 499, -EINVAL},
-		{FIELD(high_ns), 45000, 0}, /* 50 µs are a step at 20000 steps/s */
-		{FIELD(high_ns), 45001, -ERANGE},
+		{FIELD(high_ns), 42000, 0}, /* 50 µs are a step at 20000 steps/s */
+		{FIELD(high_ns), 42001, -ERANGE},
 		{FIELD(high_ns), 0xffffffff, -EINVAL},
 		{FIELD(low_ns), 600, 0},
 		{FIELD(low_ns), 599, -ERANGE},
 		{FIELD(low_ns), 499, -EINVAL},
-		{FIELD(low_ns), 45001, -ERANGE},
+		{FIELD(low_ns), 42001, -ERANGE},
 		{FIELD(setup_ns), 1000000, 0},
 		{FIELD(setup_ns), 1000001, -EINVAL},
 		{FIELD(hold_ns), 1000000, 0},
@@ -286,6 +289,13 @@ TEST(test_config)
 		{FIELD(reserved[4]), 1, -EINVAL},
 	};
 
+	struct incise_stepper_config brief = good;
+
+	/* A short pulse is waited for, unless that is switched off. */
+	brief.high_ns = brief.low_ns = INCISE_STEPPER_WAIT_MAX_NS;
+	assert_int_equal(stepper_page_velocity(&brief, &machine), 200000);
+	brief.flags |= INCISE_STEPPER_CONFIG_NO_WAIT;
+	assert_int_equal(stepper_page_velocity(&brief, &machine), 142857);
 	assert_int_equal(stepper_page_config(&good, &machine), 0);
 	for (size_t i = 0; i < sizeof(rows) / sizeof(*rows); i++) {
 		struct incise_stepper_config config = good;

@@ -166,6 +166,32 @@ TEST(test_any_motion)
 	assert_true(ends > 50000);
 }
 
+/*
+ * Run until rest: a step only comes in a direction that is known to have one ahead, and neither has after
+ * the last step of a motion from rest.
+ */
+static void end_known(struct motion *m, bool from_rest)
+{
+	bool up = false, down = false;
+
+	while (!incise_profile_resting(&m->profile)) {
+		bool any_up = incise_profile_ahead(&m->profile, 1);
+		bool any_down = incise_profile_ahead(&m->profile, -1);
+
+		tick(m);
+		assert_true(m->ticks < FOREVER);
+		if (!m->slot.n)
+			continue;
+		assert_true(m->slot.dir > 0 ? any_up : any_down);
+		up = incise_profile_ahead(&m->profile, 1);
+		down = incise_profile_ahead(&m->profile, -1);
+	}
+	/* From another motion it may be braking, and stop within a step. */
+	assert_true(!from_rest || !(up || down));
+	assert_false(incise_profile_ahead(&m->profile, 1));
+	assert_false(incise_profile_ahead(&m->profile, -1));
+}
+
 /* From any motion, the last target is reached to the last bit. */
 TEST(test_any_end)
 {
@@ -194,7 +220,7 @@ TEST(test_any_end)
 				incise_profile_position(&m.profile));
 		assert_in_range(target - (int64_t)l.position_min, 0,
 				l.position_max - (int64_t)l.position_min);
-		until_rest(&m);
+		end_known(&m, false);
 		assert_int_equal(m.profile.output, target * WATCH_STEP);
 		assert_int_equal(m.profile.rest, 0);
 		assert_int_equal(incise_profile_position(&m.profile), target);
@@ -203,6 +229,8 @@ TEST(test_any_end)
 		tick(&m);
 		assert_int_equal(m.slot.n, 0);
 		assert_int_equal(m.slot.dir, 0);
+		go(&m, target + pick(2001, &seed) - 1000);
+		end_known(&m, true);
 	}
 }
 
