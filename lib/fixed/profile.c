@@ -248,8 +248,9 @@ bool incise_profile_ahead(const struct incise_profile *profile, int32_t directio
 	int64_t next = (profile->whole + (int64_t)direction) * STEP;
 	int64_t far = profile->ramp.top ? profile->ramp.target : profile->ramp.position;
 
-	/* It goes on until it has braked, beyond its target if need be. */
-	if (profile->ramp.velocity * direction > 0)
+	/* It goes on until it has braked, beyond its target if need be. It arrives with a velocity. */
+	if (profile->ramp.velocity * direction > 0 &&
+	    profile->ramp.position != profile->ramp.target)
 		return true;
 	/* Positions that the average has not reached. */
 	for (uint32_t i = 0; i < profile->average; i++)
