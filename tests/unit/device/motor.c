@@ -8,6 +8,7 @@
 #include "../../../lib/base/random.h"
 #include "../../../lib/device/motor.h"
 #include "../../../lib/sim/sim.h"
+#include "../message.h"
 #include "conformance.h"
 #include "machine.h"
 
@@ -220,6 +221,132 @@ TEST(every_case_on_a_made_clock)
 				assert_in_range(b.machine.at - told->position,
 						MACHINE_HOME - 1, MACHINE_HOME + 1);
 		}
+}
+
+/* A driver chip, and what it shall report. */
+static struct {
+	struct incise_driver driver;
+	unsigned int faults;
+	bool persists;
+	int set_up; /* times */
+} chip;
+
+static unsigned int chip_faults(struct incise_driver *driver)
+{
+	(void)driver;
+	return chip.faults;
+}
+
+static int chip_cause(struct incise_driver *driver, char *text, size_t size)
+{
+	(void)driver;
+	return chip.faults ? snprintf(text, size, "chip: too hot; cool it, then clear")
+			   : 0;
+}
+
+static int chip_clear(struct incise_driver *driver, struct incise_error *to)
+{
+	(void)driver;
+	chip.set_up++;
+	if (chip.persists)
+		return incise_error_set(to, EBUSY, "chip: still too hot; cool it");
+	chip.faults = 0;
+	return 0;
+}
+
+static int chip_read(struct incise_driver *driver, struct incise_stepper_chip *to)
+{
+	(void)driver;
+	*to = (struct incise_stepper_chip){.microsteps = 16, .load = 77};
+	return 0;
+}
+
+static int chip_counter(struct incise_driver *driver, int i,
+			struct incise_stepper_counter *to)
+{
+	(void)driver;
+	*to = (struct incise_stepper_counter){"warm", "warnings", 3, true};
+	return i ? -ENOENT : 0;
+}
+
+static const struct incise_driver_ops chip_ops = {
+	.faults = chip_faults,
+	.cause = chip_cause,
+	.clear = chip_clear,
+	.read = chip_read,
+	.counter = chip_counter,
+};
+
+static struct incise_stepper_status status_of(struct bench *b)
+{
+	struct incise_stepper_status status;
+
+	assert_int_equal(incise_stepper_status(&b->motor.stepper, &status), 0);
+	return status;
+}
+
+/* A chip's fault takes no target any more, then power by the deadman, and lasts until cleared. */
+TEST(a_fault_of_the_driver_chip_stops_the_motor)
+{
+	static struct bench b;
+	struct incise_stepper *stepper = &b.motor.stepper;
+	struct incise_stepper_counter counter;
+	struct incise_stepper_chip read;
+	char text[200];
+
+	bench_start(&b, true, false, false, 0);
+	assert_int_equal(incise_stepper_chip(stepper, &read), -EOPNOTSUPP);
+	assert_int_equal(incise_stepper_counter(stepper, 0, &counter), -ENOENT);
+	chip.driver.ops = &chip_ops;
+	stepper->ops->attach(stepper, &chip.driver);
+	assert_int_equal(incise_stepper_chip(stepper, &read), 0);
+	assert_int_equal(read.load, 77);
+	assert_int_equal(incise_stepper_counter(stepper, 0, &counter), 0);
+
+	succeeds(!incise_stepper_enable(stepper, &err));
+	bench_advance(&b, 2000000);
+	succeeds(!incise_stepper_home(stepper, NULL, NULL, &err));
+	assert_int_equal(incise_stepper_set(stepper, 1), 0);
+	chip.faults = INCISE_STEPPER_FAULT_ALARM;
+	assert_int_equal(incise_stepper_set(stepper, 1), -EIO);
+	assert_int_equal(status_of(&b).faults, INCISE_STEPPER_FAULT_ALARM);
+	assert_int_equal(status_of(&b).state, INCISE_STEPPER_STATE_STOPPING);
+	assert_false(status_of(&b).homed);
+	incise_stepper_cause(stepper, text, sizeof(text));
+	assert_string_equal(text, "chip: too hot; cool it, then clear");
+	assert_error(incise_stepper_clear(stepper, &err), EBUSY, &err, "still moves");
+	bench_advance(&b, 300000000);
+	assert_int_equal(status_of(&b).state, INCISE_STEPPER_STATE_FAULT);
+	assert_error(incise_stepper_enable(stepper, &err), EPERM, &err, "too hot");
+	assert_int_equal(chip.set_up, 0);
+	chip.persists = true;
+	assert_error(incise_stepper_clear(stepper, &err), EBUSY, &err, "still too hot");
+	chip.persists = false;
+	succeeds(!incise_stepper_clear(stepper, &err));
+	assert_int_equal(chip.set_up, 2);
+	assert_int_equal(status_of(&b).state, INCISE_STEPPER_STATE_DISABLED);
+	assert_false(status_of(&b).homed);
+	succeeds(!incise_stepper_enable(stepper, &err));
+}
+
+/* A stall as the edge: at full speed both times, and with the way to reach it. */
+TEST(homing_by_a_stall)
+{
+	static struct bench b;
+	struct incise_stepper *stepper = &b.motor.stepper;
+	struct incise_stepper_homing homing;
+
+	bench_start(&b, true, false, false, 0);
+	assert_int_equal(stepper->ops->homing(stepper, &homing), 0);
+	assert_float_equal(homing.edge_mm_s, 0.2, 1e-12);
+	assert_float_equal(homing.clearance_mm, 0.2, 1e-12);
+	b.motor.actuator.tmc.stall_home = true;
+	chip.faults = 0;
+	stepper->ops->attach(stepper, &chip.driver);
+	assert_int_equal(stepper->ops->homing(stepper, &homing), 0);
+	assert_float_equal(homing.edge_mm_s, 2, 1e-12);
+	/* 2² / 500 to get to that speed and to leave it, and 20 of 0.02 mm */
+	assert_float_equal(homing.clearance_mm, 0.408, 1e-12);
 }
 
 struct virtual_rig {
