@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-# A driver chip of rig.conf as a user meets it: a stepper of a module that moves by the clock, and a
+# A driver chip of rig.conf as a user meets it: a stepper of a module that moves for 5 ms at each look, and a
 # TMC2209 of tests/unit/tmc/chip.h on a pseudo terminal, whose load is 300, 200 from 3 mm/s on.
 
 load cli
@@ -14,21 +14,23 @@ setup() {
 	cat >chip.c <<-END
 		#include <stdint.h>
 		#include <stdio.h>
-		#include <time.h>
 		#include "$root/tests/unit/tmc/chip.h"
 		static struct chip_line line;
+		static void look(struct chip_line *l)
+		{
+			l->reg[0][CHIP_SG_RESULT] = access("fast", F_OK) ? 300 : 200;
+			l->reg[0][CHIP_DRV_STATUS] = !access("hot", F_OK) ? 3 :
+				!access("warm", F_OK) ? 0x80000001 : 0xc0000000;
+		}
 		int main(void)
 		{
+			line.before_read = look;
 			if (chip_begin(&line))
 				return 1;
 			puts(line.path);
 			fclose(stdout);
-			for (;;) {
-				nanosleep(&(struct timespec){.tv_nsec = 5000000}, NULL);
-				line.reg[0][CHIP_SG_RESULT] = access("fast", F_OK) ? 300 : 200;
-				line.reg[0][CHIP_DRV_STATUS] = !access("hot", F_OK) ? 3 :
-					!access("warm", F_OK) ? 0x80000001 : 0xc0000000;
-			}
+			for (;;)
+				pause();
 		}
 	END
 	cat >stepper.c <<-END
@@ -36,21 +38,22 @@ setup() {
 		#include <math.h>
 		#include <stdio.h>
 		#include <string.h>
-		#include <time.h>
 		#include <unistd.h>
 		#include <incise/backend.h>
 		static struct mine {
 			struct incise_stepper stepper;
 			struct incise_driver *driver;
 			double mm, mm_s;
-			int64_t t_ns;
 		} mine;
+		static int sets;
 		static unsigned int faults(void) { return mine.driver ? mine.driver->ops->faults(mine.driver) : 0; }
 		static int set(struct incise_stepper *s, double mm)
 		{
 			(void)s;
 			mine.mm = mm;
 			mine.mm_s = 0;
+			if (++sets == 500 && !access("heats", F_OK))
+				fclose(fopen("hot", "w"));
 			return faults() ? -EIO : 0;
 		}
 		static int jog(struct incise_stepper *s, double mm_s)
@@ -65,14 +68,8 @@ setup() {
 		}
 		static int status(struct incise_stepper *s, struct incise_stepper_status *to)
 		{
-			struct timespec t;
-			int64_t now;
-
 			(void)s;
-			clock_gettime(CLOCK_MONOTONIC, &t);
-			now = t.tv_sec * INT64_C(1000000000) + t.tv_nsec;
-			mine.mm = fmin(4, mine.mm + mine.mm_s * (double)(now - mine.t_ns) / 1e9);
-			mine.t_ns = now;
+			mine.mm = fmin(4, mine.mm + mine.mm_s * 0.005);
 			*to = (struct incise_stepper_status){.position_mm = mine.mm, .velocity_mm_s = mine.mm_s,
 				.handle_mm = NAN, .force_N = NAN, .homed = access("lost", F_OK), .faults = faults(),
 				.state = faults() ? INCISE_STEPPER_STATE_FAULT :
@@ -170,6 +167,17 @@ rig() { # DRIVER, KEY...
 	[[ "$stderr" == *"driver tmc2209:$(cat path):0: too hot, it switched the motor off; cool it, or give a smaller run_A, then clear, enable and home" ]]
 }
 
+@test "a fault of the chip ends the haptic loop with its reason, and a warning is reported" {
+	touch heats
+	run --separate-stderr incise haptic "$root/scenes/wall.scene" -c none
+	[ "$status" -eq 1 ]
+	[[ "$stderr" == *": a device failed at tick "*": driver tmc2209:"*": too hot, it switched the motor off;"*"; the force was removed" ]]
+	rm hot heats
+	touch warm
+	run -0 --separate-stderr incise haptic "$root/scenes/wall.scene" -c none --duration 1s
+	[[ "$output" == *"actuator   temperature warnings of the chip: 1"* ]]
+}
+
 @test "refused: no chip, not homed, too fast, no line, settings" {
 	touch lost
 	run --separate-stderr incise stepper tune 2
@@ -186,6 +194,11 @@ rig() { # DRIVER, KEY...
 	rig "tmc2209:/nowhere:1" "microsteps = 24;"
 	run --separate-stderr incise stepper tune 2
 	failed_with actuator.microsteps "a power of two"
+	sed 's/.attach = attach, //' stepper.c >other.c
+	$CC -shared -fPIC -w -I"$root/lib/include" -o modules/stepper_mine.so other.c
+	rig "tmc2209:/nowhere:1"
+	run --separate-stderr incise stepper tune 2
+	failed_with rig.conf:2 "remove the key driver"
 	sed -i '/driver/d' rig.conf
 	run --separate-stderr incise stepper tune 2 --unhomed
 	failed_with "names no driver chip"

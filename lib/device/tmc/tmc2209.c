@@ -122,18 +122,24 @@ static int write_2209(struct tmc_driver *d, uint8_t reg, uint32_t value)
 	return rc ? rc : -EPROTO;
 }
 
-/* Another chip of this rig on the same line, or NULL. */
-static struct tmc_driver *find_neighbour(const struct tmc_driver *d,
-					 const struct incise_backend_request *request,
-					 size_t length)
+/* Use the line of another chip of this rig; 1 without one on it. */
+static int share_line(struct tmc_driver *d, const struct incise_backend_request *request,
+		      size_t length, struct incise_error *err)
 {
 	for (int i = 0; i < request->n_drivers; i++) {
 		struct tmc_driver *other = (struct tmc_driver *)request->drivers[i];
 
-		if (!strncmp(other->actuator.driver, d->actuator.driver, length))
-			return other->line;
+		if (strncmp(other->actuator.driver, d->actuator.driver, length))
+			continue;
+		if (other->node == d->node)
+			return incise_error_set(err, EINVAL,
+						"%s: %s is already the chip of another "
+						"actuator; give each its own node",
+						request->where, d->actuator.driver);
+		d->line = other->line;
+		return 0;
 	}
-	return NULL;
+	return 1;
 }
 
 static int connect_2209(struct tmc_driver *d,
@@ -142,8 +148,8 @@ static int connect_2209(struct tmc_driver *d,
 {
 	const char *all = d->actuator.driver, *colon = strrchr(all, ':');
 	int length = (int)strlen(request->arguments) - 2;
-	struct tmc_driver *neighbour;
 	char path[sizeof(d->actuator.driver)];
+	int rc;
 
 	if (length < 1 || strlen(colon) != 2 || colon[1] < '0' || colon[1] > '3')
 		return incise_error_set(
@@ -152,11 +158,9 @@ static int connect_2209(struct tmc_driver *d,
 			"example tmc2209:/dev/serial0:0, found %s; correct it",
 			request->where, all);
 	d->node = (uint8_t)(colon[1] - '0');
-	neighbour = find_neighbour(d, request, (size_t)(colon - all) + 1);
-	if (neighbour) {
-		d->line = neighbour;
-		return 0;
-	}
+	rc = share_line(d, request, (size_t)(colon - all) + 1, err);
+	if (rc <= 0)
+		return rc;
 	snprintf(path, sizeof(path), "%.*s", length, request->arguments);
 	d->fd = incise_tty_open(path, B115200);
 	if (d->fd >= 0)

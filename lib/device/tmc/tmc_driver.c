@@ -22,7 +22,6 @@
 #define GSTAT_ALL 7u /* writing a 1 clears it */
 #define MRES 24	     /* in CHOPCONF */
 #define INTPOL (1u << 28)
-#define IRUN 8
 
 #define CLOCK_HZ 12e6 /* the internal one */
 #define TSTEP_MAX 0xfffff
@@ -52,7 +51,7 @@ static uint32_t current_bits(double A, double most_A)
 
 uint32_t tmc_currents(const struct tmc_driver *d, double most_A)
 {
-	return HOLD_DELAY | current_bits(d->actuator.tmc.run_A, most_A) << IRUN |
+	return HOLD_DELAY | current_bits(d->actuator.tmc.run_A, most_A) << 8 |
 	       current_bits(d->actuator.tmc.hold_A, most_A);
 }
 
@@ -120,19 +119,18 @@ static int check_version(struct tmc_driver *d, struct incise_error *err)
 
 	if (rc)
 		return refuse_line(d, rc, err);
-	if (pins >> 24 == d->model->version && (~pins & d->model->used_by_steps))
+	if (pins >> 24 != d->model->version)
 		return incise_error_set(
 			err, ENODEV,
-			"%s: its pin SD_MODE is low, so it ignores the step line; wire it "
-			"high",
-			d->name);
-	if (pins >> 24 == d->model->version)
-		return 0;
-	return incise_error_set(
-		err, ENODEV,
-		"%s: its version is 0x%02x, that of a %s is 0x%02x; correct driver in "
-		"rig.conf, or check the wiring",
-		d->name, pins >> 24, d->model->name, d->model->version);
+			"%s: its version is 0x%02x, that of a %s is 0x%02x; correct driver "
+			"in rig.conf, or check the wiring",
+			d->name, pins >> 24, d->model->name, d->model->version);
+	if (~pins & d->model->used_by_steps)
+		return incise_error_set(err, ENODEV,
+					"%s: its pin SD_MODE is low, so it ignores the "
+					"step line; wire it high",
+					d->name);
+	return 0;
 }
 
 static int read_microsteps(uint32_t chopconf)
@@ -201,32 +199,33 @@ static void latch_fault(struct tmc_driver *d, enum incise_stepper_fault fault,
 	atomic_store_explicit(&d->faults, fault, memory_order_release);
 }
 
+/* In the order in which they are looked for. */
 static void look_at_status(struct tmc_driver *d, uint32_t state, uint32_t status)
 {
 	const struct tmc_model *m = d->model;
+	const struct {
+		uint32_t set;
+		enum incise_stepper_fault fault;
+		const char *cause;
+	} all[] = {
+		{state & GSTAT_RESET, INCISE_STEPPER_FAULT_LOST,
+		 "it restarted and lost its settings; check the motor's supply"},
+		{status & m->shorted, INCISE_STEPPER_FAULT_ALARM,
+		 "short circuit at a coil; switch the supply off, check motor and cable"},
+		{status & m->hot, INCISE_STEPPER_FAULT_ALARM,
+		 "too hot, it switched the motor off; cool it, or give a smaller run_A"},
+		{state & GSTAT_UV_CP, INCISE_STEPPER_FAULT_ALARM,
+		 "the motor's supply is too low; check it"},
+		{state & GSTAT_DRV_ERR, INCISE_STEPPER_FAULT_ALARM,
+		 "heat or a short circuit switched the motor off; check motor and cable"},
+	};
 	bool warm = status & m->warm;
 
 	d->warnings += warm && !d->warm;
 	d->warm = warm;
-	if (state & GSTAT_RESET)
-		latch_fault(
-			d, INCISE_STEPPER_FAULT_LOST,
-			"it restarted and lost its settings; check the motor's supply");
-	else if (status & m->shorted)
-		latch_fault(d, INCISE_STEPPER_FAULT_ALARM,
-			    "short circuit at a coil; switch the supply off, check motor "
-			    "and cable");
-	else if (status & m->hot)
-		latch_fault(d, INCISE_STEPPER_FAULT_ALARM,
-			    "too hot, it switched the motor off; cool it, or give a "
-			    "smaller run_A");
-	else if (state & GSTAT_UV_CP)
-		latch_fault(d, INCISE_STEPPER_FAULT_ALARM,
-			    "the motor's supply is too low; check it");
-	else if (state & GSTAT_DRV_ERR)
-		latch_fault(d, INCISE_STEPPER_FAULT_ALARM,
-			    "heat or a short circuit switched the motor off; check motor "
-			    "and cable");
+	for (size_t i = 0; i < sizeof(all) / sizeof(*all); i++)
+		if (all[i].set)
+			latch_fault(d, all[i].fault, all[i].cause);
 }
 
 /* Conditions that only a moving motor shows, and that must last. */
@@ -328,10 +327,11 @@ static int driver_clear(struct incise_driver *driver, struct incise_error *err)
 static int read_chip(struct tmc_driver *d, struct incise_stepper_chip *chip)
 {
 	const struct tmc_model *m = d->model;
-	uint32_t chopconf, status, load, currents = 0;
+	const struct incise_actuator_tmc *tmc = &d->actuator.tmc;
+	uint32_t chopconf, status, load;
 	struct tmc_row rows[TMC_ROWS_MAX];
 	double most_A;
-	int rc = m->read(d, TMC_CHOPCONF, &chopconf), n = m->fill(d, rows, &most_A);
+	int rc = m->read(d, TMC_CHOPCONF, &chopconf);
 
 	if (!rc)
 		rc = m->read(d, DRV_STATUS, &status);
@@ -339,19 +339,17 @@ static int read_chip(struct tmc_driver *d, struct incise_stepper_chip *chip)
 		rc = m->read(d, m->load, &load);
 	if (rc)
 		return rc;
-	for (int i = 0; i < n; i++)
-		if (rows[i].reg == TMC_IHOLD_IRUN)
-			currents = rows[i].value;
+	m->fill(d, rows, &most_A);
 	*chip = (struct incise_stepper_chip){
-		.run_A = ((currents >> IRUN & 31) + 1) * most_A / 32,
-		.hold_A = ((currents & 31) + 1) * most_A / 32,
+		.run_A = (current_bits(tmc->run_A, most_A) + 1) * most_A / 32,
+		.hold_A = (current_bits(tmc->hold_A, most_A) + 1) * most_A / 32,
 		.microsteps = read_microsteps(chopconf),
 		.stealthchop = status & m->stealth,
 		.standstill = status & STANDSTILL,
 		.warm = status & m->warm,
 		.load = (int)(load & 0x3ff),
 		.threshold_load = m->threshold_load,
-		.threshold = d->actuator.tmc.stall_threshold,
+		.threshold = tmc->stall_threshold,
 	};
 	snprintf(chip->name, sizeof(chip->name), "%s", d->actuator.driver);
 	return 0;

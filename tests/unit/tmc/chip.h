@@ -33,6 +33,7 @@ struct chip_line {
 	atomic_int deaf, lost_writes, garbled;
 	unsigned char frame[CHIP_FRAMES][8]; /* of requests, in their order */
 	atomic_int frames;
+	void (*before_read)(struct chip_line *line); /* or NULL */
 	unsigned char held[64]; /* bytes that are no whole request yet */
 	size_t n_held;
 	char path[64];
@@ -109,6 +110,8 @@ static size_t chip_obey(struct chip_line *l, const unsigned char *ask, size_t n,
 				   (uint32_t)ask[5] << 8 | ask[6]);
 		return 0;
 	}
+	if (l->before_read)
+		l->before_read(l);
 	value = l->reg[node][reg];
 	memcpy(answer,
 	       (unsigned char[]){5, 255, ask[2], (unsigned char)(value >> 24),
@@ -163,10 +166,9 @@ static void *chip_run(void *argument)
 	return NULL;
 }
 
-/* With node 0; 0 or -1. */
+/* A line of zeroes, then with node 0; 0 or -1. */
 static inline int chip_begin(struct chip_line *l)
 {
-	memset(l, 0, sizeof(*l));
 	chip_reset(l, 0);
 	l->master = posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC);
 	if (l->master < 0 || grantpt(l->master) || unlockpt(l->master) ||

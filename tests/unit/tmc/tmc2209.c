@@ -18,6 +18,7 @@ static struct chip_line line;
 static int begin(void **state)
 {
 	(void)state;
+	memset(&line, 0, sizeof(line));
 	return chip_begin(&line);
 }
 
@@ -197,6 +198,7 @@ TEST(two_nodes_share_a_line, begin, end)
 	assert_int_equal(chip.microsteps, 64);
 	assert_int_equal(first->ops->read(first, &chip), 0);
 	assert_int_equal(chip.microsteps, 16);
+	assert_error(open_chip(&a, &first, 1), EINVAL, &err, a.driver, "already");
 	close_chip(second);
 	close_chip(first);
 }
