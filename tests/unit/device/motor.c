@@ -349,6 +349,63 @@ TEST(homing_by_a_stall)
 	assert_float_equal(homing.clearance_mm, 0.408, 1e-12);
 }
 
+#define STALL_MM_S 1
+
+/*
+ * An end stop at step 0 and DIAG as the home input: it is active while the motor is driven into the stop
+ * at speed, and the nut stays where it is.
+ */
+static int stall_wait(struct incise_motor *motor, int64_t ns)
+{
+	struct bench *b = of(motor);
+	double mm_s;
+
+	for (; ns > 0; ns -= 250000) {
+		bench_advance(b, 250000);
+		mm_s = (double)b->pulser.motion.status.velocity / 65536 *
+		       incise_actuator_step_mm(&motor->actuator);
+		b->machine.forced &= ~(unsigned int)INCISE_STEPPER_LINE_HOME;
+		if (b->machine.at <= 0 && mm_s < -STALL_MM_S)
+			b->machine.forced |= INCISE_STEPPER_LINE_HOME;
+		if (b->machine.at < 0)
+			b->machine.at = 0;
+	}
+	return 0;
+}
+
+TEST(a_stall_homes)
+{
+	static const int64_t starts[] = {0, 1, 100, 1500, 3999};
+	struct incise_motor_ops stalling = ops;
+	static struct bench b;
+	int64_t first = 0;
+
+	stalling.wait = stall_wait;
+	for (size_t i = 0; i < sizeof(starts) / sizeof(*starts); i++) {
+		struct incise_stepper *stepper = &b.motor.stepper;
+
+		bench_start(&b, true, false, false, 0);
+		b.motor.ops = &stalling;
+		b.machine.wired_home = false;
+		b.machine.at = starts[i];
+		b.motor.actuator.tmc.stall_home = true;
+		stepper->ops->attach(stepper, &chip.driver);
+		succeeds(!incise_stepper_enable(stepper, &err));
+		stall_wait(&b.motor, 2000000);
+		succeeds(!incise_stepper_home(stepper, NULL, NULL, &err));
+		assert_true(status_of(&b).homed);
+		/*
+		 * The stop holds the nut while the count comes to rest, and on the way back it leaves
+		 * the stop by as much: v²/2a + va/2j and 2 ms of polls, 18 µm or 15 steps, and a few for
+		 * ticks; from each start the same.
+		 */
+		assert_in_range(b.machine.at, 15, 20);
+		assert_int_equal(b.machine.at, i ? first : b.machine.at);
+		first = b.machine.at;
+		assert_int_equal(b.pulser.motion.status.position, 0);
+	}
+}
+
 struct virtual_rig {
 	struct incise_clock *clock;
 	int64_t now;
