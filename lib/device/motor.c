@@ -253,6 +253,14 @@ static int reported(struct incise_motor *motor, int rc, const char *what,
 				why ? why : strerror(-rc));
 }
 
+/* Of a motor without power whose currents were off: its count means nothing. */
+static int forget_home(struct incise_motor *motor)
+{
+	int rc = look_motor(motor);
+
+	return rc ? rc : motor->ops->origin(motor, motor->last.position, false);
+}
+
 /* -EPERM with a latched fault of the driver chip. */
 static int refuse_by_driver(const struct incise_motor *motor, struct incise_error *why)
 {
@@ -277,7 +285,6 @@ static int motor_enable(struct incise_stepper *stepper, struct incise_error *err
 	return reported(motor, rc, "cannot be enabled", &why, err);
 }
 
-/* Its currents were off for a while, so the count means nothing any more. */
 static int clear_driver(struct incise_motor *motor, struct incise_error *why)
 {
 	int rc = look_motor(motor);
@@ -286,7 +293,7 @@ static int clear_driver(struct incise_motor *motor, struct incise_error *why)
 		return rc;
 	if (motor->last.state != INCISE_STEPPER_STATE_FAULT)
 		return -EBUSY;
-	rc = motor->ops->origin(motor, motor->last.position, false);
+	rc = forget_home(motor);
 	return rc ? rc : motor->driver->ops->clear(motor->driver, why);
 }
 
@@ -341,6 +348,9 @@ static int motor_disable(struct incise_stepper *stepper, struct incise_error *er
 						"switch its power off",
 						motor->name);
 	}
+	/* The module would keep it for the next program. */
+	if (!rc && motor->driver && motor->driver->ops->faults(motor->driver))
+		rc = forget_home(motor);
 	return reported(motor, rc, "cannot be disabled", &(struct incise_error){0}, err);
 }
 
@@ -439,9 +449,12 @@ static int motor_counter(struct incise_stepper *stepper, int i,
 	return driver ? driver->ops->counter(driver, i, counter) : -ENOENT;
 }
 
-static void motor_attach(struct incise_stepper *stepper, struct incise_driver *driver)
+static int motor_attach(struct incise_stepper *stepper, struct incise_driver *driver)
 {
-	motor_of(stepper)->driver = driver;
+	struct incise_motor *motor = motor_of(stepper);
+
+	motor->driver = driver;
+	return driver->restarted && !motor->watches ? forget_home(motor) : 0;
 }
 
 static int motor_chip(struct incise_stepper *stepper, struct incise_stepper_chip *chip)

@@ -95,8 +95,10 @@ static int open_driver(struct incise_rig *rig, struct incise_backend_request *re
 	rig->driver[axis] = loaded->backend->open(request, err);
 	if (!rig->driver[axis])
 		return errno ? -errno : -EIO;
-	rig->stepper[axis]->ops->attach(rig->stepper[axis], rig->driver[axis]);
-	return 0;
+	rc = rig->stepper[axis]->ops->attach(rig->stepper[axis], rig->driver[axis]);
+	return rc ? incise_error_set(err, -rc, "%s: the motor is not at rest: %s", where,
+				     strerror(-rc))
+		  : 0;
 }
 
 static int rig_open_real(struct incise_rig *rig, const struct incise_rig_plan *plan,

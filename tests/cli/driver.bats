@@ -84,7 +84,7 @@ setup() {
 				.step_mm = 0.01, .velocity_mm_s = 10, .acceleration_mm_s2 = 100, .deadman_s = 1};
 		}
 		static void closed(struct incise_stepper *s) { (void)s; }
-		static void attach(struct incise_stepper *s, struct incise_driver *d) { (void)s; mine.driver = d; }
+		static int attach(struct incise_stepper *s, struct incise_driver *d) { (void)s; mine.driver = d; return 0; }
 		static int chip(struct incise_stepper *s, struct incise_stepper_chip *to)
 		{
 			(void)s;

@@ -165,6 +165,7 @@ static int check_row(struct tmc_driver *d, const struct tmc_row *row,
 static int set_up_chip(struct tmc_driver *d, struct incise_error *err)
 {
 	struct tmc_row rows[TMC_ROWS_MAX];
+	uint32_t state;
 	double most_A;
 	int n = d->model->fill(d, rows, &most_A), rc = check_settings(d, err);
 
@@ -172,6 +173,8 @@ static int set_up_chip(struct tmc_driver *d, struct incise_error *err)
 		rc = check_version(d, err);
 	if (rc)
 		return rc;
+	rc = d->model->read(d, TMC_GSTAT, &state);
+	d->driver.restarted = !rc && state & GSTAT_ALL;
 	for (int i = 0; !rc && i < n; i++)
 		rc = d->model->write(d, rows[i].reg, rows[i].value);
 	if (!rc)

@@ -131,6 +131,8 @@ struct incise_driver_ops {
 /** A driver chip: the first member of its backend's struct. */
 struct incise_driver {
 	const struct incise_driver_ops *ops;
+	/** When it was opened it had been without supply, or off: the position is lost. */
+	bool restarted;
 };
 
 /**
@@ -170,8 +172,11 @@ struct incise_stepper_ops {
 	/** Wait; 0 or -EINTR. NULL: wait by the clock of the computer. */
 	int (*wait)(struct incise_stepper *stepper, int64_t ns);
 
-	/** Take a driver chip, which lives longer. NULL: it has a power stage of its own. */
-	void (*attach)(struct incise_stepper *stepper, struct incise_driver *driver);
+	/**
+	 * Take a driver chip, which lives longer; 0 or a negative errno. NULL: it has a power
+	 * stage of its own.
+	 */
+	int (*attach)(struct incise_stepper *stepper, struct incise_driver *driver);
 	/** Read the chip. */
 	int (*chip)(struct incise_stepper *stepper, struct incise_stepper_chip *chip);
 

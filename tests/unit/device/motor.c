@@ -298,7 +298,7 @@ TEST(a_fault_of_the_driver_chip_stops_the_motor)
 	assert_int_equal(incise_stepper_chip(stepper, &read), -EOPNOTSUPP);
 	assert_int_equal(incise_stepper_counter(stepper, 0, &counter), -ENOENT);
 	chip.driver.ops = &chip_ops;
-	stepper->ops->attach(stepper, &chip.driver);
+	assert_int_equal(stepper->ops->attach(stepper, &chip.driver), 0);
 	assert_int_equal(incise_stepper_chip(stepper, &read), 0);
 	assert_int_equal(read.load, 77);
 	assert_int_equal(incise_stepper_counter(stepper, 0, &counter), 0);
@@ -327,6 +327,22 @@ TEST(a_fault_of_the_driver_chip_stops_the_motor)
 	assert_int_equal(status_of(&b).state, INCISE_STEPPER_STATE_DISABLED);
 	assert_false(status_of(&b).homed);
 	succeeds(!incise_stepper_enable(stepper, &err));
+
+	/* The module keeps no home for a later program, whether the fault is cleared or not … */
+	bench_advance(&b, 2000000);
+	succeeds(!incise_stepper_home(stepper, NULL, NULL, &err));
+	assert_true(b.pulser.motion.status.flags & INCISE_STEPPER_FLAG_HOMED);
+	chip.faults = INCISE_STEPPER_FAULT_FOLLOWING;
+	succeeds(!incise_stepper_disable(stepper, &err));
+	assert_false(b.pulser.motion.status.flags & INCISE_STEPPER_FLAG_HOMED);
+	/* … nor one for a chip that was off meanwhile. */
+	succeeds(!incise_stepper_clear(stepper, &err));
+	b.pulser.motion.status.flags |= INCISE_STEPPER_FLAG_HOMED;
+	chip.driver.restarted = true;
+	bench_advance(&b, 2000000);
+	assert_int_equal(stepper->ops->attach(stepper, &chip.driver), 0);
+	assert_false(b.pulser.motion.status.flags & INCISE_STEPPER_FLAG_HOMED);
+	chip.driver.restarted = false;
 }
 
 /* A stall as the edge: at full speed both times, and with the way to reach it. */

@@ -158,6 +158,17 @@ TEST(state_is_read, begin, end)
 	close_chip(driver);
 }
 
+/* A chip that was off since the last program says so once. */
+TEST(restart_is_told, begin, end)
+{
+	for (int i = 0; i < 2; i++) {
+		struct incise_driver *driver = open_asked();
+
+		assert_int_equal(driver->restarted, !i);
+		close_chip(driver);
+	}
+}
+
 TEST(without_an_echo, begin, end)
 {
 	line.mute_echo = true;
