@@ -253,7 +253,7 @@ static int reported(struct incise_motor *motor, int rc, const char *what,
 				why ? why : strerror(-rc));
 }
 
-/* Of a motor without power whose currents were off: its count means nothing. */
+/* A motor without power has lost its currents for a while: its count means nothing. */
 static int forget_home(struct incise_motor *motor)
 {
 	int rc = look_motor(motor);
