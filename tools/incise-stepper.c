@@ -10,15 +10,18 @@
 #include "cli/json.h"
 #include "stepper/drive.h"
 #include "stepper/status.h"
+#include "stepper/tune.h"
 
 #define MM_MAX 1e6	   /* beyond any rig's limits */
 #define FOLLOW_NS 20000000 /* between readings */
+#define SPEED_LEAST 0.01   /* mm/s, to tune */
 #define MOTION_S 2	   /* added to twice the time that the limits allow a motion */
 
 struct stepper_job {
 	const struct subcommand *subcommand;
 	const char *rig;
-	double amount; /* the operand: mm or mm/s */
+	double amounts[TUNE_SPEEDS_MAX]; /* the operand: mm or mm/s */
+	int n_amounts;
 	bool follow, by, unhomed, hold, json;
 	double seconds; /* 0: until Ctrl-C */
 	int repeat;	/* 0: not given */
@@ -32,6 +35,7 @@ struct subcommand {
 	/* On an open drive; failure ends the program. */
 	void (*run)(const struct stepper_job *job, struct stepper_drive *drive);
 	bool watch;	   /* does not become the owner */
+	bool list;	   /* its operand is one or more, with commas */
 	const char *takes; /* letters of options, see check_options() */
 };
 
@@ -43,7 +47,7 @@ static const struct cli_option options[] = {
 	 CLI_FLAG(struct stepper_job, follow)},
 	{0, "by", NULL, "move: by MM from the present position, not to MM",
 	 CLI_FLAG(struct stepper_job, by)},
-	{0, "unhomed", NULL, "move: also if not homed, to MM of the present count",
+	{0, "unhomed", NULL, "move, tune: also if not homed, by the present count",
 	 CLI_FLAG(struct stepper_job, unhomed)},
 	{0, "hold", NULL, "move, home: stay powered afterwards, until Ctrl-C",
 	 CLI_FLAG(struct stepper_job, hold)},
@@ -59,8 +63,8 @@ static const struct cli_option options[] = {
 
 static const struct cli_command command = {
 	.name = "stepper",
-	.synopsis = "status | enable | disable | move MM | jog MM_S | home | clear "
-		    "[OPTIONS]",
+	.synopsis = "status | enable | disable | move MM | jog MM_S | home | clear | "
+		    "tune MM_S,... [OPTIONS]",
 	.summary =
 		"Show the state of a rig's actuator, and move it within its limits:\n"
 		"  status    print state, position, inputs, faults and their remedies\n"
@@ -71,6 +75,8 @@ static const struct cli_command command = {
 		"disable\n"
 		"  home      find the zero position, then disable\n"
 		"  clear     clear faults whose cause is gone\n"
+		"  tune MM_S,...  move over the travel at each speed, and advise a "
+		"threshold for StallGuard of the driver chip\n"
 		"Ctrl-C always ends with the motor at rest and without power. Not a "
 		"safety device: keep a hand on the emergency stop.",
 	.options = options,
@@ -234,7 +240,7 @@ static void maybe_hold(const struct stepper_job *job, struct stepper_drive *driv
 /* The target within the travel; outside of it fails. */
 static double destination(const struct stepper_job *job, struct stepper_drive *drive)
 {
-	double mm = job->amount, from_mm = drive->status.position_mm;
+	double mm = job->amounts[0], from_mm = drive->status.position_mm;
 	/* A travel need not be of whole steps. */
 	double slack_mm = 0.5 * drive->info.step_mm;
 
@@ -315,18 +321,23 @@ static void run_move(const struct stepper_job *job, struct stepper_drive *drive)
 	maybe_hold(job, drive);
 }
 
-static void run_jog(const struct stepper_job *job, struct stepper_drive *drive)
+static void check_speed(struct stepper_drive *drive, double mm_s)
 {
-	double mm_s = job->amount, end_mm = mm_s > 0 ? drive->info.travel_mm : 0;
-	double from_mm = drive->status.position_mm, seconds;
-	int64_t begin;
-	bool ended;
-
 	if (fabs(mm_s) > drive->info.velocity_mm_s)
 		stepper_drive_fail(drive,
 				   "%g mm/s is faster than %g mm/s, the limit "
 				   "of %s; give a lower speed",
 				   mm_s, drive->info.velocity_mm_s, drive->info.name);
+}
+
+static void run_jog(const struct stepper_job *job, struct stepper_drive *drive)
+{
+	double mm_s = job->amounts[0], end_mm = mm_s > 0 ? drive->info.travel_mm : 0;
+	double from_mm = drive->status.position_mm, seconds;
+	int64_t begin;
+	bool ended;
+
+	check_speed(drive, mm_s);
 	stepper_drive_power(drive);
 	begin = incise_clock_now(drive->clock);
 	do {
@@ -456,19 +467,43 @@ static void run_home(const struct stepper_job *job, struct stepper_drive *drive)
 	maybe_hold(job, drive);
 }
 
+static void run_tune(const struct stepper_job *job, struct stepper_drive *drive)
+{
+	json_t *object = NULL;
+
+	for (int i = 0; i < job->n_amounts; i++)
+		check_speed(drive, job->amounts[i]);
+	if (!drive->status.homed && !job->unhomed)
+		stepper_drive_fail(
+			drive,
+			"%s is not homed, so its travel is not known; run "
+			"'incise stepper home', or put the nut at its lower end "
+			"and add --unhomed",
+			drive->info.name);
+	stepper_drive_power(drive);
+	if (job->json)
+		object = report(job, drive);
+	stepper_tune(drive, job->amounts, job->n_amounts, object);
+	if (cli_stop)
+		fail_stopped(drive);
+	if (job->json)
+		put_json(object, JSON_INDENT(2));
+}
+
 /* --- subcommands ----------------------------------------------------------------------- */
 
 static const struct cli_unit lengths[] = {{"mm", 1}, {"um", 1e-3}, {0}};
 static const struct cli_unit speeds[] = {{"mm/s", 1}, {"um/s", 1e-3}, {0}};
 
 static const struct subcommand subcommands[] = {
-	{"status", NULL, NULL, run_status, true, "ft"},
-	{"enable", NULL, NULL, run_enable, false, "t"},
-	{"disable", NULL, NULL, run_disable, false, ""},
-	{"move", "MM", lengths, run_move, false, "buht"},
-	{"jog", "MM_S", speeds, run_jog, false, "t"},
-	{"home", NULL, NULL, run_home, false, "htn"},
-	{"clear", NULL, NULL, run_clear, false, ""},
+	{"status", NULL, NULL, run_status, true, false, "ft"},
+	{"enable", NULL, NULL, run_enable, false, false, "t"},
+	{"disable", NULL, NULL, run_disable, false, false, ""},
+	{"move", "MM", lengths, run_move, false, false, "buht"},
+	{"jog", "MM_S", speeds, run_jog, false, false, "t"},
+	{"home", NULL, NULL, run_home, false, false, "htn"},
+	{"clear", NULL, NULL, run_clear, false, false, ""},
+	{"tune", "MM_S", speeds, run_tune, false, true, "u"},
 };
 #define SUBCOMMANDS (sizeof(subcommands) / sizeof(*subcommands))
 
@@ -511,6 +546,24 @@ static const struct subcommand *subcommand_named(const char *name)
 	cli_unknown("subcommand", name, names);
 }
 
+/* One amount, or for a list up to TUNE_SPEEDS_MAX of them that are not 0 or less. */
+static void parse_amounts(struct stepper_job *job, char *text)
+{
+	const struct subcommand *sub = job->subcommand;
+	char *rest = text, *piece;
+
+	while ((piece = sub->list ? strsep(&rest, ",") : text)) {
+		if (job->n_amounts == TUNE_SPEEDS_MAX)
+			cli_usage("%s: expected at most %d speeds", sub->name,
+				  TUNE_SPEEDS_MAX);
+		job->amounts[job->n_amounts++] =
+			cli_quantity(sub->operand, piece, sub->units,
+				     sub->list ? SPEED_LEAST : -MM_MAX, MM_MAX);
+		if (!sub->list)
+			break;
+	}
+}
+
 static void parse_stepper(struct stepper_job *job, int argc, char **argv)
 {
 	const struct subcommand *sub;
@@ -521,7 +574,7 @@ static void parse_stepper(struct stepper_job *job, int argc, char **argv)
 	operands = argc - optind;
 	if (!operands)
 		cli_usage("missing subcommand: status, enable, disable, move, jog, "
-			  "home or clear");
+			  "home, clear or tune");
 	sub = job->subcommand = subcommand_named(argv[optind]);
 	if (sub->operand && operands < 2)
 		cli_usage("%s: missing %s, for example 'incise stepper %s 2'", sub->name,
@@ -533,8 +586,7 @@ static void parse_stepper(struct stepper_job *job, int argc, char **argv)
 		cli_usage("unexpected argument '%2$s'; %1$s takes none", sub->name,
 			  argv[optind + 1]);
 	if (sub->operand)
-		job->amount = cli_quantity(sub->operand, argv[optind + 1], sub->units,
-					   -MM_MAX, MM_MAX);
+		parse_amounts(job, argv[optind + 1]);
 	check_options(job);
 }
 

@@ -71,6 +71,10 @@ const struct incise_setting incise_actuator_settings[] = {
 	SETTING_TRUTH(invert, invert, "false",
 		      "true if a step up needs the line dir inactive"),
 	SETTING_GROUP(lines, incise_actuator_line_settings, "lines of the backend gpio"),
+	SETTING_TEXT(driver, driver, "(none)",
+		     "driver chip with a line of its own, as BACKEND:ARGUMENTS"),
+	SETTING_GROUP(tmc, incise_actuator_tmc_settings,
+		      "settings of the drivers tmc2209 and tmc5160"),
 	SETTING_GROUP(can, incise_actuator_can_settings,
 		      "settings of the backends can and slcan"),
 	{0},
@@ -158,5 +162,7 @@ int incise_actuator_read(struct incise_actuator *actuator, const config_setting_
 	rc = incise_actuator_lines_check(actuator, group, path, err);
 	if (!rc && can)
 		rc = incise_actuator_can_check(actuator, can, path, err);
+	if (!rc)
+		rc = incise_actuator_tmc_check(actuator, group, path, err);
 	return rc ? rc : check_actuator(actuator, group, path, err);
 }

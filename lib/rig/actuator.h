@@ -9,11 +9,12 @@
 #include "../base/settings.h"
 
 /*
- * The keys of the group actuator, and of its groups can and lines, which the folders of these devices
+ * The keys of the group actuator, and of its groups can, lines and tmc, which the folders of these devices
  * bring: all in a struct incise_actuator.
  */
 extern const struct incise_setting incise_actuator_settings[],
-	incise_actuator_can_settings[], incise_actuator_line_settings[];
+	incise_actuator_can_settings[], incise_actuator_line_settings[],
+	incise_actuator_tmc_settings[];
 
 /* Read and check the group. 0 or -EINVAL; @err names file, line and key. */
 int incise_actuator_read(struct incise_actuator *actuator, const config_setting_t *group,
@@ -31,6 +32,11 @@ int incise_actuator_lines_check(const struct incise_actuator *actuator,
 				struct incise_error *err);
 int incise_actuator_can_check(const struct incise_actuator *actuator,
 			      const config_setting_t *can, const char *path,
+			      struct incise_error *err);
+
+/* The same of the group tmc, which a driver of that kind needs; sets the default of hold_A. */
+int incise_actuator_tmc_check(struct incise_actuator *actuator,
+			      const config_setting_t *group, const char *path,
 			      struct incise_error *err);
 
 #endif

@@ -18,6 +18,10 @@
 #define CLEARANCE_MM 0.5		 /* from a limit that is the home, too */
 #define LATE_MAX 20			 /* edges in a row */
 #define TICK_MOST_S 0.002		 /* between writes of a status with power */
+/* Homing: the second approach, and the way off the input before it. */
+#define EDGE_SLOW 0.1 /* of home_mm_s */
+#define CLEARANCE_MM 0.2
+#define STALL_STEPS 20 /* at full speed before StallGuard's value is right */
 
 double incise_actuator_step_mm(const struct incise_actuator *actuator)
 {
@@ -98,6 +102,22 @@ static int64_t stood_still(struct incise_motor *motor)
 	return (double)age_ns > most_ns ? age_ns : 0;
 }
 
+/* Faults of the driver chip are in no status: the writer of it cannot ask the chip. */
+static void add_driver_faults(struct incise_motor *motor)
+{
+	uint32_t faults = motor->driver ? motor->driver->ops->faults(motor->driver) : 0;
+
+	if (!faults)
+		return;
+	motor->last.faults |= faults;
+	motor->last.flags &= ~INCISE_STEPPER_FLAG_HOMED;
+	motor->last.state =
+		motor->last.state == INCISE_STEPPER_STATE_DISABLED ||
+				motor->last.state == INCISE_STEPPER_STATE_FAULT
+			? INCISE_STEPPER_STATE_FAULT
+			: INCISE_STEPPER_STATE_STOPPING;
+}
+
 /*
  * Read the status. While a writer is interrupted the last one stays valid, but not for
  * more than UNREAD_MAX reads.
@@ -113,6 +133,8 @@ static int look_motor(struct incise_motor *motor)
 			motor->last.faults |= INCISE_STEPPER_FAULT_DEADMAN;
 			motor->last.state = INCISE_STEPPER_STATE_STOPPING;
 		}
+		if (!rc)
+			add_driver_faults(motor);
 		return rc;
 	}
 	if (motor->unread >= UNREAD_MAX)
@@ -232,14 +254,48 @@ static int reported(struct incise_motor *motor, int rc, const char *what,
 				why ? why : strerror(-rc));
 }
 
+/* A motor without power has lost its currents for a while: its count means nothing. */
+static int forget_home(struct incise_motor *motor)
+{
+	int rc = look_motor(motor);
+
+	return rc ? rc : motor->ops->origin(motor, motor->last.position, false);
+}
+
+/* -EPERM with a latched fault of the driver chip. */
+static int refuse_by_driver(const struct incise_motor *motor, struct incise_error *why)
+{
+	char cause[240];
+
+	if (!motor->driver ||
+	    motor->driver->ops->cause(motor->driver, cause, sizeof(cause)) <= 0)
+		return 0;
+	return incise_error_set(why, EPERM, "%s: cannot be enabled: %s", motor->name,
+				cause);
+}
+
 static int motor_enable(struct incise_stepper *stepper, struct incise_error *err)
 {
 	struct incise_motor *motor = motor_of(stepper);
 	struct incise_error why = {0};
-	int rc = motor->watches ? -EPERM : motor->ops->enable(motor, &why);
+	int rc = motor->watches ? -EPERM : refuse_by_driver(motor, &why);
 
+	if (!rc)
+		rc = motor->ops->enable(motor, &why);
 	motor->beyond = false;
 	return reported(motor, rc, "cannot be enabled", &why, err);
+}
+
+static int clear_driver(struct incise_motor *motor, struct incise_error *why)
+{
+	int rc = look_motor(motor);
+
+	if (rc || !motor->driver->ops->faults(motor->driver))
+		return rc;
+	if (motor->last.state != INCISE_STEPPER_STATE_FAULT)
+		return -EBUSY;
+	rc = forget_home(motor);
+	return rc ? rc : motor->driver->ops->clear(motor->driver, why);
 }
 
 static int motor_clear(struct incise_stepper *stepper, struct incise_error *err)
@@ -248,6 +304,8 @@ static int motor_clear(struct incise_stepper *stepper, struct incise_error *err)
 	struct incise_error why = {0};
 	int rc = motor->watches ? -EPERM : motor->ops->clear(motor, &why);
 
+	if (!rc && motor->driver)
+		rc = clear_driver(motor, &why);
 	return reported(motor, rc, "cannot be cleared", &why, err);
 }
 
@@ -291,6 +349,9 @@ static int motor_disable(struct incise_stepper *stepper, struct incise_error *er
 						"switch its power off",
 						motor->name);
 	}
+	/* The module would keep it for the next program. */
+	if (!rc && motor->driver && motor->driver->ops->faults(motor->driver))
+		rc = forget_home(motor);
 	return reported(motor, rc, "cannot be disabled", &(struct incise_error){0}, err);
 }
 
@@ -330,8 +391,19 @@ static int motor_homing(struct incise_stepper *stepper,
 			struct incise_stepper_homing *homing)
 {
 	const struct incise_motor *motor = motor_of(stepper);
+	const struct incise_actuator *actuator = &motor->actuator;
+	double speed_mm_s = actuator->home_mm_s;
 
-	homing->speed_mm_s = motor->actuator.home_mm_s;
+	homing->speed_mm_s = speed_mm_s;
+	homing->edge_mm_s = EDGE_SLOW * speed_mm_s;
+	homing->clearance_mm = CLEARANCE_MM;
+	/* A stall is found at speed only. */
+	if (motor->driver && actuator->tmc.stall_home) {
+		homing->edge_mm_s = speed_mm_s;
+		homing->clearance_mm =
+			speed_mm_s * speed_mm_s / actuator->acceleration_mm_s2 +
+			STALL_STEPS * actuator->lead_mm / actuator->steps_per_turn;
+	}
 	homing->home_mm = motor->actuator.home_mm;
 	if (motor->lines & INCISE_STEPPER_LINE_HOME)
 		homing->home_at = INCISE_STEPPER_LINE_HOME;
@@ -366,6 +438,36 @@ static int motor_origin(struct incise_stepper *stepper, double position_mm, bool
 	return rc ? rc : motor->ops->origin(motor, steps, homed);
 }
 
+static int motor_cause(struct incise_stepper *stepper, char *text, size_t size)
+{
+	struct incise_driver *driver = motor_of(stepper)->driver;
+
+	return driver ? driver->ops->cause(driver, text, size) : 0;
+}
+
+static int motor_counter(struct incise_stepper *stepper, int i,
+			 struct incise_stepper_counter *counter)
+{
+	struct incise_driver *driver = motor_of(stepper)->driver;
+
+	return driver ? driver->ops->counter(driver, i, counter) : -ENOENT;
+}
+
+static int motor_attach(struct incise_stepper *stepper, struct incise_driver *driver)
+{
+	struct incise_motor *motor = motor_of(stepper);
+
+	motor->driver = driver;
+	return driver->restarted && !motor->watches ? forget_home(motor) : 0;
+}
+
+static int motor_chip(struct incise_stepper *stepper, struct incise_stepper_chip *chip)
+{
+	struct incise_driver *driver = motor_of(stepper)->driver;
+
+	return driver ? driver->ops->read(driver, chip) : -EOPNOTSUPP;
+}
+
 void incise_motor_init(struct incise_motor *motor)
 {
 	static const struct incise_stepper_ops ops = {
@@ -381,6 +483,10 @@ void incise_motor_init(struct incise_motor *motor)
 		.edge = motor_edge,
 		.origin = motor_origin,
 		.wait = motor_wait,
+		.cause = motor_cause,
+		.counter = motor_counter,
+		.attach = motor_attach,
+		.chip = motor_chip,
 	};
 
 	motor->stepper.ops = &ops;

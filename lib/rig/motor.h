@@ -58,8 +58,9 @@ struct incise_motor {
 	struct incise_actuator actuator;
 	char name[64];
 	double rate_max_hz;
-	unsigned int lines; /* INCISE_STEPPER_LINE_… bits it has */
-	bool watches;	    /* opened to watch, not to drive */
+	unsigned int lines;	      /* INCISE_STEPPER_LINE_… bits it has */
+	struct incise_driver *driver; /* its chip, or NULL */
+	bool watches;		      /* opened to watch, not to drive */
 	bool in_process; /* a thread of this program writes the status, and stops with it */
 	struct incise_stepper_setpoint *setpoint; /* NULL where it watches */
 	const struct incise_stepper_motor_status *slot;

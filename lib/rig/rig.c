@@ -23,6 +23,8 @@ struct incise_rig {
 	struct incise_force *force;
 	struct incise_camera *camera;
 	struct incise_stepper *stepper[INCISE_RIG_AXES_MAX];
+	struct incise_loaded driver_loaded[INCISE_RIG_AXES_MAX];
+	struct incise_driver *driver[INCISE_RIG_AXES_MAX]; /* NULL: none */
 	double direction[INCISE_RIG_AXES_MAX][3];
 	int n_axes; /* that are open */
 	double point_mm[3], normal[3];
@@ -60,6 +62,45 @@ static int siblings(const struct incise_rig *rig, int slot, struct incise_steppe
 	return n;
 }
 
+/* The driver chip of the stepper that was opened last. */
+static int open_driver(struct incise_rig *rig, struct incise_backend_request *request,
+		       struct incise_error *err)
+{
+	int axis = rig->n_axes - 1, n = 0;
+	const char *text = request->actuator->driver;
+	struct incise_driver *others[INCISE_RIG_AXES_MAX];
+	struct incise_loaded *loaded = &rig->driver_loaded[axis];
+	char where[sizeof(((struct rig_real *)0)->where) + 10], name[32];
+	int rc;
+
+	if (!*text)
+		return 0;
+	snprintf(where, sizeof(where), "%s: driver", request->where);
+	if (!rig->stepper[axis]->ops->attach)
+		return incise_error_set(err, EOPNOTSUPP,
+					"%s: this stepper has a power stage of its own; "
+					"remove the key driver",
+					where);
+	snprintf(name, sizeof(name), "%.*s", (int)strcspn(text, ":"), text);
+	rc = incise_backend_find(loaded, "driver", name, where, err);
+	if (rc)
+		return rc;
+	for (int i = 0; i < axis; i++)
+		if (rig->driver_loaded[i].backend == loaded->backend)
+			others[n++] = rig->driver[i];
+	request->where = where;
+	request->arguments = strchr(text, ':') ? strchr(text, ':') + 1 : "";
+	request->drivers = others;
+	request->n_drivers = n;
+	rig->driver[axis] = loaded->backend->open(request, err);
+	if (!rig->driver[axis])
+		return errno ? -errno : -EIO;
+	rc = rig->stepper[axis]->ops->attach(rig->stepper[axis], rig->driver[axis]);
+	return rc ? incise_error_set(err, -rc, "%s: the motor is not at rest: %s", where,
+				     strerror(-rc))
+		  : 0;
+}
+
 static int rig_open_real(struct incise_rig *rig, const struct incise_rig_plan *plan,
 			 int slot, struct incise_error *err)
 {
@@ -95,7 +136,7 @@ static int rig_open_real(struct incise_rig *rig, const struct incise_rig_plan *p
 		rig->camera = device;
 	else
 		rig->stepper[rig->n_axes++] = device;
-	return 0;
+	return kind == KIND_STEPPER ? open_driver(rig, &request, err) : 0;
 }
 
 static int rig_devices(struct incise_rig *rig, const struct incise_rig_plan *plan,
@@ -189,6 +230,12 @@ void incise_rig_close(struct incise_rig *rig)
 		rig->camera->ops->close(rig->camera);
 	for (int i = 0; i < rig->n_axes; i++)
 		rig->stepper[i]->ops->close(rig->stepper[i]);
+	/* The first on a line has opened it. */
+	for (int i = rig->n_axes - 1; i >= 0; i--) {
+		if (rig->driver[i])
+			rig->driver[i]->ops->close(rig->driver[i]);
+		incise_backend_unload(&rig->driver_loaded[i]);
+	}
 	for (int slot = 0; slot < N_SLOTS; slot++)
 		incise_backend_unload(&rig->loaded[slot]);
 	incise_sim_free(rig->sim);

@@ -86,6 +86,10 @@ static void actuator(struct rig_list *rig, int axis)
 	if (member(group, "lines"))
 		incise_settings_list(&rig->list, incise_actuator_line_settings, &shown,
 				     member(group, "lines"), inner);
+	snprintf(inner, sizeof(inner), "%s.tmc", prefix);
+	if (member(group, "tmc"))
+		incise_settings_list(&rig->list, incise_actuator_tmc_settings, &shown,
+				     member(group, "tmc"), inner);
 	snprintf(inner, sizeof(inner), "%s.can", prefix);
 	if (member(group, "can") || starts(device, "can:") || starts(device, "slcan:"))
 		incise_settings_list(&rig->list, incise_actuator_can_settings, &shown,

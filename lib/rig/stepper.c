@@ -14,8 +14,6 @@
 
 #define POLL_NS 1000000
 #define LEAST_POLL_NS 100000
-#define SLOW 0.1	 /* of home_mm_s, for the edge */
-#define CLEARANCE_MM 0.2 /* off the input between the two ways to it */
 #define REST_NS (2 * INCISE_NS_PER_S)
 
 /*
@@ -256,7 +254,7 @@ static int back_off(struct home *h)
 	if (!rc)
 		rc = name_place(h, 0, false);
 	if (!rc)
-		rc = go_to(h, fmin(CLEARANCE_MM, travel_mm / 4));
+		rc = go_to(h, fmin(h->homing.clearance_mm, travel_mm / 4));
 	return rc;
 }
 
@@ -288,8 +286,7 @@ static int find_stepper(struct home *h)
 		rc = back_off(h);
 	if (!rc)
 		/* From the middle of the count: it can move to both sides of the edge. */
-		rc = seek(h, -SLOW * h->homing.speed_mm_s, h->info.travel_mm / 2, true,
-			  &edge_mm);
+		rc = seek(h, -h->homing.edge_mm_s, h->info.travel_mm / 2, true, &edge_mm);
 	if (rc > 0)
 		return incise_error_set(h->err, EIO,
 					"homing %s: no edge of the %s on the way back; "
@@ -441,6 +438,11 @@ int incise_stepper_counter(struct incise_stepper *stepper, int i,
 	return stepper->ops->counter && i >= 0
 		       ? stepper->ops->counter(stepper, i, counter)
 		       : -ENOENT;
+}
+
+int incise_stepper_chip(struct incise_stepper *stepper, struct incise_stepper_chip *chip)
+{
+	return stepper->ops->chip ? stepper->ops->chip(stepper, chip) : -EOPNOTSUPP;
 }
 
 const char *incise_stepper_state_name(enum incise_stepper_state state)

@@ -2,6 +2,7 @@
 /*
  * State of an actuator as text and JSON; see status.h.
  */
+#include <errno.h>
 #include <math.h>
 #include <stdbool.h>
 #include <stdio.h>
@@ -154,6 +155,42 @@ static void put_limits(const struct incise_stepper_info *info)
 	putchar('\n');
 }
 
+/* A line about the driver chip, if there is one. */
+static void put_chip(struct incise_stepper *stepper)
+{
+	struct incise_stepper_chip chip;
+	int rc = incise_stepper_chip(stepper, &chip);
+
+	if (rc == -EBUSY)
+		puts("driver     not read: the program that drives the actuator uses it");
+	else if (rc && rc != -EOPNOTSUPP)
+		printf("driver     cannot be read: %s\n", strerror(-rc));
+	if (rc)
+		return;
+	printf("driver     %s: %.2f A, %.2f A at rest, %d microsteps, %s, %s, StallGuard %d "
+	       "(threshold %d)\n",
+	       chip.name, chip.run_A, chip.hold_A, chip.microsteps,
+	       chip.stealthchop ? "StealthChop" : "SpreadCycle",
+	       chip.warm ? "too warm: cool it or give a smaller run_A"
+			 : "temperature normal",
+	       chip.load, chip.threshold);
+}
+
+/* Null without a chip that can be read. */
+static json_t *chip_json(struct incise_stepper *stepper)
+{
+	struct incise_stepper_chip chip;
+
+	if (incise_stepper_chip(stepper, &chip))
+		return json_null();
+	return json_pack("{so so so si sb sb sb si si}", "name", json_text(chip.name),
+			 "run_A", json_number(chip.run_A), "hold_A",
+			 json_number(chip.hold_A), "microsteps", chip.microsteps,
+			 "stealthchop", chip.stealthchop, "standstill", chip.standstill,
+			 "warm", chip.warm, "load", chip.load, "stall_threshold",
+			 chip.threshold);
+}
+
 void stepper_status_text(struct incise_stepper *stepper,
 			 const struct incise_stepper_info *info,
 			 const struct incise_stepper_status *status)
@@ -188,6 +225,7 @@ void stepper_status_text(struct incise_stepper *stepper,
 	put_limits(info);
 	printf("deadman    %g ms without a target\nlate       %llu steps\n",
 	       info->deadman_s * 1e3, (unsigned long long)status->late);
+	put_chip(stepper);
 	stepper_counters_text(stepper);
 }
 
@@ -240,7 +278,7 @@ json_t *stepper_status_json(struct incise_stepper *stepper,
 			    const struct incise_stepper_status *status)
 {
 	return json_pack(
-		"{so sI ss so sI so sb so so so so so so sI so so so so so so so so so}",
+		"{so sI ss so sI so sb so so so so so so sI so so so so so so so so so so}",
 		"name", json_text(info->name), "t_ns", (json_int_t)status->t_ns, "state",
 		incise_stepper_state_name(status->state), "position_mm",
 		json_number(status->position_mm), "position_steps",
@@ -260,5 +298,5 @@ json_t *stepper_status_json(struct incise_stepper *stepper,
 		"deadman_s", json_number(info->deadman_s), "rate_max_hz",
 		info->rate_max_hz > 0 ? json_number(info->rate_max_hz) : json_null(),
 		"spring_N_mm", json_number(info->spring_N_mm), "counters",
-		stepper_counters_json(stepper));
+		stepper_counters_json(stepper), "driver", chip_json(stepper));
 }

@@ -89,7 +89,9 @@ struct incise_stepper_edge {
 
 /** Parameters of homing. */
 struct incise_stepper_homing {
-	double speed_mm_s;    /**< speed of the approach; a tenth of it for the edge */
+	double speed_mm_s;    /**< speed of the approach */
+	double edge_mm_s;     /**< speed of the second approach, for the edge */
+	double clearance_mm;  /**< off the input between the two */
 	double home_mm;	      /**< position of the edge in the machine */
 	unsigned int home_at; /**< INCISE_STEPPER_LINE_HOME, or _AT_MIN without one */
 };
@@ -104,6 +106,33 @@ struct incise_stepper_plan_ops {
 		    const struct incise_stepper_pose_given *pose) INCISE_REALTIME;
 	int (*rendered)(struct incise_stepper *stepper,
 			struct incise_stepper_rendered *rendered) INCISE_REALTIME;
+};
+
+struct incise_driver;
+
+/**
+ * Functions of a driver chip between the step line and the motor: it has its own line to the
+ * program and is opened after its stepper. All except faults may block.
+ */
+struct incise_driver_ops {
+	/** Latched incise_stepper_fault bits. */
+	unsigned int (*faults)(struct incise_driver *driver) INCISE_REALTIME;
+	/** The first fault in words; 0: none. */
+	int (*cause)(struct incise_driver *driver, char *text, size_t size);
+	/** Set it up again, without faults. 0; -EBUSY (a cause persists), -EIO, -ENODEV. */
+	int (*clear)(struct incise_driver *driver, struct incise_error *err);
+	/** See incise_stepper_chip(), incise_stepper_counter(). */
+	int (*read)(struct incise_driver *driver, struct incise_stepper_chip *chip);
+	int (*counter)(struct incise_driver *driver, int i,
+		       struct incise_stepper_counter *counter);
+	void (*close)(struct incise_driver *driver);
+};
+
+/** A driver chip: the first member of its backend's struct. */
+struct incise_driver {
+	const struct incise_driver_ops *ops;
+	/** When it was opened it had been without supply, or off: the position is lost. */
+	bool restarted;
 };
 
 /**
@@ -142,6 +171,14 @@ struct incise_stepper_ops {
 	int (*origin)(struct incise_stepper *stepper, double position_mm, bool homed);
 	/** Wait; 0 or -EINTR. NULL: wait by the clock of the computer. */
 	int (*wait)(struct incise_stepper *stepper, int64_t ns);
+
+	/**
+	 * Take a driver chip, which lives longer; 0 or a negative errno. NULL: it has a power
+	 * stage of its own.
+	 */
+	int (*attach)(struct incise_stepper *stepper, struct incise_driver *driver);
+	/** Read the chip. */
+	int (*chip)(struct incise_stepper *stepper, struct incise_stepper_chip *chip);
 
 	const struct incise_stepper_plan_ops *plan; /**< NULL: it runs no plans */
 };
@@ -222,6 +259,18 @@ struct incise_actuator_can {
 	int master; /**< node id of this program's heartbeat, 1 … 127 */
 };
 
+/** A driver chip of TRINAMIC: the group `tmc`. */
+struct incise_actuator_tmc {
+	double sense_ohm;
+	double run_A, hold_A; /**< root mean square */
+	bool interpolate;
+	bool stealthchop;
+	double stealthchop_mm_s; /**< SpreadCycle above it; 0: never */
+	double stall_mm_s;	 /**< StallGuard from it on; 0: never */
+	int stall_threshold;
+	bool stall_home; /**< a stall is the edge of the home input, and no fault */
+};
+
 /** The group `actuator` of rig.conf. */
 struct incise_actuator {
 	double spring_N_mm, travel_mm;
@@ -246,6 +295,8 @@ struct incise_actuator {
 	int line[INCISE_LINES];	 /**< offsets; -1: not wired */
 	unsigned int active_low; /**< bits 1 << incise_actuator_line */
 	struct incise_actuator_can can;
+	char driver[100]; /**< of its driver chip, BACKEND:ARGUMENTS; "": none */
+	struct incise_actuator_tmc tmc;
 };
 
 /** Version of the structs and values that backends use. */
@@ -258,7 +309,7 @@ struct incise_backend_request {
 	struct incise_clock *clock; /**< real; valid as long as the device */
 	bool watch; /**< only read: do not move the device or disturb its owner */
 	/* Settings for its kind, or defaults; copy them. */
-	const struct incise_actuator *actuator; /**< for a stepper */
+	const struct incise_actuator *actuator; /**< for a stepper, or a driver */
 	const struct incise_tracker_setup *tracker;
 	const struct incise_force_setup *force;
 	const struct incise_camera_setup *camera;
@@ -269,6 +320,9 @@ struct incise_backend_request {
 	 */
 	struct incise_stepper *const *siblings;
 	int n_siblings;
+	/** For a driver: those of the rig's drivers that this backend opened before. */
+	struct incise_driver *const *drivers;
+	int n_drivers;
 };
 
 /**
@@ -282,7 +336,7 @@ struct incise_backend_request {
  */
 struct incise_backend {
 	unsigned int abi; /**< INCISE_BACKEND_ABI */
-	const char *kind; /**< "tracker", "force", "camera", "stepper", … */
+	const char *kind; /**< "tracker", "force", "camera", "stepper", "driver", … */
 	const char *name; /**< fewer than 32 letters a to z, digits, underscores */
 	/**
 	 * Open a device. close() must bring a powered device to rest.

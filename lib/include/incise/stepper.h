@@ -174,6 +174,27 @@ struct incise_stepper_counter {
 INCISE_API int incise_stepper_counter(struct incise_stepper *stepper, int i,
 				      struct incise_stepper_counter *counter);
 
+/** A driver chip between the step line and the motor, as it reports itself. */
+struct incise_stepper_chip {
+	char name[100];	      /**< as in rig.conf, "tmc2209:/dev/serial0:0" */
+	double run_A, hold_A; /**< its currents, root mean square */
+	int microsteps;
+	bool stealthchop; /**< StealthChop is at work, else SpreadCycle */
+	bool standstill;
+	bool warm; /**< temperature warning */
+	int load;  /**< StallGuard's value, 0 to 1023: the smaller, the more load */
+	int threshold;
+	/** A stall is a load of at most this times the threshold; 0: a load of 0. */
+	int threshold_load;
+};
+
+/**
+ * Read the driver chip of an actuator: some messages, so up to 0.2 s. Not real-time safe.
+ * @return 0; -EOPNOTSUPP (rig.conf names no driver), or the error of its line.
+ */
+INCISE_API int incise_stepper_chip(struct incise_stepper *stepper,
+				   struct incise_stepper_chip *chip);
+
 /** "disabled", "ready", "moving", "stopping", "fault". */
 INCISE_API const char *incise_stepper_state_name(enum incise_stepper_state state);
 

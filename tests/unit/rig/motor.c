@@ -8,6 +8,7 @@
 #include "../../../lib/base/random.h"
 #include "../../../lib/rig/motor.h"
 #include "../../../lib/sim/sim.h"
+#include "../message.h"
 #include "conformance.h"
 #include "machine.h"
 
@@ -220,6 +221,205 @@ TEST(every_case_on_a_made_clock)
 				assert_in_range(b.machine.at - told->position,
 						MACHINE_HOME - 1, MACHINE_HOME + 1);
 		}
+}
+
+/* A driver chip, and what it shall report. */
+static struct {
+	struct incise_driver driver;
+	unsigned int faults;
+	bool persists;
+	int set_up; /* times */
+} chip;
+
+static unsigned int chip_faults(struct incise_driver *driver)
+{
+	(void)driver;
+	return chip.faults;
+}
+
+static int chip_cause(struct incise_driver *driver, char *text, size_t size)
+{
+	(void)driver;
+	return chip.faults ? snprintf(text, size, "chip: too hot; cool it, then clear")
+			   : 0;
+}
+
+static int chip_clear(struct incise_driver *driver, struct incise_error *to)
+{
+	(void)driver;
+	chip.set_up++;
+	if (chip.persists)
+		return incise_error_set(to, EBUSY, "chip: still too hot; cool it");
+	chip.faults = 0;
+	return 0;
+}
+
+static int chip_read(struct incise_driver *driver, struct incise_stepper_chip *to)
+{
+	(void)driver;
+	*to = (struct incise_stepper_chip){.microsteps = 16, .load = 77};
+	return 0;
+}
+
+static int chip_counter(struct incise_driver *driver, int i,
+			struct incise_stepper_counter *to)
+{
+	(void)driver;
+	*to = (struct incise_stepper_counter){"warm", "warnings", 3, true};
+	return i ? -ENOENT : 0;
+}
+
+static const struct incise_driver_ops chip_ops = {
+	.faults = chip_faults,
+	.cause = chip_cause,
+	.clear = chip_clear,
+	.read = chip_read,
+	.counter = chip_counter,
+};
+
+static struct incise_stepper_status status_of(struct bench *b)
+{
+	struct incise_stepper_status status;
+
+	assert_int_equal(incise_stepper_status(&b->motor.stepper, &status), 0);
+	return status;
+}
+
+/* A chip's fault takes no target any more, then power by the deadman, and lasts until cleared. */
+TEST(a_fault_of_the_driver_chip_stops_the_motor)
+{
+	static struct bench b;
+	struct incise_stepper *stepper = &b.motor.stepper;
+	struct incise_stepper_counter counter;
+	struct incise_stepper_chip read;
+	char text[200];
+
+	bench_start(&b, true, false, false, 0);
+	assert_int_equal(incise_stepper_chip(stepper, &read), -EOPNOTSUPP);
+	assert_int_equal(incise_stepper_counter(stepper, 0, &counter), -ENOENT);
+	chip.driver.ops = &chip_ops;
+	assert_int_equal(stepper->ops->attach(stepper, &chip.driver), 0);
+	assert_int_equal(incise_stepper_chip(stepper, &read), 0);
+	assert_int_equal(read.load, 77);
+	assert_int_equal(incise_stepper_counter(stepper, 0, &counter), 0);
+
+	succeeds(!incise_stepper_enable(stepper, &err));
+	bench_advance(&b, 2000000);
+	succeeds(!incise_stepper_home(stepper, NULL, NULL, &err));
+	assert_int_equal(incise_stepper_set(stepper, 1), 0);
+	chip.faults = INCISE_STEPPER_FAULT_ALARM;
+	assert_int_equal(incise_stepper_set(stepper, 1), -EIO);
+	assert_int_equal(status_of(&b).faults, INCISE_STEPPER_FAULT_ALARM);
+	assert_int_equal(status_of(&b).state, INCISE_STEPPER_STATE_STOPPING);
+	assert_false(status_of(&b).homed);
+	incise_stepper_cause(stepper, text, sizeof(text));
+	assert_string_equal(text, "chip: too hot; cool it, then clear");
+	assert_error(incise_stepper_clear(stepper, &err), EBUSY, &err, "still moves");
+	bench_advance(&b, 300000000);
+	assert_int_equal(status_of(&b).state, INCISE_STEPPER_STATE_FAULT);
+	assert_error(incise_stepper_enable(stepper, &err), EPERM, &err, "too hot");
+	assert_int_equal(chip.set_up, 0);
+	chip.persists = true;
+	assert_error(incise_stepper_clear(stepper, &err), EBUSY, &err, "still too hot");
+	chip.persists = false;
+	succeeds(!incise_stepper_clear(stepper, &err));
+	assert_int_equal(chip.set_up, 2);
+	assert_int_equal(status_of(&b).state, INCISE_STEPPER_STATE_DISABLED);
+	assert_false(status_of(&b).homed);
+	succeeds(!incise_stepper_enable(stepper, &err));
+
+	/* The module keeps no home for a later program, whether the fault is cleared or not … */
+	bench_advance(&b, 2000000);
+	succeeds(!incise_stepper_home(stepper, NULL, NULL, &err));
+	assert_true(b.pulser.motion.status.flags & INCISE_STEPPER_FLAG_HOMED);
+	chip.faults = INCISE_STEPPER_FAULT_FOLLOWING;
+	succeeds(!incise_stepper_disable(stepper, &err));
+	assert_false(b.pulser.motion.status.flags & INCISE_STEPPER_FLAG_HOMED);
+	/* … nor one for a chip that was off meanwhile. */
+	succeeds(!incise_stepper_clear(stepper, &err));
+	b.pulser.motion.status.flags |= INCISE_STEPPER_FLAG_HOMED;
+	chip.driver.restarted = true;
+	bench_advance(&b, 2000000);
+	assert_int_equal(stepper->ops->attach(stepper, &chip.driver), 0);
+	assert_false(b.pulser.motion.status.flags & INCISE_STEPPER_FLAG_HOMED);
+	chip.driver.restarted = false;
+}
+
+/* A stall as the edge: at full speed both times, and with the way to reach it. */
+TEST(homing_by_a_stall)
+{
+	static struct bench b;
+	struct incise_stepper *stepper = &b.motor.stepper;
+	struct incise_stepper_homing homing;
+
+	bench_start(&b, true, false, false, 0);
+	assert_int_equal(stepper->ops->homing(stepper, &homing), 0);
+	assert_float_equal(homing.edge_mm_s, 0.2, 1e-12);
+	assert_float_equal(homing.clearance_mm, 0.2, 1e-12);
+	b.motor.actuator.tmc.stall_home = true;
+	chip.faults = 0;
+	stepper->ops->attach(stepper, &chip.driver);
+	assert_int_equal(stepper->ops->homing(stepper, &homing), 0);
+	assert_float_equal(homing.edge_mm_s, 2, 1e-12);
+	/* 2² / 500 to get to that speed and to leave it, and 20 of 0.02 mm */
+	assert_float_equal(homing.clearance_mm, 0.408, 1e-12);
+}
+
+#define STALL_MM_S 1
+
+/*
+ * An end stop at step 0 and DIAG as the home input: it is active while the motor is driven into the stop
+ * at speed, and the nut stays where it is.
+ */
+static int stall_wait(struct incise_motor *motor, int64_t ns)
+{
+	struct bench *b = of(motor);
+	double mm_s;
+
+	for (; ns > 0; ns -= 250000) {
+		bench_advance(b, 250000);
+		mm_s = (double)b->pulser.motion.status.velocity / 65536 *
+		       incise_actuator_step_mm(&motor->actuator);
+		b->machine.forced &= ~(unsigned int)INCISE_STEPPER_LINE_HOME;
+		if (b->machine.at <= 0 && mm_s < -STALL_MM_S)
+			b->machine.forced |= INCISE_STEPPER_LINE_HOME;
+		if (b->machine.at < 0)
+			b->machine.at = 0;
+	}
+	return 0;
+}
+
+TEST(a_stall_homes)
+{
+	static const int64_t starts[] = {0, 1, 100, 1500, 3999};
+	struct incise_motor_ops stalling = ops;
+	static struct bench b;
+	int64_t first = 0;
+
+	stalling.wait = stall_wait;
+	for (size_t i = 0; i < sizeof(starts) / sizeof(*starts); i++) {
+		struct incise_stepper *stepper = &b.motor.stepper;
+
+		bench_start(&b, true, false, false, 0);
+		b.motor.ops = &stalling;
+		b.machine.wired_home = false;
+		b.machine.at = starts[i];
+		b.motor.actuator.tmc.stall_home = true;
+		stepper->ops->attach(stepper, &chip.driver);
+		succeeds(!incise_stepper_enable(stepper, &err));
+		stall_wait(&b.motor, 2000000);
+		succeeds(!incise_stepper_home(stepper, NULL, NULL, &err));
+		assert_true(status_of(&b).homed);
+		/*
+		 * The stop holds the nut while the count comes to rest, and on the way back it leaves
+		 * the stop by as much: v²/2a + va/2j and 2 ms of polls, 18 µm or 15 steps, and a few for
+		 * ticks; from each start the same.
+		 */
+		assert_in_range(b.machine.at, 15, 20);
+		assert_int_equal(b.machine.at, i ? first : b.machine.at);
+		first = b.machine.at;
+		assert_int_equal(b.pulser.motion.status.position, 0);
+	}
 }
 
 struct virtual_rig {

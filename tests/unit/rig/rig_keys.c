@@ -40,7 +40,11 @@ static const char everything[] =
 	"		acceleration_per_turn_s2 = 61; following_mm = 1.5; following_ms = 51;\n"
 	"		homing_method = -3; absolute = true; position_gain_1_s = 10;\n"
 	"		stiffness_permille_mm = 5; damping_permille_s_mm = 6;\n"
-	"		torque_max_permille = 700; master = 126; }; },\n"
+	"		torque_max_permille = 700; master = 126; };\n"
+	"	driver = \"tmc2209:/dev/serial0:1\"; tmc = { sense_ohm = 0.1; run_A = 0.8;\n"
+	"		hold_A = 0.2; interpolate = false; stealthchop = false;\n"
+	"		stealthchop_mm_s = 5; stall_mm_s = 0.5; stall_threshold = 60;\n"
+	"		stall_home = true; }; },\n"
 	"	{ spring_N_mm = 1; travel_mm = 10; lead_mm = 2; direction = [0, 1, 0]; } );\n";
 
 struct keys {
@@ -236,6 +240,7 @@ TEST(every_key_is_listed)
 	has_all(&keys, incise_actuator_settings, "actuator[1]");
 	has_all(&keys, incise_actuator_can_settings, "actuator[1].can");
 	has_all(&keys, incise_actuator_line_settings, "actuator[1].lines");
+	has_all(&keys, incise_actuator_tmc_settings, "actuator[1].tmc");
 	/* no key is given without its value */
 	for (int i = 0; i < keys.n; i++)
 		assert_true(!keys.key[i].given || *keys.key[i].value);
@@ -266,10 +271,10 @@ TEST(values_are_those_of_the_file)
 		{"actuator[1].lines.enable", "0", 19},
 		{"actuator[1].lines.active_low", "[\"enable\", \"estop\"]", 20},
 		{"actuator[1].can.cycle_us", "1500", 21},
-		{"actuator[2].lead_mm", "2", 27},
+		{"actuator[2].lead_mm", "2", 31},
 		{"actuator[2].high_us", "", 0},
 		{"actuator[2].can.following_mm", "1", 0},
-		{"actuator[2].direction", "[0, 1, 0]", 27},
+		{"actuator[2].direction", "[0, 1, 0]", 31},
 	};
 	struct temp_file file = temp_file_new("rig.conf", everything);
 	struct keys keys;

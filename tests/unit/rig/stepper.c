@@ -404,7 +404,8 @@ static int machine_homing(struct incise_stepper *stepper,
 {
 	struct machine *m = of(stepper);
 
-	*homing = (struct incise_stepper_homing){SPEED_MM_S, m->home_mm, m->home_at};
+	*homing = (struct incise_stepper_homing){SPEED_MM_S, SPEED_MM_S / 10, 0.2,
+						 m->home_mm, m->home_at};
 	return m->home_at ? 0 : -EOPNOTSUPP;
 }
 

@@ -502,6 +502,7 @@ static void set_ops(struct can_stepper *c)
 	c->ops.homing = NULL;
 	c->ops.edge = NULL;
 	c->ops.origin = NULL;
+	c->ops.attach = NULL;
 	c->motor.stepper.ops = &c->ops;
 }
 
