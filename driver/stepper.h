@@ -10,9 +10,8 @@
  *     └── events ◀─────┘
  *
  * Locks, outer first: stepper.mutex (set-up, owner, unbind), motor.lock (raw; all
- * that moves), plan.lock (raw; samples of a source, stops), events.lock (raw). Locks of a
- * source's subsystem come after stepper.mutex. sync.lock is on its own. No memory of a user
- * is touched under any of them: mmap() comes with the user's memory locked already.
+ * that moves), plan.lock (raw; stops), events.lock (raw). sync.lock is on its own. No memory of
+ * a user is touched under any of them: mmap() comes with the user's memory locked already.
  */
 #ifndef INCISE_DRIVER_STEPPER_H
 #define INCISE_DRIVER_STEPPER_H

@@ -88,12 +88,9 @@ static bool stepper_plan_good(const struct stepper *stepper,
 {
 	u32 all = BIT(stepper->n_motors) - 1;
 
-	if (!load->motors || load->motors & ~all || load->reserved0 ||
-	    memchr_inv(load->reserved, 0, sizeof(load->reserved)))
-		return false;
-	if (!load->size)
-		return !load->data && !load->flags && stepper_source_good(load);
-	return !(load->flags & ~INCISE_STEPPER_PLAN_SOURCE) && stepper_source_good(load);
+	return load->motors && !(load->motors & ~all) && !load->flags &&
+	       !memchr_inv(load->reserved, 0, sizeof(load->reserved)) &&
+	       (load->size || !load->data);
 }
 
 static int stepper_plan_open(struct stepper_plan *plan)
@@ -258,7 +255,6 @@ void stepper_plan_take_out(struct stepper *stepper)
 
 	if (!plan)
 		return;
-	stepper_source_close(plan);
 	stepper_plan_tell(stepper, plan->load.motors, NULL);
 	stepper->plan = NULL;
 	stepper_plan_announce(plan, INCISE_STEPPER_PLAN_EMPTY);
@@ -286,8 +282,6 @@ int stepper_plan_install(struct stepper *stepper, const struct incise_stepper_pl
 		return -EBUSY;
 	if (plan) {
 		ret = stepper_plan_fits(stepper, plan);
-		if (!ret && load->flags & INCISE_STEPPER_PLAN_SOURCE)
-			ret = stepper_source_open(plan);
 		if (ret)
 			return ret;
 	}

@@ -189,7 +189,7 @@ struct incise_stepper_motor_status {
  * @t_ns: of the last tick: when it was due, which is what it computed with
  * @age_ns: of its pose; at its largest without one
  * @pose_tick: number of the tick, from 1, at which the last pose was taken
- * @pose_seq: seq of the last pose taken; with a source, the number of the sample
+ * @pose_seq: seq of the last pose taken
  * @tube_seq: of the tube's
  * @poses: taken since the start, the tube's too
  * @refused: not taken since the start: older than the last one, too far away, or none
@@ -409,33 +409,19 @@ struct incise_stepper_sync {
 	__u64 reserved[2];
 };
 
-/* incise_stepper_plan.flags */
-#define INCISE_STEPPER_PLAN_SOURCE \
-	(1U << 0) /* poses come from the controller's own channel */
-
 /**
  * struct incise_stepper_plan - a plan for motors, 128 bytes
  * @motors: mask; the plan's first axis is the lowest of them. As many as the plan has axes
- * @flags: INCISE_STEPPER_PLAN_SOURCE or 0
+ * @flags: zero
  * @data: where the file of `incise compile` is in memory
  * @size: of it, bytes; 0: the plan of these motors goes, and the rest is 0
- * @origin: with a source: the sensor's position at 0; 2^-16 mm
- * @direction: with a source: the way of the sensor, unit; 2^-30
- * @scale: with a source: mm for one of its units; 2^-32
- * @quaternion: with a source: of the sensor; w first, 2^-30
- * @tool: with a source: INCISE_STEPPER_POSE_TOOL, what is held
- * @reserved0: zero
  * @reserved: zero
  *
  * A controller has one plan. The file is checked in full; after that, a tick takes a bounded time,
- * and no pose makes it overflow. With a source, of an encoder in the IIO subsystem
- * (incise_source.ko, which is to be loaded), poses are made in the kernel: the page's slot of the
- * first motor is set to mode POSE once, and its deadman is kept off by the source. Only
- * INCISE_STEPPER_POSE_FADE of the pose in the page counts then. A tick takes the newest sample;
- * position = origin + direction × scale × sample, samples held to ±2^30, scale within ±1 mm.
+ * and no pose makes it overflow.
  *
  * EBUSY: a motor of the plan, or of the one before, has power, or still comes to rest. EINVAL: the
- * file or a field is not good; EOPNOTSUPP: its version is not known here, or there is no source.
+ * file or a field is not good; EOPNOTSUPP: its version is not known here.
  * ERANGE: a motor's deadman_ns is not longer than the plan's pose age, its fade and the way of its
  * largest force at its slew, a motor's tick_ns is longer than the plan's, or a tick of the plan
  * takes more than a quarter of its tick_ns on this machine, in more than one of ten. EFBIG: more
@@ -449,13 +435,7 @@ struct incise_stepper_plan {
 	__u32 flags;
 	__u64 data;
 	__u64 size;
-	__s32 origin[3];
-	__s32 direction[3];
-	__s64 scale;
-	__s32 quaternion[4];
-	__u32 tool;
-	__u32 reserved0;
-	__u64 reserved[6];
+	__u64 reserved[13];
 };
 
 /* Watchers may call the ones that only read; the others need the owner (EPERM). */
