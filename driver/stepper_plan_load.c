@@ -139,7 +139,7 @@ int stepper_plan_make(struct stepper *stepper, const struct incise_stepper_plan 
 		return 0;
 	if (load->size > INCISE_FIXED_PLAN_SIZE_MAX)
 		return -EFBIG;
-	plan = kvzalloc(sizeof(*plan), GFP_KERNEL);
+	plan = kvzalloc(sizeof(*plan), GFP_KERNEL_ACCOUNT);
 	if (!plan)
 		return -ENOMEM;
 	raw_spin_lock_init(&plan->lock);
@@ -150,13 +150,14 @@ int stepper_plan_make(struct stepper *stepper, const struct incise_stepper_plan 
 	plan->leader = &stepper->motor[__ffs(load->motors)];
 	for (i = 0; i < INCISE_FIXED_AXES_MAX; i++)
 		plan->aim[i] = STEPPER_PLAN_NO_AIM;
-	plan->file = vmemdup_user(u64_to_user_ptr(load->data), load->size);
-	if (IS_ERR(plan->file)) {
-		ret = PTR_ERR(plan->file);
-		plan->file = NULL;
-	} else {
+	/* The user's control group pays. A warning in the log is not for users to cause. */
+	plan->file = kvmalloc(load->size, GFP_KERNEL_ACCOUNT | __GFP_NOWARN);
+	if (!plan->file)
+		ret = -ENOMEM;
+	else if (copy_from_user(plan->file, u64_to_user_ptr(load->data), load->size))
+		ret = -EFAULT;
+	else
 		ret = stepper_plan_open(plan);
-	}
 	if (ret) {
 		stepper_plan_free(plan);
 		return ret;

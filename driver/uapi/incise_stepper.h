@@ -8,7 +8,8 @@
  *           needed: no system call.
  *   ioctl   what is set up while the motors stand.
  *   read    events, whole structs; poll shows when there is one. Each open file has a
- *           place of its own in the ring of events; a gap in seq shows what it missed.
+ *           place of its own in the ring of events; a gap in seq shows what it missed. A
+ *           thread of the controller (SCHED_FIFO 50) wakes readers: the status page is sooner.
  *
  * Lengths are microsteps ("steps"), times are nanoseconds of CLOCK_MONOTONIC. Reserved
  * fields are zero, else EINVAL. An ioctl that is not known here gives ENOTTY.
@@ -244,7 +245,7 @@ struct incise_stepper_plan_status {
 	__s32 command[3];
 	__s32 along[3];
 	__s32 target[3];
-	__u32 reserved0;
+	__u32 reserved0[2];
 	__u64 reserved[23];
 };
 
@@ -420,7 +421,8 @@ struct incise_stepper_sync {
  * A controller has one plan. The file is checked in full; after that, a tick takes a bounded time,
  * and no pose makes it overflow.
  *
- * EBUSY: a motor of the plan, or of the one before, has power, or still comes to rest. EINVAL: the
+ * EBUSY: a motor of the plan, or of the one before, has power, or still comes to rest, or another
+ * thread loads a plan. EINVAL: the
  * file or a field is not good; EOPNOTSUPP: its version is not known here.
  * ERANGE: a motor's deadman_ns is not longer than the plan's pose age, its fade and the way of its
  * largest force at its slew, a motor's tick_ns is longer than the plan's, or a tick of the plan
@@ -438,7 +440,7 @@ struct incise_stepper_plan {
 	__u64 reserved[13];
 };
 
-/* Watchers may call the ones that only read; the others need the owner (EPERM). */
+/* Watchers may call the ones that only read, and DISABLE; the others need the owner (EPERM). */
 #define INCISE_STEPPER_IOC 0xE8
 #define INCISE_STEPPER_GET_INFO \
 	_IOR(INCISE_STEPPER_IOC, 0, struct incise_stepper_controller)
@@ -448,11 +450,14 @@ struct incise_stepper_plan {
 	_IOW(INCISE_STEPPER_IOC, 2, struct incise_stepper_config)
 /*
  * A mask of motors, not 0: all get power or no motor does, and motors that had power keep it.
- * EPERM: a fault is latched; EBUSY: an input forbids it, e-stop say, or it is still coming to rest;
+ * ENOTRECOVERABLE: a fault is latched, until CLEAR; EBUSY: an input forbids it, e-stop say, or it is still coming to rest;
  * ERANGE: it stands outside of its position limits; ESHUTDOWN: the machine goes down.
  */
 #define INCISE_STEPPER_ENABLE _IOW(INCISE_STEPPER_IOC, 3, __u32)
-/* Brings them to rest within the limits, then takes power away. Returns at once. */
+/*
+ * Brings them to rest within the limits, then takes power away. Returns at once. A watcher may
+ * too: whoever may look may stop.
+ */
 #define INCISE_STEPPER_DISABLE _IOW(INCISE_STEPPER_IOC, 4, __u32)
 /* Forgets the latched faults of motors at rest. EBUSY: the cause is still there. */
 #define INCISE_STEPPER_CLEAR _IOW(INCISE_STEPPER_IOC, 5, __u32)
