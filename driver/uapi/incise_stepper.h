@@ -449,7 +449,8 @@ struct incise_stepper_plan {
 #define INCISE_STEPPER_SET_CONFIG \
 	_IOW(INCISE_STEPPER_IOC, 2, struct incise_stepper_config)
 /*
- * A mask of motors, not 0: all get power or no motor does, and motors that had power keep it.
+ * A mask of motors, not 0: all get power or no motor does, and motors that had power keep it. The
+ * timers of those that get it, and of their plan, fire on the processor that this call runs on.
  * ENOTRECOVERABLE: a fault is latched, until CLEAR; EBUSY: an input forbids it, e-stop say, or it is still coming to rest;
  * ERANGE: it stands outside of its position limits; ESHUTDOWN: the machine goes down.
  */
