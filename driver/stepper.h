@@ -9,10 +9,9 @@
  *     ▲                │
  *     └── events ◀─────┘
  *
- * Locks, outer first: stepper.mutex (set-up, owner, unbind), motor.lock (raw; all
- * that moves), plan.lock (raw; samples of a source, stops), events.lock (raw). Locks of a
- * source's subsystem come after stepper.mutex. sync.lock is on its own. No memory of a user
- * is touched under any of them: mmap() comes with the user's memory locked already.
+ * Locks, outer first: stepper.loading (LOAD_PLAN), stepper.mutex (set-up, owner, unbind), motor.lock (raw; all
+ * that moves), plan.lock (raw; stops), events.lock (raw). sync.lock is on its own. No memory of
+ * a user is touched under any of them: mmap() comes with the user's memory locked already.
  */
 #ifndef INCISE_DRIVER_STEPPER_H
 #define INCISE_DRIVER_STEPPER_H
@@ -21,7 +20,6 @@
 #include <linux/cdev.h>
 #include <linux/device.h>
 #include <linux/hrtimer.h>
-#include <linux/irq_work.h>
 #include <linux/mutex.h>
 #include <linux/notifier.h>
 #include <linux/pm_qos.h>
@@ -42,6 +40,7 @@ struct platform_device;
 struct seq_file;
 struct stepper;
 struct stepper_plan;
+struct task_struct;
 
 /* Bins of a histogram: [0, 1), [1, 2), [2, 4) … µs; the last one is open. */
 #define STEPPER_BINS 24
@@ -177,7 +176,8 @@ struct stepper {
 	struct device *parent; /* only until unbind */
 	int id;
 
-	struct mutex mutex; /* owner, gone, and all set-up */
+	struct mutex loading; /* a plan: outside of mutex */
+	struct mutex mutex;   /* owner, gone, and all set-up */
 	struct file *owner;
 	bool closing; /* reboot: no power any more */
 	bool gone;
@@ -192,7 +192,8 @@ struct stepper {
 	struct stepper_sync_line sync;
 	struct stepper_events events;
 	wait_queue_head_t wait;
-	struct irq_work wake;
+	struct task_struct *herald;    /* wakes readers of events */
+	atomic_t news;		       /* events that it has not told */
 	struct pm_qos_request latency; /* no idle states: stepper.mutex */
 	struct work_struct look;       /* whether these may come back */
 	bool awake;
@@ -284,6 +285,9 @@ void stepper_lines_ignore(struct stepper *stepper);
 
 /* stepper_event.c */
 void stepper_event_init(struct stepper *stepper);
+int stepper_event_start(struct stepper *stepper);
+void stepper_event_end(struct stepper *stepper);
+void stepper_event_wake(struct stepper *stepper);
 void stepper_event_put(struct stepper *stepper, const struct incise_stepper_event *event);
 u64 stepper_event_last(struct stepper *stepper);
 unsigned int stepper_event_take(struct stepper *stepper, u64 *after,

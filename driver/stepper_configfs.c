@@ -9,11 +9,12 @@
  *   echo 1 >bench/live                  binds; cdev says which node it is
  *   echo 0 >bench/live                  unbinds
  *
- * A line is LABEL:OFFSET or LABEL:OFFSET:active-low, or nothing where it is not wired.
+ * A line is LABEL:OFFSET[:active-low][:pull-up|:pull-down], or nothing where it is not wired.
  * While live nothing can be changed (EBUSY) and nothing removed.
  */
 #include <linux/configfs.h>
 #include <linux/device.h>
+#include <linux/gpio/machine.h>
 #include <linux/module.h>
 #include <linux/mutex.h>
 #include <linux/slab.h>
@@ -57,34 +58,65 @@ static struct stepper_motor_folder *to_motor_folder(struct config_item *item)
 	return container_of(to_config_group(item), struct stepper_motor_folder, group);
 }
 
+static const struct {
+	const char *word;
+	unsigned long flag;
+} stepper_wire_words[] = {
+	{":active-low", GPIO_ACTIVE_LOW},
+	{":pull-up", GPIO_PULL_UP},
+	{":pull-down", GPIO_PULL_DOWN},
+};
+
 static ssize_t stepper_wire_show(struct stepper_folder *folder,
 				 const struct stepper_wire *wire, char *page)
 {
-	int n = 0;
+	int i, n = 0;
 
 	mutex_lock(&folder->mutex);
-	if (wire->label)
-		n = sysfs_emit(page, "%s:%u%s\n", wire->label, wire->offset,
-			       wire->active_low ? ":active-low" : "");
+	if (wire->label) {
+		n = sysfs_emit(page, "%s:%u", wire->label, wire->offset);
+		for (i = 0; i < ARRAY_SIZE(stepper_wire_words); i++)
+			if (wire->flags & stepper_wire_words[i].flag)
+				n += sysfs_emit_at(page, n, "%s",
+						   stepper_wire_words[i].word);
+		n += sysfs_emit_at(page, n, "\n");
+	}
 	mutex_unlock(&folder->mutex);
 	return n;
 }
 
-/* LABEL:OFFSET[:active-low]; a label may have a ':' of its own. */
+/* Takes a word away from the end of a line; 0: there is none. */
+static unsigned long stepper_wire_word(char *text)
+{
+	size_t n = strlen(text);
+	int i;
+
+	for (i = 0; i < ARRAY_SIZE(stepper_wire_words); i++) {
+		size_t length = strlen(stepper_wire_words[i].word);
+
+		if (n <= length || strcmp(text + n - length, stepper_wire_words[i].word))
+			continue;
+		text[n - length] = '\0';
+		return stepper_wire_words[i].flag;
+	}
+	return 0;
+}
+
+/* LABEL:OFFSET and words in any order; a label may have a ':' of its own. */
 static int stepper_wire_parse(struct stepper_wire *wire, char *text)
 {
-	const char *low = ":active-low";
-	size_t n = strlen(text);
+	const unsigned long both = GPIO_PULL_UP | GPIO_PULL_DOWN;
+	unsigned long flag;
 	char *colon;
 	int ret;
 
 	*wire = (struct stepper_wire){};
-	if (!n)
+	if (!*text)
 		return 0;
-	if (n > strlen(low) && !strcmp(text + n - strlen(low), low)) {
-		wire->active_low = true;
-		text[n - strlen(low)] = '\0';
-	}
+	while ((flag = stepper_wire_word(text)))
+		wire->flags |= flag;
+	if ((wire->flags & both) == both)
+		return -EINVAL;
 	colon = strrchr(text, ':');
 	if (!colon || colon == text)
 		return -EINVAL;

@@ -56,6 +56,7 @@ static void stepper_device_release(struct device *dev)
 	free_page((unsigned long)stepper->status);
 	ida_free(&stepper_ids, stepper->id);
 	mutex_destroy(&stepper->mutex);
+	mutex_destroy(&stepper->loading);
 	kfree(stepper);
 }
 
@@ -96,6 +97,7 @@ struct stepper *stepper_device_new(struct device *parent, unsigned int n_motors)
 	stepper->info.n_motors = n_motors;
 	stepper->info.capabilities = STEPPER_PLAN_CAPABILITY;
 	mutex_init(&stepper->mutex);
+	mutex_init(&stepper->loading);
 	stepper_event_init(stepper);
 	stepper_sync_init(stepper);
 	stepper_latency_init(stepper);

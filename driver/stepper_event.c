@@ -7,27 +7,72 @@
  *                   ▲
  *                   a file that has read up to 5
  */
-#include <linux/irq_work.h>
+#include <linux/kthread.h>
+#include <linux/sched.h>
 #include <linux/wait.h>
 
 #include "stepper.h"
 
-static void stepper_event_wake(struct irq_work *work)
+/*
+ * The herald: a thread bound to no processor, as readers must hear of a stop while a program keeps
+ * the timer's processor for itself. The waiting queue's lock sleeps on PREEMPT_RT, so that a
+ * hard interrupt wakes the herald, and the herald the readers.
+ */
+static int stepper_event_tell(void *data)
 {
-	struct stepper *stepper = container_of(work, struct stepper, wake);
+	struct stepper *stepper = data;
 
-	wake_up_interruptible_all(&stepper->wait);
-	stepper_latency_event(stepper);
+	sched_set_fifo(current);
+	for (;;) {
+		set_current_state(TASK_IDLE);
+		if (kthread_should_stop())
+			break;
+		if (!atomic_xchg(&stepper->news, 0)) {
+			schedule();
+			continue;
+		}
+		__set_current_state(TASK_RUNNING);
+		wake_up_interruptible_all(&stepper->wait);
+		stepper_latency_event(stepper);
+	}
+	__set_current_state(TASK_RUNNING);
+	return 0;
+}
+
+int stepper_event_start(struct stepper *stepper)
+{
+	struct task_struct *herald;
+
+	herald = kthread_run(stepper_event_tell, stepper, "%s", dev_name(&stepper->dev));
+	if (IS_ERR(herald))
+		return PTR_ERR(herald);
+	stepper->herald = herald;
+	return 0;
+}
+
+/* No event comes any more. Sleeps. */
+void stepper_event_end(struct stepper *stepper)
+{
+	if (stepper->herald)
+		kthread_stop(stepper->herald);
+	stepper->herald = NULL;
+}
+
+/* From any context. */
+void stepper_event_wake(struct stepper *stepper)
+{
+	atomic_inc(&stepper->news);
+	if (stepper->herald)
+		wake_up_process(stepper->herald);
 }
 
 void stepper_event_init(struct stepper *stepper)
 {
 	raw_spin_lock_init(&stepper->events.lock);
 	init_waitqueue_head(&stepper->wait);
-	init_irq_work(&stepper->wake, stepper_event_wake);
 }
 
-/* From any context: a wake-up is not for hard interrupts, so it is left to irq_work. */
+/* From any context. */
 void stepper_event_put(struct stepper *stepper, const struct incise_stepper_event *event)
 {
 	struct stepper_events *events = &stepper->events;
@@ -40,7 +85,7 @@ void stepper_event_put(struct stepper *stepper, const struct incise_stepper_even
 	*to = *event;
 	to->seq = events->seq;
 	raw_spin_unlock_irqrestore(&events->lock, flags);
-	irq_work_queue(&stepper->wake);
+	stepper_event_wake(stepper);
 }
 
 u64 stepper_event_last(struct stepper *stepper)

@@ -117,7 +117,7 @@ static int stepper_file_enable(struct stepper *stepper, u32 mask)
 back:
 	for_each_set_bit(i, &given, stepper->n_motors)
 		stepper_setup_disable(&stepper->motor[i]);
-	irq_work_queue(&stepper->wake);
+	stepper_event_wake(stepper);
 	return ret;
 }
 
@@ -169,15 +169,13 @@ union stepper_argument {
 
 /* stepper.mutex held, the device there, the caller allowed to. */
 static int stepper_file_command(struct stepper *stepper, unsigned int command,
-				union stepper_argument *arg, struct stepper_plan **plan)
+				union stepper_argument *arg)
 {
 	unsigned int motor;
 	int ret;
 
 	stepper_plan_sweep(stepper);
 	switch (command) {
-	case INCISE_STEPPER_LOAD_PLAN:
-		return stepper_plan_install(stepper, &arg->plan, plan);
 	case INCISE_STEPPER_GET_INFO:
 		arg->info = stepper->info;
 		return 0;
@@ -216,7 +214,8 @@ static int stepper_file_command(struct stepper *stepper, unsigned int command,
 static bool stepper_file_watchers(unsigned int command)
 {
 	return command == INCISE_STEPPER_GET_INFO ||
-	       command == INCISE_STEPPER_GET_CONFIG || command == INCISE_STEPPER_GET_SYNC;
+	       command == INCISE_STEPPER_GET_CONFIG ||
+	       command == INCISE_STEPPER_GET_SYNC || command == INCISE_STEPPER_DISABLE;
 }
 
 static bool stepper_file_known(unsigned int command)
@@ -238,12 +237,35 @@ static bool stepper_file_known(unsigned int command)
 	}
 }
 
+/* One load at a time: each holds as much memory as its plan is long. */
+static int stepper_file_load(struct stepper *stepper,
+			     const struct incise_stepper_plan *load)
+{
+	struct stepper_plan *plan = NULL;
+	int ret;
+
+	if (!mutex_trylock(&stepper->loading))
+		return -EBUSY;
+	ret = stepper_plan_make(stepper, load, &plan);
+	if (!ret) {
+		mutex_lock(&stepper->mutex);
+		ret = -ENODEV;
+		if (!stepper->gone) {
+			stepper_plan_sweep(stepper);
+			ret = stepper_plan_install(stepper, load, &plan);
+		}
+		mutex_unlock(&stepper->mutex);
+		stepper_plan_free(plan);
+	}
+	mutex_unlock(&stepper->loading);
+	return ret;
+}
+
 static long stepper_file_ioctl(struct file *file, unsigned int command, unsigned long to)
 {
 	struct stepper_file *opened = file->private_data;
 	struct stepper *stepper = opened->stepper;
 	void __user *user = (void __user *)to;
-	struct stepper_plan *plan = NULL;
 	union stepper_argument arg;
 	int ret;
 
@@ -257,16 +279,11 @@ static long stepper_file_ioctl(struct file *file, unsigned int command, unsigned
 	    copy_from_user(&arg, user, _IOC_SIZE(command)))
 		return -EFAULT;
 
-	ret = 0;
 	if (command == INCISE_STEPPER_LOAD_PLAN)
-		ret = stepper_plan_make(stepper, &arg.plan, &plan);
-	if (ret)
-		return ret;
+		return stepper_file_load(stepper, &arg.plan);
 	mutex_lock(&stepper->mutex);
-	ret = stepper->gone ? -ENODEV
-			    : stepper_file_command(stepper, command, &arg, &plan);
+	ret = stepper->gone ? -ENODEV : stepper_file_command(stepper, command, &arg);
 	mutex_unlock(&stepper->mutex);
-	stepper_plan_free(plan);
 	if (ret)
 		return ret;
 	if (_IOC_DIR(command) & _IOC_READ && copy_to_user(user, &arg, _IOC_SIZE(command)))

@@ -45,7 +45,7 @@ void stepper_latency_init(struct stepper *stepper)
 	INIT_WORK(&stepper->look, stepper_latency_look);
 }
 
-/* An event came: from irq_work. */
+/* An event came: from the herald. */
 void stepper_latency_event(struct stepper *stepper)
 {
 	if (READ_ONCE(stepper->awake))

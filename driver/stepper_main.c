@@ -116,6 +116,9 @@ static int stepper_main_probe(struct platform_device *pdev)
 		label = dev_name(dev);
 	strscpy(stepper->info.name, label, sizeof(stepper->info.name));
 
+	ret = stepper_event_start(stepper);
+	if (ret)
+		goto put;
 	ret = stepper_lines_get(stepper, dev);
 	if (ret)
 		goto put;
@@ -151,7 +154,7 @@ ignore:
 ignore_lines:
 	stepper_lines_ignore(stepper);
 put:
-	irq_work_sync(&stepper->wake);
+	stepper_event_end(stepper);
 	stepper_latency_end(stepper);
 	put_device(&stepper->dev);
 	return ret;
@@ -174,7 +177,7 @@ static void stepper_main_remove(struct platform_device *pdev)
 
 	stepper_lines_ignore(stepper);
 	wake_up_all(&stepper->wait);
-	irq_work_sync(&stepper->wake);
+	stepper_event_end(stepper);
 	stepper_latency_end(stepper);
 	put_device(&stepper->dev);
 }

@@ -32,7 +32,6 @@ static void stepper_nodes_line(struct stepper_nodes *nodes, int motor, const cha
 			       const struct stepper_wire *wire)
 {
 	unsigned int n = nodes->n_lines;
-	unsigned long flags = wire->active_low ? GPIO_ACTIVE_LOW : GPIO_ACTIVE_HIGH;
 	char *key = nodes->key[n];
 
 	if (!wire->label)
@@ -41,7 +40,7 @@ static void stepper_nodes_line(struct stepper_nodes *nodes, int motor, const cha
 		snprintf(key, sizeof(nodes->key[n]), "%s", name);
 	else
 		snprintf(key, sizeof(nodes->key[n]), "motor%d-%s", motor, name);
-	nodes->table->table[n] = GPIO_LOOKUP(wire->label, wire->offset, key, flags);
+	nodes->table->table[n] = GPIO_LOOKUP(wire->label, wire->offset, key, wire->flags);
 	nodes->n_lines++;
 }
 

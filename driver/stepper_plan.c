@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-only
 /*
- * Ticks of a plan: lib/fixed's tick with the poses of the page, or of a source. The timer of the
+ * Ticks of a plan: lib/fixed's tick with the poses of the page. The timer of the
  * plan's first motor, its leader, runs them between that motor's own ticks and edges; the other
  * motors of the plan, its followers, read their targets at their ticks, on whatever processor.
  *
@@ -126,9 +126,6 @@ static void stepper_plan_start(struct stepper_plan *plan, s64 due)
 	plan->due_ns = due;
 	plan->late_row = 0;
 	plan->digest = ~0U;
-	raw_spin_lock(&plan->lock);
-	plan->taken = plan->sample.sequence;
-	raw_spin_unlock(&plan->lock);
 }
 
 /* A motor comes to rest, or its set-point says another mode. */
@@ -303,11 +300,7 @@ static void stepper_plan_take_tube(struct stepper_plan *plan, s64 now, s64 due)
 		if (plan->tube.mode != INCISE_STEPPER_MODE_POSE || plan->tube.pose.tool)
 			break;
 		pose = stepper_plan_pose_of(&plan->tube);
-		pose.tool = leader->setpoint.pose.tool;
-		if (plan->source_ops)
-			pose.tool =
-				plan->load.tool | (pose.tool & INCISE_STEPPER_POSE_FADE);
-		pose.tool |= INCISE_FIXED_POSE_TUBE;
+		pose.tool = leader->setpoint.pose.tool | INCISE_FIXED_POSE_TUBE;
 		stepper_plan_give(plan, &pose, plan->tube.seq, now, due);
 		return;
 	case STEPPER_PAGE_NOTHING:
@@ -325,10 +318,7 @@ static void stepper_plan_take(struct stepper_plan *plan, s64 now, s64 due)
 	bool left = plan->leaving & INCISE_STEPPER_PLAN_LEFT;
 	struct incise_fixed_pose pose;
 
-	if (plan->source_ops && stepper_source_take(plan, &pose)) {
-		pose.tool |= setpoint->pose.tool & INCISE_STEPPER_POSE_FADE;
-		stepper_plan_give(plan, &pose, plan->taken, now, due);
-	} else if (!plan->source_ops && plan->fresh) {
+	if (plan->fresh) {
 		pose = stepper_plan_pose_of(setpoint);
 		stepper_plan_give(plan, &pose, setpoint->seq, now, due);
 	}

@@ -1,13 +1,11 @@
 /* SPDX-License-Identifier: GPL-2.0-only */
 /*
- * A plan in the module: the state that its load, its ticks and its source share; see
- * stepper_plan.c.
+ * A plan in the module: the state that its load and its ticks share; see stepper_plan.c.
  */
 #ifndef INCISE_DRIVER_STEPPER_PLAN_H
 #define INCISE_DRIVER_STEPPER_PLAN_H
 
 #include "../lib/fixed/plan.h"
-#include "incise_source.h"
 #include "stepper.h"
 
 #define STEPPER_PLAN_NO_AIM S64_MIN
@@ -25,15 +23,12 @@
  * @view:	checked
  * @cost_ns:	cost of nine in ten ticks when it was loaded
  * @orphan:	goes when its motors have no power; stepper.mutex
- * @source_ops:	of its source; NULL: poses come by the page
- * @source:	what it opened
  * @running:	the leader's set-point says mode POSE. From here on to @state: leader's lock, if
  *		nothing else is said
  * @quiet:	there is no force, and none comes by itself; read without a lock
  * @leaving:	INCISE_STEPPER_PLAN_LEFT, _AWAY: why it is to fade; read without a lock
  * @fresh:	the leader's set-point has a pose that the plan has not got
  * @tube:	last set-point of the tube's slot
- * @taken:	sequence of the last sample taken of @sample
  * @due_ns:	of the next tick
  * @late_row:	ticks in a row that came too late, or took too long
  * @digest:	register of the CRC, not inverted
@@ -41,8 +36,7 @@
  * @lateness:	of its ticks
  * @cost:	of them
  * @tick:	the last one
- * @lock:	@sample, and writers of @stops
- * @sample:	of the source, the newest
+ * @lock:	writers of @stops
  * @aim:	per axis, read by the motors on any processor: steps or STEPPER_PLAN_NO_AIM
  * @life_ns:	when the last pose was taken; read likewise
  * @stops:	counts what ends the run of all of its motors; read likewise
@@ -59,15 +53,12 @@ struct stepper_plan {
 	struct incise_fixed_plan view;
 	u32 cost_ns;
 	bool orphan;
-	const struct incise_stepper_source_ops *source_ops;
-	void *source;
 
 	bool running;
 	bool quiet;
 	u32 leaving;
 	bool fresh;
 	struct stepper_setpoint tube;
-	u32 taken;
 	s64 due_ns;
 	u32 late_row;
 	u32 digest;
@@ -75,11 +66,7 @@ struct stepper_plan {
 	struct stepper_histogram lateness, cost;
 	struct incise_fixed_tick tick;
 
-	raw_spinlock_t lock; /* see sample, stops */
-	struct {
-		s64 raw, t_ns;
-		u32 sequence;
-	} sample;
+	raw_spinlock_t lock; /* see stops */
 	s64 aim[INCISE_FIXED_AXES_MAX];
 	s64 life_ns;
 	u32 stops;
@@ -91,11 +78,5 @@ struct stepper_plan {
 
 /* stepper_plan.c: leader->lock held */
 void stepper_plan_publish(struct stepper_plan *plan, u32 state, s64 t_ns);
-
-/* stepper_source.c */
-int stepper_source_open(struct stepper_plan *plan);
-void stepper_source_close(struct stepper_plan *plan);
-bool stepper_source_take(struct stepper_plan *plan, struct incise_fixed_pose *pose);
-bool stepper_source_good(const struct incise_stepper_plan *load);
 
 #endif

@@ -88,12 +88,9 @@ static bool stepper_plan_good(const struct stepper *stepper,
 {
 	u32 all = BIT(stepper->n_motors) - 1;
 
-	if (!load->motors || load->motors & ~all || load->reserved0 ||
-	    memchr_inv(load->reserved, 0, sizeof(load->reserved)))
-		return false;
-	if (!load->size)
-		return !load->data && !load->flags && stepper_source_good(load);
-	return !(load->flags & ~INCISE_STEPPER_PLAN_SOURCE) && stepper_source_good(load);
+	return load->motors && !(load->motors & ~all) && !load->flags &&
+	       !memchr_inv(load->reserved, 0, sizeof(load->reserved)) &&
+	       (load->size || !load->data);
 }
 
 static int stepper_plan_open(struct stepper_plan *plan)
@@ -142,7 +139,7 @@ int stepper_plan_make(struct stepper *stepper, const struct incise_stepper_plan 
 		return 0;
 	if (load->size > INCISE_FIXED_PLAN_SIZE_MAX)
 		return -EFBIG;
-	plan = kvzalloc(sizeof(*plan), GFP_KERNEL);
+	plan = kvzalloc(sizeof(*plan), GFP_KERNEL_ACCOUNT);
 	if (!plan)
 		return -ENOMEM;
 	raw_spin_lock_init(&plan->lock);
@@ -153,13 +150,14 @@ int stepper_plan_make(struct stepper *stepper, const struct incise_stepper_plan 
 	plan->leader = &stepper->motor[__ffs(load->motors)];
 	for (i = 0; i < INCISE_FIXED_AXES_MAX; i++)
 		plan->aim[i] = STEPPER_PLAN_NO_AIM;
-	plan->file = vmemdup_user(u64_to_user_ptr(load->data), load->size);
-	if (IS_ERR(plan->file)) {
-		ret = PTR_ERR(plan->file);
-		plan->file = NULL;
-	} else {
+	/* The user's control group pays. A warning in the log is not for users to cause. */
+	plan->file = kvmalloc(load->size, GFP_KERNEL_ACCOUNT | __GFP_NOWARN);
+	if (!plan->file)
+		ret = -ENOMEM;
+	else if (copy_from_user(plan->file, u64_to_user_ptr(load->data), load->size))
+		ret = -EFAULT;
+	else
 		ret = stepper_plan_open(plan);
-	}
 	if (ret) {
 		stepper_plan_free(plan);
 		return ret;
@@ -258,7 +256,6 @@ void stepper_plan_take_out(struct stepper *stepper)
 
 	if (!plan)
 		return;
-	stepper_source_close(plan);
 	stepper_plan_tell(stepper, plan->load.motors, NULL);
 	stepper->plan = NULL;
 	stepper_plan_announce(plan, INCISE_STEPPER_PLAN_EMPTY);
@@ -286,8 +283,6 @@ int stepper_plan_install(struct stepper *stepper, const struct incise_stepper_pl
 		return -EBUSY;
 	if (plan) {
 		ret = stepper_plan_fits(stepper, plan);
-		if (!ret && load->flags & INCISE_STEPPER_PLAN_SOURCE)
-			ret = stepper_source_open(plan);
 		if (ret)
 			return ret;
 	}

@@ -43,7 +43,7 @@ static int stepper_setup_allowed(const struct stepper_motor *motor)
 	const u32 forbid = INCISE_STEPPER_LINE_ESTOP | INCISE_STEPPER_LINE_ALARM;
 
 	if (motor->faults)
-		return -EPERM;
+		return -ENOTRECOVERABLE;
 	if (motor->disabling || motor->inputs & forbid)
 		return -EBUSY;
 	if (motor->position < motor->config.position_min ||
@@ -56,7 +56,7 @@ static int stepper_setup_allowed(const struct stepper_motor *motor)
  * stepper_setup_ready() - whether a motor may be enabled
  * @motor:	the motor
  *
- * Return: 0; -EPERM a fault is latched; -EBUSY it is coming to rest, or an input
+ * Return: 0; -ENOTRECOVERABLE a fault is latched; -EBUSY it is coming to rest, or an input
  * forbids it; -ERANGE it stands outside of its position limits.
  */
 int stepper_setup_ready(struct stepper_motor *motor)

@@ -16,7 +16,7 @@ struct stepper_nodes;
 struct stepper_wire {
 	char *label; /* of the chip; NULL: not wired */
 	unsigned int offset;
-	bool active_low;
+	unsigned long flags; /* enum gpio_lookup_flags */
 };
 
 enum { STEPPER_WIRE_ESTOP, STEPPER_WIRE_SYNC, STEPPER_WIRES };

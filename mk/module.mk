@@ -4,7 +4,7 @@
 #
 #   KDIR=DIR         headers of another kernel than the running one
 #   INCISE_SIM=m     incise_sim.ko too, the simulated chip that tests use
-#   INCISE_PLAN=n    without plans: no LOAD_PLAN, no mode POSE, no incise_source.ko
+#   INCISE_PLAN=n    without plans: no LOAD_PLAN, no mode POSE
 #   W=1 C=2          as in the kernel
 
 KDIR ?= /lib/modules/$(shell uname -r)/build
@@ -40,7 +40,7 @@ module_install: module ## install the module for that kernel, below $(DESTDIR)$(
 	$(depmod)
 
 module_uninstall: module_headers ## remove what module_install installed
-	rm -f "$(module_installed)"/incise_stepper.ko* "$(module_installed)"/incise_source.ko*
+	rm -f "$(module_installed)"/incise_stepper.ko*
 	$(depmod)
 
 # A source tree for dkms, which then builds the module for each kernel that is installed.
@@ -49,7 +49,7 @@ srcdir ?= $(prefix)/src
 dkms_dir = $(srcdir)/incise-$(version)
 dkms_sources = $(addprefix driver/,Kbuild Makefile compat/probe) \
 	$(filter-out %.mod.c,$(wildcard $(addprefix driver/,*.[ch] uapi/*.h compat/*.c))) \
-	$(wildcard driver/source/*) $(wildcard lib/fixed/*.[ch] lib/tissue/*.proto.[ch] lib/tissue/*.def) \
+	$(wildcard lib/fixed/*.[ch] lib/tissue/*.proto.[ch] lib/tissue/*.def) \
 	$(addprefix lib/number/,both.h fixed.h fixed_kind.h no_kind.h) \
 	$(shell grep -l __KERNEL__ lib/include/incise/*.h) \
 	$(addprefix lib/include/incise/,export.h stepper_state.h tick_flags.h tool.h)

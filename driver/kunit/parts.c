@@ -100,7 +100,6 @@ static void parts_events(struct kunit *test)
 		event.position = i;
 		stepper_event_put(stepper, &event);
 	}
-	irq_work_sync(&stepper->wake);
 	KUNIT_EXPECT_EQ(test, stepper_event_take(stepper, &after, got, 8), 8U);
 	KUNIT_EXPECT_EQ(test, got[0].seq, 11ULL);
 	KUNIT_EXPECT_EQ(test, got[0].position, 11LL);

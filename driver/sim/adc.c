@@ -18,7 +18,6 @@
 #include <linux/iio/buffer.h>
 #include <linux/iio/driver.h>
 #include <linux/iio/iio.h>
-#include <linux/iio/machine.h>
 #include <linux/iio/trigger.h>
 #include <linux/iio/trigger_consumer.h>
 #include <linux/iio/triggered_buffer.h>
@@ -40,7 +39,6 @@ static const struct iio_chan_spec sim_adc_channels[] = {
 		.type = IIO_VOLTAGE,
 		.indexed = 1,
 		.channel = 0,
-		.datasheet_name = "voltage0",
 		.info_mask_separate = BIT(IIO_CHAN_INFO_RAW) | BIT(IIO_CHAN_INFO_SCALE) |
 				      BIT(IIO_CHAN_INFO_OFFSET),
 		.info_mask_shared_by_all = BIT(IIO_CHAN_INFO_SAMP_FREQ),
@@ -252,14 +250,7 @@ static void sim_trigger_remove(struct sim_adc *adc)
 	iio_trigger_free(adc->trigger);
 }
 
-/* The controller whose plans may have the channel as their source; "": no controller. */
-static int sim_adc_map(struct sim_adc *adc, const char *controller)
-{
-	adc->map[0] = (struct iio_map)IIO_MAP("voltage0", controller, "position");
-	return *controller ? iio_map_array_register(adc->iio, adc->map) : 0;
-}
-
-int sim_adc_add(struct sim_adc *adc, struct device *parent, const char *controller)
+int sim_adc_add(struct sim_adc *adc, struct device *parent)
 {
 	struct iio_dev *iio;
 	int ret;
@@ -284,16 +275,11 @@ int sim_adc_add(struct sim_adc *adc, struct device *parent, const char *controll
 					 &sim_adc_setup_ops);
 	if (ret)
 		goto out_remove_trigger;
-	ret = sim_adc_map(adc, controller);
-	if (ret)
-		goto out_cleanup_buffer;
 	ret = iio_device_register(iio);
 	if (ret)
-		goto out_unmap;
+		goto out_cleanup_buffer;
 	return 0;
 
-out_unmap:
-	iio_map_array_unregister(iio);
 out_cleanup_buffer:
 	iio_triggered_buffer_cleanup(iio);
 out_remove_trigger:
@@ -306,7 +292,6 @@ out_free_device:
 void sim_adc_remove(struct sim_adc *adc)
 {
 	iio_device_unregister(adc->iio);
-	iio_map_array_unregister(adc->iio);
 	iio_triggered_buffer_cleanup(adc->iio);
 	sim_trigger_remove(adc);
 	iio_device_free(adc->iio);

@@ -13,7 +13,6 @@
 
 #include <linux/hrtimer.h>
 #include <linux/iio/iio.h>
-#include <linux/iio/machine.h>
 #include <linux/mutex.h>
 #include <linux/spinlock.h>
 
@@ -50,7 +49,6 @@ struct sim_conversion {
  * @lock:	guards all but the writing end of the waveform; taken in hard
  *		interrupts
  * @iio:	what the IIO core sees
- * @map:	who may use its channel in the kernel; the last one is empty
  * @trigger:	fires @frequency times per second
  * @timer:	makes it fire
  * @frequency:	conversions per second
@@ -70,7 +68,6 @@ struct sim_conversion {
 struct sim_adc {
 	raw_spinlock_t lock;
 	struct iio_dev *iio;
-	struct iio_map map[2];
 	struct iio_trigger *trigger;
 	struct hrtimer timer;
 	unsigned int frequency;
@@ -89,7 +86,7 @@ struct sim_adc {
 };
 
 /* adc.c */
-int sim_adc_add(struct sim_adc *adc, struct device *parent, const char *controller);
+int sim_adc_add(struct sim_adc *adc, struct device *parent);
 void sim_adc_remove(struct sim_adc *adc);
 
 /* converter.c */

@@ -51,8 +51,7 @@
  *
  * The ADC is the IIO device INCISE_SIM_ADC: channel voltage0 (12 bits, mV =
  * (raw - 2048) * 5000 / 4096) and timestamp, trigger INCISE_SIM_TRIGGER
- * (current by default), sampling_frequency 1 to 20000 Hz at both. With the module's
- * parameter source=DEVICE voltage0 belongs to that controller, as its source.
+ * (current by default), sampling_frequency 1 to 20000 Hz at both.
  *
  *  adc/waveform write   __u16 raw codes 0 to 4095, appended to those that are
  *                       queued; may be taken in part, ENOSPC when 2^20 are

@@ -21,10 +21,6 @@ static unsigned int ring = 1U << 20;
 module_param(ring, uint, 0444);
 MODULE_PARM_DESC(ring, "Number of edges kept for a reader, up to 2^24");
 
-static char *source = "";
-module_param(source, charp, 0444);
-MODULE_PARM_DESC(source, "Controller whose plans read the ADC: incise-stepper.0");
-
 static struct sim sim_instance;
 static struct sim_adc sim_adc_instance;
 static struct platform_device *sim_device;
@@ -37,7 +33,7 @@ static int sim_probe(struct platform_device *device)
 	ret = sim_chip_add(sim, &device->dev);
 	if (ret)
 		return ret;
-	ret = sim_adc_add(&sim_adc_instance, &device->dev, source);
+	ret = sim_adc_add(&sim_adc_instance, &device->dev);
 	if (ret) {
 		sim_chip_remove(sim);
 		return ret;

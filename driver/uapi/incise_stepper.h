@@ -8,7 +8,8 @@
  *           needed: no system call.
  *   ioctl   what is set up while the motors stand.
  *   read    events, whole structs; poll shows when there is one. Each open file has a
- *           place of its own in the ring of events; a gap in seq shows what it missed.
+ *           place of its own in the ring of events; a gap in seq shows what it missed. A
+ *           thread of the controller (SCHED_FIFO 50) wakes readers: the status page is sooner.
  *
  * Lengths are microsteps ("steps"), times are nanoseconds of CLOCK_MONOTONIC. Reserved
  * fields are zero, else EINVAL. An ioctl that is not known here gives ENOTTY.
@@ -192,7 +193,7 @@ struct incise_stepper_motor_status {
  * @t_ns: of the last tick: when it was due, which is what it computed with
  * @age_ns: of its pose; at its largest without one
  * @pose_tick: number of the tick, from 1, at which the last pose was taken
- * @pose_seq: seq of the last pose taken; with a source, the number of the sample
+ * @pose_seq: seq of the last pose taken
  * @tube_seq: of the tube's
  * @poses: taken since the start, the tube's too
  * @refused: not taken since the start: older than the last one, too far away, or none
@@ -247,7 +248,7 @@ struct incise_stepper_plan_status {
 	__s32 command[3];
 	__s32 along[3];
 	__s32 target[3];
-	__u32 reserved0;
+	__u32 reserved0[2];
 	__u64 reserved[23];
 };
 
@@ -422,33 +423,20 @@ struct incise_stepper_sync {
 	__u64 reserved[2];
 };
 
-/* incise_stepper_plan.flags */
-#define INCISE_STEPPER_PLAN_SOURCE \
-	(1U << 0) /* poses come from the controller's own channel */
-
 /**
  * struct incise_stepper_plan - a plan for motors, 128 bytes
  * @motors: mask; the plan's first axis is the lowest of them. As many as the plan has axes
- * @flags: INCISE_STEPPER_PLAN_SOURCE or 0
+ * @flags: zero
  * @data: where the file of `incise compile` is in memory
  * @size: of it, bytes; 0: the plan of these motors goes, and the rest is 0
- * @origin: with a source: the sensor's position at 0; 2^-16 mm
- * @direction: with a source: the way of the sensor, unit; 2^-30
- * @scale: with a source: mm for one of its units; 2^-32
- * @quaternion: with a source: of the sensor; w first, 2^-30
- * @tool: with a source: INCISE_STEPPER_POSE_TOOL, what is held
- * @reserved0: zero
  * @reserved: zero
  *
  * A controller has one plan. The file is checked in full; after that, a tick takes a bounded time,
- * and no pose makes it overflow. With a source, of an encoder in the IIO subsystem
- * (incise_source.ko, which is to be loaded), poses are made in the kernel: the page's slot of the
- * first motor is set to mode POSE once, and its deadman is kept off by the source. Only
- * INCISE_STEPPER_POSE_FADE of the pose in the page counts then. A tick takes the newest sample;
- * position = origin + direction × scale × sample, samples held to ±2^30, scale within ±1 mm.
+ * and no pose makes it overflow.
  *
- * EBUSY: a motor of the plan, or of the one before, has power, or still comes to rest. EINVAL: the
- * file or a field is not good; EOPNOTSUPP: its version is not known here, or there is no source.
+ * EBUSY: a motor of the plan, or of the one before, has power, or still comes to rest, or another
+ * thread loads a plan. EINVAL: the
+ * file or a field is not good; EOPNOTSUPP: its version is not known here.
  * ERANGE: a motor's deadman_ns is not longer than the plan's pose age, its fade and the way of its
  * largest force at its slew, a motor's tick_ns is longer than the plan's, or a tick of the plan
  * takes more than a quarter of its tick_ns on this machine, in more than one of ten. EFBIG: more
@@ -462,16 +450,10 @@ struct incise_stepper_plan {
 	__u32 flags;
 	__u64 data;
 	__u64 size;
-	__s32 origin[3];
-	__s32 direction[3];
-	__s64 scale;
-	__s32 quaternion[4];
-	__u32 tool;
-	__u32 reserved0;
-	__u64 reserved[6];
+	__u64 reserved[13];
 };
 
-/* Watchers may call the ones that only read; the others need the owner (EPERM). */
+/* Watchers may call the ones that only read, and DISABLE; the others need the owner (EPERM). */
 #define INCISE_STEPPER_IOC 0xE8
 #define INCISE_STEPPER_GET_INFO \
 	_IOR(INCISE_STEPPER_IOC, 0, struct incise_stepper_controller)
@@ -480,12 +462,16 @@ struct incise_stepper_plan {
 #define INCISE_STEPPER_SET_CONFIG \
 	_IOW(INCISE_STEPPER_IOC, 2, struct incise_stepper_config)
 /*
- * A mask of motors, not 0: all get power or no motor does, and motors that had power keep it.
- * EPERM: a fault is latched; EBUSY: an input forbids it, e-stop say, or it is still coming to rest;
+ * A mask of motors, not 0: all get power or no motor does, and motors that had power keep it. The
+ * timers of those that get it, and of their plan, fire on the processor that this call runs on.
+ * ENOTRECOVERABLE: a fault is latched, until CLEAR; EBUSY: an input forbids it, e-stop say, or it is still coming to rest;
  * ERANGE: it stands outside of its position limits; ESHUTDOWN: the machine goes down.
  */
 #define INCISE_STEPPER_ENABLE _IOW(INCISE_STEPPER_IOC, 3, __u32)
-/* Brings them to rest within the limits, then takes power away. Returns at once. */
+/*
+ * Brings them to rest within the limits, then takes power away. Returns at once. A watcher may
+ * too: whoever may look may stop.
+ */
 #define INCISE_STEPPER_DISABLE _IOW(INCISE_STEPPER_IOC, 4, __u32)
 /* Forgets the latched faults of motors at rest. EBUSY: the cause is still there. */
 #define INCISE_STEPPER_CLEAR _IOW(INCISE_STEPPER_IOC, 5, __u32)

@@ -218,7 +218,7 @@ static void odd_ioctls(int rounds)
 		refused += ret && ret != -ENOTTY;
 		strange |= ret && ret != -ENOTTY && ret != -EINVAL && ret != -EFAULT &&
 			   ret != -ERANGE && ret != -EBUSY && ret != -EPERM &&
-			   ret != -EOPNOTSUPP;
+			   ret != -EOPNOTSUPP && ret != -ENOTRECOVERABLE;
 	}
 	kill(child, SIGKILL);
 	waitpid(child, NULL, 0);

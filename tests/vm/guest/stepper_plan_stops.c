@@ -155,28 +155,18 @@ static void refused_files(void)
 	check(plan_look(&bench).state == INCISE_STEPPER_PLAN_EMPTY, "there is no plan");
 }
 
-static void refused_source(void)
+static void refused_flags(void)
 {
 	struct incise_stepper_plan plan = {
 		.motors = ALL,
-		.flags = INCISE_STEPPER_PLAN_SOURCE,
+		.flags = 1,
 		.data = (uintptr_t)head,
 		.size = size,
-		.direction = {0, 0, 1 << 30},
-		.scale = 1 << 20,
-		.quaternion = {1 << 30},
-		.tool = INCISE_TOOL_BLADE,
 	};
 
 	configure();
-	check(ioctl(bench.fd, INCISE_STEPPER_LOAD_PLAN, &plan) && errno == EOPNOTSUPP,
-	      "a source that is not there: EOPNOTSUPP");
-	plan.direction[0] = 1 << 30;
 	check(ioctl(bench.fd, INCISE_STEPPER_LOAD_PLAN, &plan) && errno == EINVAL,
-	      "a direction that is none: EINVAL");
-	plan.flags = 0;
-	check(ioctl(bench.fd, INCISE_STEPPER_LOAD_PLAN, &plan) && errno == EINVAL,
-	      "a source's fields without one: EINVAL");
+	      "a flag that is none: EINVAL");
 }
 
 static void busy(void)
@@ -426,7 +416,7 @@ static void goes(void)
 static void all(void)
 {
 	refused_files();
-	refused_source();
+	refused_flags();
 	busy();
 	odd_poses();
 	asked();

@@ -271,7 +271,7 @@ static void try_deadman(struct bench *bench)
 	       "deadman: it stops with that fault");
 	printf("# %lld us after the last set-point\n",
 	       (long long)(now_ns() - begin) / 1000);
-	report(command(bench, INCISE_STEPPER_ENABLE, 1) == -EPERM,
+	report(command(bench, INCISE_STEPPER_ENABLE, 1) == -ENOTRECOVERABLE,
 	       "no power while a fault is latched");
 	report(command(bench, INCISE_STEPPER_CLEAR, 1) == 0 &&
 		       look(bench).state == INCISE_STEPPER_STATE_DISABLED,
@@ -365,6 +365,7 @@ static void try_abi(struct bench *bench, const char *path)
 	       "a reserved field that is not zero");
 	report(ioctl(watcher, INCISE_STEPPER_ENABLE, &mask) < 0 && errno == EPERM,
 	       "a watcher cannot enable");
+	report(!ioctl(watcher, INCISE_STEPPER_DISABLE, &mask), "it can stop a motor");
 	report(mmap(NULL, PAGE, PROT_READ, MAP_SHARED, watcher, 0) == MAP_FAILED &&
 		       errno == EPERM,
 	       "nor see the set-points");

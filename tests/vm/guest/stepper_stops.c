@@ -152,9 +152,11 @@ static void inputs_stop(const char *name, unsigned int line, bool low, uint32_t 
 					 bench_line(0, BENCH_STEP), line, !low);
 		right = right && run_into(any_velocity(&config)) && agrees(fault);
 		refused &= bench_command(&bench, INCISE_STEPPER_CLEAR, 1) == -EBUSY &&
-			   bench_command(&bench, INCISE_STEPPER_ENABLE, 1) == -EPERM;
+			   bench_command(&bench, INCISE_STEPPER_ENABLE, 1) ==
+				   -ENOTRECOVERABLE;
 		simulator_write("inputs", "%u %d", line, low);
-		refused &= bench_command(&bench, INCISE_STEPPER_ENABLE, 1) == -EPERM;
+		refused &= bench_command(&bench, INCISE_STEPPER_ENABLE, 1) ==
+			   -ENOTRECOVERABLE;
 	}
 	check(right, "%s stops the motor at once, %d times", name, rounds);
 	check(refused, "%s: no power until the cause is gone and the fault is cleared",
