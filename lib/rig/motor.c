@@ -413,7 +413,7 @@ static int motor_homing(struct incise_stepper *stepper,
 		return -EOPNOTSUPP;
 	/* Rest beside the switch, not on it. */
 	if (homing->home_at == INCISE_STEPPER_LINE_LIMIT_MIN && homing->home_mm == 0)
-		homing->home_mm = -fmin(CLEARANCE_MM, motor->actuator.travel_mm / 4);
+		homing->home_mm = -fmin(BESIDE_LIMIT_MM, motor->actuator.travel_mm / 4);
 	return 0;
 }
 

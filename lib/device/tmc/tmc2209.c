@@ -14,8 +14,8 @@
 #include <string.h>
 #include <unistd.h>
 #include "../../base/monotonic.h"
-#include "../backends.h"
-#include "../tty.h"
+#include "../../rig/backends.h"
+#include "../../rig/tty.h"
 #include "tmc_driver.h"
 
 #define IFCNT 0x02

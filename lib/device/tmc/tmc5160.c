@@ -14,7 +14,7 @@
 #include <string.h>
 #include <sys/ioctl.h>
 #include <linux/spi/spidev.h>
-#include "../backends.h"
+#include "../../rig/backends.h"
 #include "tmc_driver.h"
 
 #define GLOBAL_SCALER 0x0b

@@ -10,7 +10,7 @@
 #include <string.h>
 #include <unistd.h>
 #include "../../base/monotonic.h"
-#include "../thread.h"
+#include "../../rig/thread.h"
 #include "tmc_driver.h"
 
 #define TSTEP 0x12

@@ -5,7 +5,7 @@
  */
 #include <stddef.h>
 #include <string.h>
-#include "../actuator.h"
+#include "../../rig/actuator.h"
 
 #define SETTINGS_OF struct incise_actuator
 

@@ -5,7 +5,7 @@
  */
 #include "../unit.h"
 #include <time.h>
-#include "../../../lib/device/backends.h"
+#include "../../../lib/rig/backends.h"
 #include "../../../lib/device/tmc/tmc_driver.h"
 #include "../message.h"
 #include "chip.h"

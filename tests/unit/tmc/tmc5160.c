@@ -8,7 +8,7 @@
 #include <stdatomic.h>
 #include <string.h>
 #include <sys/ioctl.h>
-#include "../../../lib/device/backends.h"
+#include "../../../lib/rig/backends.h"
 #include "../../../lib/device/tmc/tmc_driver.h"
 #include "../message.h"
 
