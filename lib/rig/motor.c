@@ -15,7 +15,7 @@
 #define UNREAD_MAX 100	    /* failed reads until -EIO */
 #define POLL_NS INCISE_NS_PER_S / 1000
 #define DISABLE_NS (2 * INCISE_NS_PER_S) /* more than a drive is given to stop */
-#define CLEARANCE_MM 0.5		 /* from a limit that is the home, too */
+#define BESIDE_LIMIT_MM 0.5		 /* home, where that is a limit */
 #define LATE_MAX 20			 /* edges in a row */
 #define TICK_MOST_S 0.002		 /* between writes of a status with power */
 /* Homing: the second approach, and the way off the input before it. */
