@@ -208,6 +208,7 @@ struct stepper {
 /* stepper_motor.c */
 void stepper_motor_init(struct stepper_motor *motor);
 void stepper_motor_start(struct stepper_motor *motor); /* motor->lock held */
+void stepper_motor_compute(struct stepper_motor *motor);
 void stepper_motor_end(struct stepper_motor *motor);
 void stepper_motor_take(struct stepper_motor *motor, s64 now, s64 due);
 void stepper_motor_want(struct stepper_motor *motor, s64 target);

@@ -9,8 +9,8 @@
  *                              fires                     line has changed
  *
  * Then it fires SHOTS times more, each PULSE_NS behind the write of the one before, as edges
- * of pulses do: with C the median of what a firing costs then, from when it is due to its write,
- * and a 32nd more, a step takes
+ * of pulses do, and computes when the next one is due: with C the median of what a firing costs then,
+ * from when it is due to its write, and a 16th more, a step takes
  *
  *   high + low + 2C        with two firings
  *   high + low + C + E     with one that waits for the end of the pulse
@@ -52,7 +52,7 @@
 #define SHOT_NS 100000
 #define ROUNDS 3
 #define QUIET_NS 20000
-#define PULSE_NS 2000
+#define PULSE_NS 1000
 
 struct stepper_trial {
 	struct hrtimer timer;
@@ -104,6 +104,7 @@ static enum hrtimer_restart stepper_ability_fire(struct hrtimer *timer)
 		stepper_ability_shot(trial, &motor->lines);
 		written = ktime_get_ns();
 		trial->close_ns[close] = min(written - due, (s64)U32_MAX);
+		stepper_motor_compute(motor);
 		/* The side that waits for the last reads them. */
 		smp_store_release(&trial->n, trial->n + 1);
 		if (close == SHOTS - 1)
@@ -191,7 +192,7 @@ int stepper_ability_measure(struct stepper *stepper)
 		info->edge_ns = trial->edge_ns[SHOTS / 2];
 		pulse = (u64)info->edge_ns + trial->late_ns[SHOTS / 2];
 		tick = (u64)trial->tick_ns[SHOTS / 2] + 2ULL * trial->late_ns[0];
-		close = (u64)trial->close_ns[SHOTS / 2] * 33 / 32;
+		close = (u64)trial->close_ns[SHOTS / 2] * 17 / 16;
 	}
 	stepper_latency_release(stepper);
 	kfree(trial);
