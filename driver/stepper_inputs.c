@@ -5,7 +5,8 @@
  * e-stop just before each step as well, so that a lost interrupt costs one step at most.
  *
  *   e-stop, driver   a motor with power halts
- *   limit            it halts if it moves towards it; away from there it may move
+ *   limit            it halts if it has a way to go towards it; away from there it may move,
+ *                    and the step that arrives at it may be the last
  *   home             the position at its leading edge is kept
  *
  * All under motor->lock. A line that cannot be read counts as active, except home, which
@@ -20,8 +21,11 @@ static bool stepper_inputs_towards(const struct stepper_motor *motor,
 {
 	int direction = limit == STEPPER_LIMIT_MAX ? 1 : -1;
 
-	return motor->powered && motor->slot.dir == direction &&
-	       (motor->given < motor->slot.n || !incise_profile_resting(&motor->profile));
+	if (!motor->powered)
+		return false;
+	if (motor->given < motor->slot.n)
+		return motor->slot.dir == direction;
+	return incise_profile_ahead(&motor->profile) == direction;
 }
 
 static void stepper_inputs_act(struct stepper_motor *motor, enum stepper_input input,

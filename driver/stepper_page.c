@@ -124,7 +124,8 @@ static bool stepper_page_within(__u64 value, __u64 min, __u64 max)
 int stepper_page_config(const struct incise_stepper_config *config,
 			const struct incise_stepper_controller *info)
 {
-	const __u32 flags = INCISE_STEPPER_CONFIG_INVERT | INCISE_STEPPER_CONFIG_RETRACT;
+	const __u32 flags = INCISE_STEPPER_CONFIG_INVERT | INCISE_STEPPER_CONFIG_RETRACT |
+			    INCISE_STEPPER_CONFIG_VOLATILE_HOME;
 	const __s64 most = INCISE_PROFILE_POSITION_MAX;
 	unsigned int i;
 

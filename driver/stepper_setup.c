@@ -250,6 +250,7 @@ void stepper_setup_fault(struct stepper_motor *motor, u32 fault)
 
 	raw_spin_lock_irqsave(&motor->lock, flags);
 	stepper_stop_fault(motor, fault, ktime_get_ns());
+	stepper_status_publish(motor, ktime_get_ns());
 	raw_spin_unlock_irqrestore(&motor->lock, flags);
 }
 

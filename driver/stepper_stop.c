@@ -21,6 +21,10 @@
 	(INCISE_STEPPER_FAULT_LIMIT_MIN | INCISE_STEPPER_FAULT_LIMIT_MAX | \
 	 INCISE_STEPPER_FAULT_ESTOP | INCISE_STEPPER_FAULT_ALARM |         \
 	 INCISE_STEPPER_FAULT_LATE | INCISE_STEPPER_FAULT_LINE)
+/* Without power a rotor forgets its microstep, and may be turned by hand. */
+#define UNHOME                                                     \
+	(INCISE_STEPPER_FAULT_ESTOP | INCISE_STEPPER_FAULT_ALARM | \
+	 INCISE_STEPPER_FAULT_SUSPEND)
 #define RETRACT                                                      \
 	(INCISE_STEPPER_FAULT_DEADMAN | INCISE_STEPPER_FAULT_OWNER | \
 	 INCISE_STEPPER_FAULT_PLAN)
@@ -30,6 +34,8 @@ void stepper_stop_off(struct stepper_motor *motor, s64 now)
 {
 	motor->powered = false;
 	motor->disabling = false;
+	if (motor->config.flags & INCISE_STEPPER_CONFIG_VOLATILE_HOME)
+		motor->flags &= ~INCISE_STEPPER_FLAG_HOMED;
 	compat_gpiod_set_value(motor->lines.enable, 0);
 	trace_incise_stepper_edge(motor->stepper->id, motor->index, STEPPER_ENABLE, 0,
 				  now, now);
@@ -79,6 +85,8 @@ static void stepper_stop_gently(struct stepper_motor *motor, u32 fault, s64 now)
 /* Latch a fault of a motor that has power, and stop it as the fault asks for. */
 void stepper_stop_fault(struct stepper_motor *motor, u32 fault, s64 now)
 {
+	if (fault & UNHOME)
+		motor->flags &= ~INCISE_STEPPER_FLAG_HOMED;
 	if (!motor->powered)
 		return;
 	/* It was disabled before the file was closed. */

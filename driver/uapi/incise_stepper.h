@@ -121,7 +121,10 @@ struct incise_stepper_setpoint {
 };
 
 /* incise_stepper_motor_status.flags */
-/* Position is the machine's; a stop at once while moving takes it away. */
+/*
+ * Position is the machine's. A stop at once while moving takes it away, and so do, moving or not,
+ * e-stop, the power stage's fault and suspend, and with VOLATILE_HOME every end of power.
+ */
 #define INCISE_STEPPER_FLAG_HOMED (1U << 0)
 #define INCISE_STEPPER_FLAG_HELD (1U << 1)	/* the last set-point was clamped */
 #define INCISE_STEPPER_FLAG_HOME_SEEN (1U << 2) /* home_position is of this enable */
@@ -320,6 +323,8 @@ struct incise_stepper_controller {
 #define INCISE_STEPPER_CONFIG_INVERT (1U << 0) /* a step up sets dir inactive */
 /* On DEADMAN and OWNER, a homed motor goes to safe_position before it is disabled. */
 #define INCISE_STEPPER_CONFIG_RETRACT (1U << 1)
+/* Without power the motor does not keep its place: DISABLE takes HOMED away. */
+#define INCISE_STEPPER_CONFIG_VOLATILE_HOME (1U << 2)
 
 /**
  * struct incise_stepper_config - a motor's limits and times, 128 bytes

@@ -12,6 +12,7 @@
 #include "page.h"
 
 #define LEAST_PULSE_NS 5000 /* default: enough for most power stages */
+#define CLEAR_MM 0.5	    /* default: from the limit switch to 0 */
 #define UNREAD_MAX 100	    /* failed reads until -EIO */
 #define POLL_NS INCISE_NS_PER_S / 1000
 #define DISABLE_NS (2 * INCISE_NS_PER_S) /* more than a drive is given to stop */
@@ -338,6 +339,9 @@ static int motor_homing(struct incise_stepper *stepper,
 		homing->home_at = INCISE_STEPPER_LINE_LIMIT_MIN;
 	else
 		return -EOPNOTSUPP;
+	/* At rest the nut is clear of a switch that stops it. */
+	if (homing->home_at == INCISE_STEPPER_LINE_LIMIT_MIN && !motor->actuator.has_home)
+		homing->home_mm = -fmin(CLEAR_MM, motor->actuator.travel_mm / 4);
 	return 0;
 }
 
@@ -391,7 +395,9 @@ void incise_motor_config(const struct incise_actuator *actuator, unsigned int in
 	*config = (struct incise_stepper_config){
 		.motor = index,
 		.flags = (actuator->invert ? INCISE_STEPPER_CONFIG_INVERT : 0) |
-			 (actuator->retract ? INCISE_STEPPER_CONFIG_RETRACT : 0),
+			 (actuator->retract ? INCISE_STEPPER_CONFIG_RETRACT : 0) |
+			 (actuator->volatile_home ? INCISE_STEPPER_CONFIG_VOLATILE_HOME
+						  : 0),
 		.tick_ns = limits.tick_ns,
 		.velocity = limits.velocity,
 		.acceleration = limits.acceleration,

@@ -22,6 +22,8 @@ static void power_off(struct incise_pulser *p, int64_t now)
 	if (p->ops->write(p->world, INCISE_PULSER_ENABLE, false) < 0)
 		p->motion.status.faults |= INCISE_STEPPER_FAULT_LINE;
 	incise_motion_power_off(&p->motion);
+	if (p->motion.config.flags & INCISE_STEPPER_CONFIG_VOLATILE_HOME)
+		p->motion.status.flags &= ~INCISE_STEPPER_FLAG_HOMED;
 	incise_motion_publish(&p->motion, now);
 }
 
@@ -35,6 +37,9 @@ static void halt(struct incise_pulser *p, int64_t now)
 
 static void fault_at(struct incise_pulser *p, uint32_t fault, int64_t now)
 {
+	/* The supply may be off: a rotor without it forgets its microstep. */
+	if (fault & (INCISE_STEPPER_FAULT_ESTOP | INCISE_STEPPER_FAULT_ALARM))
+		p->motion.status.flags &= ~INCISE_STEPPER_FLAG_HOMED;
 	if (incise_motion_fault(&p->motion, fault))
 		halt(p, now);
 }
@@ -61,7 +66,8 @@ static int64_t write_line(struct incise_pulser *p, enum incise_pulser_output out
 
 static void look_pulser(struct incise_pulser *p, int64_t now)
 {
-	bool moves = p->motion.powered && (p->given < p->steps.n || !p->motion.resting);
+	int ahead = p->given < p->steps.n ? p->steps.dir
+					  : incise_profile_ahead(&p->motion.profile);
 	int inputs = p->ops->inputs(p->world);
 	uint32_t rising;
 
@@ -79,10 +85,12 @@ static void look_pulser(struct incise_pulser *p, int64_t now)
 		fault_at(p, INCISE_STEPPER_FAULT_ESTOP, now);
 	if (inputs & INCISE_STEPPER_LINE_ALARM)
 		fault_at(p, INCISE_STEPPER_FAULT_ALARM, now);
-	/* Motion away from a limit is allowed. */
-	if (moves && inputs & INCISE_STEPPER_LINE_LIMIT_MIN && p->steps.dir < 0)
+	if (!p->motion.powered)
+		return;
+	/* Motion away from a limit is allowed, and so is a last step that ends at it. */
+	if (inputs & INCISE_STEPPER_LINE_LIMIT_MIN && ahead < 0)
 		fault_at(p, INCISE_STEPPER_FAULT_LIMIT_MIN, now);
-	if (moves && inputs & INCISE_STEPPER_LINE_LIMIT_MAX && p->steps.dir > 0)
+	if (inputs & INCISE_STEPPER_LINE_LIMIT_MAX && ahead > 0)
 		fault_at(p, INCISE_STEPPER_FAULT_LIMIT_MAX, now);
 }
 

@@ -243,6 +243,17 @@ bool incise_profile_resting(const struct incise_profile *profile)
 	return profile->still >= profile->average;
 }
 
+int incise_profile_ahead(const struct incise_profile *profile)
+{
+	int64_t moved = profile->moved, left = profile->ramp.target - profile->output;
+
+	if (incise_profile_resting(profile))
+		return 0;
+	if (!profile->ramp.top || (left < 0 && moved > 0) || (left > 0 && moved < 0))
+		left = moved;
+	return left > 0 ? 1 : left < 0 ? -1 : 0;
+}
+
 int32_t incise_profile_position(const struct incise_profile *profile)
 {
 	return profile->whole;

@@ -167,6 +167,12 @@ uint32_t incise_profile_step_ns(const struct incise_profile_slot *slot, int32_t 
  */
 bool incise_profile_resting(const struct incise_profile *profile);
 
+/*
+ * The direction of the way that is left after the last tick's slot: 1, -1; 0 where the steps that
+ * were given out end it. A motion that brakes, or has passed its target, goes on as it went.
+ */
+int incise_profile_ahead(const struct incise_profile *profile);
+
 /* The sum of all steps of the ticks so far, from the position that init or halt gave. */
 int32_t incise_profile_position(const struct incise_profile *profile);
 

@@ -233,11 +233,13 @@ struct incise_actuator {
 	double jerk_mm_s3; /**< 0: no limit */
 	double deadman_s;
 	bool retract; /**< after the deadman, move to rest_mm before power goes off */
+	bool volatile_home; /**< without power the nut does not stay: home again */
 	uint32_t tick_ns;
 	uint32_t high_ns, low_ns; /**< 0: not given: the shortest of the machine */
 	uint32_t setup_ns, hold_ns;
 	uint64_t enable_ns;
 	double home_mm_s, home_mm;
+	bool has_home;		 /**< the file has home_mm */
 	double origin_mm;	 /**< see struct incise_stepper_info */
 	double rest_mm, late_s;	 /**< see struct incise_stepper_info */
 	double direction[3];	 /**< of its force, unit; 0 0 0: not given */
