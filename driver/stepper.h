@@ -104,7 +104,8 @@ struct stepper_motor {
 
 	struct incise_stepper_config config;
 	s64 interval_ns; /* of steps at config.velocity, rounded up */
-	s64 lag_ns;	 /* lateness caught up, not put off */
+	s64 lag_ns;	 /* lateness caught up, not put off … */
+	s64 catch_ns;	 /* … by at most so much in a step */
 	u32 state;
 	u32 faults;
 	u32 inputs;

@@ -108,6 +108,8 @@ static int stepper_defaults_of(struct stepper_defaults *from,
 		c->flags |= INCISE_STEPPER_CONFIG_INVERT;
 	if (fwnode_property_present(from->node, "incise,retract"))
 		c->flags |= INCISE_STEPPER_CONFIG_RETRACT;
+	if (fwnode_property_present(from->node, "incise,volatile-home"))
+		c->flags |= INCISE_STEPPER_CONFIG_VOLATILE_HOME;
 	stepper_defaults_former(from, "incise,deadman-ns", "incise,deadman-us");
 	stepper_defaults_former(from, "incise,enable-ns", "incise,enable-us");
 	return from->error;

@@ -5,7 +5,8 @@
  * e-stop just before each step as well, so that a lost interrupt costs one step at most.
  *
  *   e-stop, driver   a motor with power halts
- *   limit            it halts if it moves towards it; away from there it may move
+ *   limit            it halts if it has a way to go towards it; away from there it may move,
+ *                    and the step that arrives at it may be the last
  *   home             the position at its leading edge is kept
  *
  * All under motor->lock. A line that cannot be read counts as active, except home, which

@@ -13,9 +13,9 @@
  * Due times come from the profile's time line, never from now: lateness does not
  * add up. But high, low, set-up, hold and the interval at the largest velocity
  * count from the actual times of edges, taken after the write, when the line has
- * changed for sure. So a late edge shortens nothing. The usual lateness of a timer
- * (lag_ns) is caught up, at most 1/7 faster than the profile asks (CATCH_UP); where it is
- * more, the time line is put off. There is never a burst, and no acceleration that the
+ * changed for sure. So a late edge shortens nothing but the interval, by what a firing costs or
+ * an eighth of it (catch_ns): the usual lateness of a timer (lag_ns) is caught up, or a motor would
+ * never reach its largest velocity; where it is more, the time line is put off. There is never a burst, and no acceleration that the
  * profile does not know of.
  */
 #include <linux/delay.h>
@@ -81,7 +81,8 @@ static enum stepper_next stepper_motor_move(const struct stepper_motor *motor, s
 		return STEPPER_NEXT_DIR;
 	}
 	gap = *want - motor->lead_due_ns;
-	gap = max(gap - (gap >> CATCH_UP), motor->interval_ns);
+	gap = max(gap - max(gap >> CATCH_UP, motor->catch_ns),
+		  motor->interval_ns - motor->catch_ns);
 	*due = max3(*want, motor->lead_ns + gap, motor->trail_ns + config->low_ns);
 	*due = max3(*due, motor->dir_ns + config->setup_ns, motor->powered_ns);
 	return STEPPER_NEXT_LEAD;

@@ -137,7 +137,7 @@ int stepper_page_config(const struct incise_stepper_config *config,
 			const struct incise_stepper_controller *info)
 {
 	const __u32 flags = INCISE_STEPPER_CONFIG_INVERT | INCISE_STEPPER_CONFIG_RETRACT |
-			    INCISE_STEPPER_CONFIG_VOLATILE |
+			    INCISE_STEPPER_CONFIG_VOLATILE_HOME |
 			    INCISE_STEPPER_CONFIG_NO_WAIT;
 	const __s64 most = INCISE_PROFILE_POSITION_MAX;
 	unsigned int i;

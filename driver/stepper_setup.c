@@ -192,8 +192,10 @@ int stepper_setup_config(struct stepper_motor *motor,
 		motor->interval_ns =
 			div_u64(NSEC_PER_SEC + config->velocity - 1, config->velocity);
 		/* Timers are late by so much anyway, and an eighth of a step is not felt. */
-		motor->lag_ns = max(motor->interval_ns >> 3,
-				    (s64)motor->stepper->info.lateness_ns);
+		motor->catch_ns = max(motor->interval_ns >> 3,
+				      (s64)motor->stepper->info.step_ns >> 1);
+		motor->lag_ns =
+			max(motor->catch_ns, (s64)motor->stepper->info.lateness_ns);
 		incise_profile_halt(&motor->profile, motor->position);
 		stepper_status_publish(motor, ktime_get_ns());
 	}
@@ -250,6 +252,7 @@ void stepper_setup_fault(struct stepper_motor *motor, u32 fault)
 
 	raw_spin_lock_irqsave(&motor->lock, flags);
 	stepper_stop_fault(motor, fault, ktime_get_ns());
+	stepper_status_publish(motor, ktime_get_ns());
 	raw_spin_unlock_irqrestore(&motor->lock, flags);
 }
 

@@ -37,7 +37,7 @@ void stepper_stop_off(struct stepper_motor *motor, s64 now)
 {
 	motor->powered = false;
 	motor->disabling = false;
-	if (motor->config.flags & INCISE_STEPPER_CONFIG_VOLATILE)
+	if (motor->config.flags & INCISE_STEPPER_CONFIG_VOLATILE_HOME)
 		motor->flags &= ~INCISE_STEPPER_FLAG_HOMED;
 	compat_gpiod_set_value(motor->lines.enable, 0);
 	trace_incise_stepper_edge(motor->stepper->id, motor->index, STEPPER_ENABLE, 0,

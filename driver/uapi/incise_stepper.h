@@ -124,7 +124,7 @@ struct incise_stepper_setpoint {
 /* incise_stepper_motor_status.flags */
 /*
  * Position is the machine's. A stop at once while moving takes it away, and so do e-stop, ALARM, suspend and,
- * with INCISE_STEPPER_CONFIG_VOLATILE, each power off.
+ * with INCISE_STEPPER_CONFIG_VOLATILE_HOME, each power off.
  */
 #define INCISE_STEPPER_FLAG_HOMED (1U << 0)
 #define INCISE_STEPPER_FLAG_HELD (1U << 1)	/* the last set-point was clamped */
@@ -329,7 +329,7 @@ struct incise_stepper_controller {
 /* On DEADMAN and OWNER, a homed motor goes to safe_position before it is disabled. */
 #define INCISE_STEPPER_CONFIG_RETRACT (1U << 1)
 /* Without power the machine moves: it is not homed any more. */
-#define INCISE_STEPPER_CONFIG_VOLATILE (1U << 2)
+#define INCISE_STEPPER_CONFIG_VOLATILE_HOME (1U << 2)
 /* The timer ends each pulse; else it waits for the end of one of at most INCISE_STEPPER_WAIT_MAX_NS. */
 #define INCISE_STEPPER_CONFIG_NO_WAIT (1U << 3)
 #define INCISE_STEPPER_WAIT_MAX_NS 2000

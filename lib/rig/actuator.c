@@ -39,7 +39,7 @@ const struct incise_setting incise_actuator_settings[] = {
 		      "after the deadman, move to rest_mm before power goes off, if "
 		      "the position is known"),
 	SETTING_TRUTH(volatile_home, volatile_home, "false",
-		      "without power the nut can move: home again after each power off"),
+		      "without power the nut does not keep its place: home again"),
 	SETTING_NUMBER(tick_us, tick_ns, "µs", 50, 2000, "250",
 		       "period in which the driver reads targets", .scale = US),
 	SETTING_NUMBER(high_us, high_ns, "µs", 0.5, 1000, "(5 or more)",
@@ -54,7 +54,8 @@ const struct incise_setting incise_actuator_settings[] = {
 		       "from power on to the first step", .scale = MS),
 	SETTING_NUMBER(home_mm_s, home_mm_s, "mm/s", 0.001, 10000,
 		       "(2, or velocity_mm_s)", "speed of homing; at most velocity_mm_s"),
-	SETTING_NUMBER(home_mm, home_mm, "mm", -1000, 1000, "0",
+	SETTING_NUMBER(home_mm, home_mm, "mm", -1000, 1000,
+		       "(0; -0.5 with the limit switch at 0 as home)",
 		       "position of the edge of the home input, from a quarter of the "
 		       "travel below 0 to its end; where the lower limit is the home, 0 "
 		       "stands for -0.5, so that the motor does not rest on it"),
@@ -154,6 +155,7 @@ int incise_actuator_read(struct incise_actuator *actuator, const config_setting_
 	if (rc)
 		return rc;
 	actuator->has_lines = config_setting_get_member(group, "lines");
+	actuator->has_home = config_setting_get_member(group, "home_mm");
 	if (!actuator->home_mm_s)
 		actuator->home_mm_s = fmin(2, actuator->velocity_mm_s);
 	if (!actuator->can.following_mm)

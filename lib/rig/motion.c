@@ -58,7 +58,7 @@ int incise_motion_power_on(struct incise_motion *m, int64_t now_ns)
 void incise_motion_power_off(struct incise_motion *m)
 {
 	m->powered = m->ending = false;
-	if (m->config.flags & INCISE_STEPPER_CONFIG_VOLATILE)
+	if (m->config.flags & INCISE_STEPPER_CONFIG_VOLATILE_HOME)
 		m->status.flags &= ~INCISE_STEPPER_FLAG_HOMED;
 	m->status.state = m->status.faults ? INCISE_STEPPER_STATE_FAULT
 					   : INCISE_STEPPER_STATE_DISABLED;

@@ -412,7 +412,7 @@ static int motor_homing(struct incise_stepper *stepper,
 	else
 		return -EOPNOTSUPP;
 	/* Rest beside the switch, not on it. */
-	if (homing->home_at == INCISE_STEPPER_LINE_LIMIT_MIN && homing->home_mm == 0)
+	if (homing->home_at == INCISE_STEPPER_LINE_LIMIT_MIN && !motor->actuator.has_home)
 		homing->home_mm = -fmin(BESIDE_LIMIT_MM, motor->actuator.travel_mm / 4);
 	return 0;
 }
@@ -502,7 +502,8 @@ void incise_motor_config(const struct incise_actuator *actuator, unsigned int in
 		.motor = index,
 		.flags = (actuator->invert ? INCISE_STEPPER_CONFIG_INVERT : 0) |
 			 (actuator->retract ? INCISE_STEPPER_CONFIG_RETRACT : 0) |
-			 (actuator->volatile_home ? INCISE_STEPPER_CONFIG_VOLATILE : 0),
+			 (actuator->volatile_home ? INCISE_STEPPER_CONFIG_VOLATILE_HOME
+						  : 0),
 		.tick_ns = limits.tick_ns,
 		.velocity = limits.velocity,
 		.acceleration = limits.acceleration,

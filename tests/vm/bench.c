@@ -217,6 +217,10 @@ int bench_configure(struct bench *bench, const struct incise_stepper_config *con
 	struct incise_stepper_origin origin = {
 		.motor = m, .homed = 1, .position = position};
 	const bool timed = !strcmp(getenv("INCISE_VM_PROFILE") ?: "", "deterministic");
+	/* An eighth of a step, or what a firing costs. */
+	const int64_t eighth_ns = INT64_C(125000000) / config->velocity + 1;
+	const int64_t firing_ns = bench->info.step_ns / 2;
+	const int64_t catch_ns = eighth_ns > firing_ns ? eighth_ns : firing_ns;
 	struct edge_log_motor motor = {
 		.step = bench_line(m, BENCH_STEP),
 		.dir = bench_line(m, BENCH_DIR),
@@ -229,12 +233,12 @@ int bench_configure(struct bench *bench, const struct incise_stepper_config *con
 		.hold_ns = config->hold_ns,
 		.enable_ns = config->enable_ns,
 		.velocity = config->velocity,
+		.catch_ns = catch_ns,
 		.acceleration = config->acceleration,
 		.tick_ns = config->tick_ns,
-		.lateness_ns = timed ? INT64_C(125000000) / config->velocity +
-					       config->setup_ns + config->hold_ns +
-					       LATE_NS
-				     : -1,
+		.lateness_ns =
+			timed ? catch_ns + config->setup_ns + config->hold_ns + LATE_NS
+			      : -1,
 		.position_min = config->position_min,
 		.position_max = config->position_max,
 		.stop = {{true, bench_line(m, BENCH_MIN), false, -1, 0},

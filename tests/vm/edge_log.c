@@ -244,8 +244,8 @@ static void edge_log_lead(struct edge_log *log)
 	else
 		edge_log_at_least(log, EDGE_LOG_ENABLE, log->powered_ns,
 				  motor->enable_ns);
-	/* A step less than 1e9/v after the last one, whatever its direction. */
-	if ((log->t_ns - log->lead_ns) * motor->velocity < 1e9)
+	/* A step less than 1e9/v, less what may be caught up, after the last one, whatever its direction. */
+	if ((log->t_ns - log->lead_ns + motor->catch_ns) * motor->velocity < 1e9)
 		edge_log_fault(log, EDGE_LOG_VELOCITY,
 			       "%lld ns after a step at %.0f steps/s",
 			       (long long)(log->t_ns - log->lead_ns), motor->velocity);

@@ -51,6 +51,7 @@ struct edge_log_motor {
 	double velocity;     /* steps/s */
 	double acceleration; /* steps/s^2 */
 	int64_t tick_ns;
+	int64_t catch_ns;    /* a step may follow so much sooner than velocity says */
 	int64_t lateness_ns; /* of a step at most; < 0: acceleration is not judged */
 	int64_t position_min, position_max;
 	struct edge_log_stop stop[EDGE_LOG_STOPS];

@@ -155,20 +155,23 @@ int feeder_tool(const struct feeder *feeder, const char *tool, struct incise_err
 	return rc;
 }
 
-void feeder_end(struct feeder *feeder)
+int feeder_end(struct feeder *feeder)
 {
 	const struct timespec pause = {.tv_nsec = LOOK_NS};
 	int64_t looks = END_MOST_S * (INCISE_NS_PER_S / LOOK_NS);
 
+	int status = 0;
+
 	if (!feeder->own || feeder->pid <= 0)
-		return;
+		return 0;
 	feeder->own = false;
 	kill(feeder->pid, SIGTERM);
 	/* A stopped feeder ends as well. */
 	kill(feeder->pid, SIGCONT);
-	while (waitpid(feeder->pid, NULL, WNOHANG) == 0) {
+	while (waitpid(feeder->pid, &status, WNOHANG) == 0) {
 		if (!looks--)
 			kill(feeder->pid, SIGKILL);
 		nanosleep(&pause, NULL);
 	}
+	return status ? -ECHILD : 0;
 }

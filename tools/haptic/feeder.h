@@ -31,7 +31,10 @@ int feeder_begin(struct feeder *feeder, char **argv, struct incise_error *err);
 /* Order another tool. Returns 0, or a negative errno with its answer in @err. */
 int feeder_tool(const struct feeder *feeder, const char *tool, struct incise_error *err);
 
-/* End it if this process started it: the force fades. Waits for it. */
-void feeder_end(struct feeder *feeder);
+/*
+ * End it if this process started it: the force fades. Waits for it. Returns 0; -ECHILD: it ended with
+ * an error, and has said which.
+ */
+int feeder_end(struct feeder *feeder);
 
 #endif

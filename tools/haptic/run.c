@@ -284,7 +284,8 @@ static int end_force(struct haptic *haptic, struct incise_error *err)
 {
 	if (haptic->mode != HAPTIC_WATCH)
 		return hold_let_go(haptic->rig, err);
-	feeder_end(&haptic->feeder);
+	if (feeder_end(&haptic->feeder))
+		return incise_error_set(err, ECHILD, "incise feed ended with an error");
 	return 0;
 }
 

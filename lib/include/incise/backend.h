@@ -288,6 +288,7 @@ struct incise_actuator {
 	uint32_t setup_ns, hold_ns;
 	uint64_t enable_ns;
 	double home_mm_s, home_mm;
+	bool has_home;		 /**< the file has home_mm */
 	double origin_mm;	 /**< see struct incise_stepper_info */
 	double rest_mm, late_s;	 /**< see struct incise_stepper_info */
 	double direction[3];	 /**< of its force, unit; 0 0 0: not given */
