@@ -191,11 +191,12 @@ int stepper_setup_config(struct stepper_motor *motor,
 		motor->config = *config;
 		motor->interval_ns =
 			div_u64(NSEC_PER_SEC + config->velocity - 1, config->velocity);
-		/* Timers are late by so much anyway, and an eighth of a step is not felt. */
+		/* A firing is late by what the one before costs, and an eighth of a step is not felt. */
 		motor->catch_ns = max(motor->interval_ns >> 3,
 				      (s64)motor->stepper->info.step_ns >> 1);
 		motor->lag_ns =
-			max(motor->catch_ns, (s64)motor->stepper->info.lateness_ns);
+			max(motor->catch_ns, (s64)motor->stepper->info.lateness_ns) +
+			motor->stepper->tick_cost_ns;
 		incise_profile_halt(&motor->profile, motor->position);
 		stepper_status_publish(motor, ktime_get_ns());
 	}
