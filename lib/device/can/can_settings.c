@@ -68,6 +68,10 @@ const struct incise_setting incise_actuator_can_settings[] = {
 		       "largest distance from the target; at most travel_mm"),
 	SETTING_NUMBER(following_ms, can.following_s, "ms", 1, 10000, "50",
 		       "longest time beyond following_mm", .scale = 1e-3),
+	SETTING_NUMBER(start_ms, can.start_s, "ms", 10, 60000, "500",
+		       "longest time from power on to operation enabled; a drive that "
+		       "searches its commutation or opens a brake needs more",
+		       .scale = 1e-3),
 	SETTING_WHOLE(homing_method, can.homing_method, "", -128, 127, "0",
 		      "number of the homing method in the drive's manual"),
 	SETTING_TRUTH(absolute, can.absolute, "false",

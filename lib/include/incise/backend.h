@@ -250,6 +250,7 @@ struct incise_actuator_can {
 	double velocity_per_turn_s;	  /**< velocity units per turn/s: 60 for rpm */
 	double acceleration_per_turn_s2;  /**< acceleration units per turn/s² */
 	double following_mm, following_s; /**< largest following error, longest time */
+	double start_s;			  /**< longest time to operation enabled */
 	int homing_method;		  /**< number in CiA 402; 0: it cannot home */
 	bool absolute;		      /**< the encoder keeps its count without power */
 	double position_gain_1_s;     /**< csv: mm/s per mm */

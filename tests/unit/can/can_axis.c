@@ -31,6 +31,7 @@ static void start(struct bench *b)
 		.silence_ns = 150 * MS,
 		.following = 500,
 		.following_ns = 20 * MS,
+		.start_ns = 500 * MS,
 		.inputs = true,
 		.wired = INCISE_STEPPER_LINE_LIMIT_MIN | INCISE_STEPPER_LINE_LIMIT_MAX |
 			 INCISE_STEPPER_LINE_HOME | INCISE_STEPPER_LINE_ESTOP,
@@ -316,6 +317,7 @@ TEST(each_reason_has_its_own_line)
 		{CAN_AXIS_HOME_TIME, 0, 0, "not done in time"},
 		{CAN_AXIS_OUTSIDE, -100, 0, "to -0.750 mm"},
 		{CAN_AXIS_STOOD_STILL, 3000, 0, "was stopped for 3000 ms"},
+		{CAN_AXIS_HOME_OLD, 0, 0, "off and on"},
 		{CAN_AXIS_NO_STOP, CIA402_ENABLED, 0, "operation enabled: switch"},
 	};
 	struct can_axis axis = {.setup.step_mm = 0.0075};

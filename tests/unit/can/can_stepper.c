@@ -5,6 +5,8 @@
  * noticing is missing; homing by the drive; and no set-point is lost.
  */
 #include "../unit.h"
+#include "../../../lib/base/random.h"
+#include "../cases.h"
 #include "../rig/conformance.h"
 #include "rig.h"
 
@@ -527,6 +529,65 @@ TEST(it_homes_by_itself)
 		assert_false(can_rig_look(&rig).homed);
 		can_rig_close(&rig);
 	}
+}
+
+/*
+ * Drives that begin late, keep the bits of their last homing, do not set their count, or set one of their
+ * own: homed is only one whose shaft is where its count says, and a good drive always is.
+ */
+TEST(homed_only_where_the_shaft_is)
+{
+	const int n = cases_of(1000, 50);
+	uint64_t key = cases_seed(7), drawn = 0;
+	int good = 0, refused = 0;
+
+	for (int i = 0; i < n; i++) {
+		bool late = (incise_random_bits(key, drawn++) % (2)),
+		     before = (incise_random_bits(key, drawn++) % (2));
+		int fault = (int)(incise_random_bits(key, drawn++) % (6));
+		double tolerance =
+			1.1 * COUNTS_PER_MM; /* following_mm, and its braking */
+		int rc;
+
+		can_rig_init(&rig);
+		can_rig_open_or_fail(&rig);
+		can_rig_enable_or_fail(&rig);
+		if (before) {
+			rig.drive.homing_fails = (incise_random_bits(key, drawn++) % (2));
+			rc = incise_stepper_home(rig.stepper, NULL, NULL, &err);
+			assert_int_equal(!rc, !rig.drive.homing_fails);
+			if (rc)
+				assert_int_equal(incise_stepper_clear(rig.stepper, &err),
+						 0);
+			can_rig_enable_or_fail(&rig);
+		}
+		rig.drive.homing_late_ns =
+			late ? (int64_t)(incise_random_bits(key, drawn++) % 500000000)
+			     : 0;
+		rig.drive.homing_fails = fault == 1;
+		rig.drive.homing_keeps = fault == 2;
+		rig.drive.homing_no_count = fault == 3;
+		if (fault == 4)
+			rig.drive.homing_own =
+				(late ? 2.0 : -2.0) * COUNTS_PER_MM *
+				(double)(1 + incise_random_bits(key, drawn++) % 20);
+		rc = incise_stepper_home(rig.stepper, NULL, NULL, &err);
+		if (!rc) {
+			assert_true(can_rig_look(&rig).homed);
+			assert_true(fabs(rig.drive.origin + 5000) < tolerance);
+			good++;
+		} else {
+			assert_false(can_rig_look(&rig).homed);
+			assert_true(*err.text);
+			if (fault < 1 || fault > 4)
+				fail_msg("case %d: %s", i, err.text);
+			refused++;
+		}
+		if (fault == 1 || fault == 4)
+			assert_true(rc);
+		can_rig_close(&rig);
+	}
+	assert_true(good > n / 5 && refused > n / 5);
 }
 
 TEST(homing_can_fail_and_be_stopped)

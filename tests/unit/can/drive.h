@@ -172,6 +172,10 @@ struct drive {
 	bool blocked;	      /* the shaft does not turn */
 	bool fault_stays;     /* a fault cannot be reset */
 	bool homing_fails;
+	int64_t homing_late_ns; /* homing begins so late; until then its old bits stay … */
+	bool homing_keeps;	/* … and never fall: it does not begin */
+	bool homing_no_count; /* the count is not set at the switch … */
+	double homing_own;    /* … or to a position of its own, counts */
 	double gives_way;     /* counts that its shaft jumps when its brake opens */
 	bool no_tpdo;	      /* TPDO1 is not sent */
 	bool twice;	      /* each frame of it comes twice */
@@ -209,6 +213,7 @@ struct drive {
 	struct can_filter filters[16];
 	int filters_n; /* 0: all */
 	int64_t tick_ns, heartbeat_ns, consumer_ns, inhibit_ns, timer_ns, enabled_at_ns;
+	int64_t homing_at_ns; /* 0: not */
 	bool watching, enabling, homed, homing, homing_error;
 	bool had_reset_bit, had_home_bit, booted;
 	struct can_frame rpdo; /* waits for a SYNC; of length 0: none */
@@ -330,6 +335,7 @@ static inline void drive_enter(struct drive *d, enum cia402_state state)
 		d->od[OD_TARGET_VELOCITY].value = d->od[OD_TORQUE].value = 0;
 	} else {
 		d->homing = d->enabling = false;
+		d->homing_at_ns = 0;
 	}
 	d->quick_stops += state == CIA402_QUICK_STOP;
 	d->state = state;
@@ -455,9 +461,11 @@ static inline double drive_homing(struct drive *d, double dt)
 	d->homing = false;
 	d->homing_error = d->homing_fails;
 	d->homed = !d->homing_fails;
-	if (d->homed) {
-		d->origin += d->position - drive_signed(d, OD_HOME_OFFSET);
-		d->position = drive_signed(d, OD_HOME_OFFSET);
+	if (d->homed && !d->homing_no_count) {
+		double count = drive_signed(d, OD_HOME_OFFSET) + d->homing_own;
+
+		d->origin += d->position - count;
+		d->position = count;
 	}
 	return 0;
 }
@@ -524,13 +532,19 @@ static inline void drive_move(struct drive *d)
 	}
 	if (d->od[OD_MODE].value != d->od[OD_MODE_NOW].value) {
 		d->od[OD_MODE_NOW].value = d->od[OD_MODE].value;
-		d->homing = d->homing_error = false;
+		d->homing = false;
+		d->homing_at_ns = 0;
 		d->target = d->position;
 	}
 	if (d->od[OD_MODE_NOW].value == CIA402_HOMING && d->state == CIA402_ENABLED &&
-	    d->od[OD_CONTROLWORD].value & 0x10 && !d->had_home_bit) {
-		d->homing = true;
-		d->homed = d->homing_error = false;
+	    d->od[OD_CONTROLWORD].value & 0x10 && !d->had_home_bit)
+		d->homing_at_ns = d->now_ns + d->homing_late_ns;
+	if (d->homing_at_ns && d->now_ns >= d->homing_at_ns) {
+		d->homing_at_ns = 0;
+		if (!d->homing_keeps) {
+			d->homing = true;
+			d->homed = d->homing_error = false;
+		}
 	}
 	d->had_home_bit = d->od[OD_CONTROLWORD].value & 0x10;
 	if (drive_powered(d))

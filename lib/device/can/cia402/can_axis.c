@@ -11,11 +11,11 @@
 #include "can_axis.h"
 
 #define MS 1000000LL
-#define START_NS (500 * MS)    /* from no power to operation enabled */
-#define END_NS (200 * MS)      /* from shutdown to no power */
-#define QUICK_NS (1000 * MS)   /* for a quick stop, next to deadman and ramp */
-#define OBEY_NS (20 * MS)      /* from the command to the start of a quick stop */
-#define PICKED_UP_NS (50 * MS) /* from the command to the start of homing */
+#define END_NS (200 * MS)    /* from shutdown to no power */
+#define QUICK_NS (1000 * MS) /* for a quick stop, next to deadman and ramp */
+#define OBEY_NS (20 * MS)    /* from the command to the start of a quick stop */
+#define OLD_BITS_NS \
+	(5000 * MS) /* from the command to homing: the bits of the last one fall */
 #define INPUTS_NS (3 * CIA402_INPUTS_MS * MS)
 #define OPEN_CYCLES 10	  /* without an answer, in csv and cst … */
 #define OPEN_NS (20 * MS) /* … and at least that */
@@ -441,7 +441,7 @@ static void run_starting(struct can_axis *axis)
 		if (!homes)
 			axis->result = 0;
 		enter_phase(axis, homes ? CAN_AXIS_HOMING : CAN_AXIS_RUNNING);
-	} else if (axis->now_ns - axis->since_ns > START_NS) {
+	} else if (axis->now_ns - axis->since_ns > axis->setup.start_ns) {
 		set_cause(axis, CAN_AXIS_NO_START, state, 0);
 		abandon(axis, -ETIMEDOUT);
 	}
@@ -469,22 +469,31 @@ static void run_running(struct can_axis *axis)
 static void run_homing(struct can_axis *axis)
 {
 	uint16_t word = axis->statusword;
-	bool started = !axis->old_bits || axis->now_ns - axis->since_ns > PICKED_UP_NS;
+	bool waited = axis->now_ns - axis->since_ns > OLD_BITS_NS;
 
 	check_inputs(axis);
 	if (axis->phase != CAN_AXIS_HOMING)
 		return;
 	/* The drive clears the bits of an earlier homing when it starts this one. */
 	axis->old_bits &= word;
+	/*
+	 * A bit that has not fallen answers the last homing, however late that is. A drive that was homed, and has
+	 * nothing to do, may keep its bits: then its count must say that it is there, see can_session_homed().
+	 */
+	if (!waited || axis->old_bits & CIA402_FOLLOWING_ERROR)
+		word &= ~axis->old_bits;
 	if (axis->stop_homing) {
 		axis->motion.status.state = INCISE_STEPPER_STATE_STOPPING;
 		abandon(axis, -EINTR);
-	} else if (started && word & CIA402_FOLLOWING_ERROR) {
+	} else if (word & CIA402_FOLLOWING_ERROR) {
 		set_fault(axis, INCISE_STEPPER_FAULT_ALARM, CAN_AXIS_NO_HOME, 0, 0);
 	} else if (axis->now_ns > axis->limit_ns) {
 		axis->outcome = -ETIMEDOUT;
 		set_fault(axis, INCISE_STEPPER_FAULT_ALARM, CAN_AXIS_HOME_TIME, 0, 0);
-	} else if (started && word & CIA402_HOMED && word & CIA402_TARGET_REACHED) {
+	} else if (waited && axis->old_bits & CIA402_FOLLOWING_ERROR) {
+		axis->outcome = -ETIMEDOUT;
+		set_fault(axis, INCISE_STEPPER_FAULT_ALARM, CAN_AXIS_HOME_OLD, 0, 0);
+	} else if (word & CIA402_HOMED && word & CIA402_TARGET_REACHED) {
 		axis->outcome = 0;
 		axis->motion.ending = true;
 		enter_phase(axis, CAN_AXIS_ENDING);
@@ -793,6 +802,11 @@ int can_axis_cause_text(const struct can_axis *axis, char *text, size_t size)
 		return snprintf(text, size,
 				"its homing was not done in time: check that it moves, "
 				"home_mm_s and homing_method in rig.conf, then clear");
+	case CAN_AXIS_HOME_OLD:
+		return snprintf(
+			text, size,
+			"it still reports that its last homing failed, and not "
+			"whether it homed now: switch it off and on, and home again");
 	case CAN_AXIS_OUTSIDE:
 		return snprintf(
 			text, size,

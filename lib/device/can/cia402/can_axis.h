@@ -51,6 +51,7 @@ enum can_axis_cause {
 	CAN_AXIS_NO_START,   /* a: enum cia402_state */
 	CAN_AXIS_NO_HOME,    /* the drive reports that homing failed */
 	CAN_AXIS_HOME_TIME,
+	CAN_AXIS_HOME_OLD,    /* the error bit of the last homing stays set */
 	CAN_AXIS_OUTSIDE,     /* a: steps; it gave way while getting power */
 	CAN_AXIS_STOOD_STILL, /* a: ms; this program, not the drive */
 	CAN_AXIS_NO_STOP, /* a: enum cia402_state; it did not report to have no power */
@@ -67,6 +68,7 @@ struct can_axis_setup {
 	int64_t silence_ns;   /* of the drive until it counts as lost */
 	int32_t following;    /* more steps off the target … */
 	int64_t following_ns; /* … for so long are a fault */
+	int64_t start_ns;     /* longest time to operation enabled */
 	bool inputs;	      /* it sends TPDO2 … */
 	bool inputs_timed;    /* … at each CIA402_INPUTS_MS */
 	unsigned int wired;   /* INCISE_STEPPER_LINE_… bits that are valid */

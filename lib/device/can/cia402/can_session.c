@@ -427,6 +427,29 @@ int can_session_clear(struct can_session *s, struct incise_error *err)
 	return rc;
 }
 
+/*
+ * Homing gives the edge the count 0, from which the drive brakes: where its count says otherwise, it was not set,
+ * and the shaft is elsewhere than it seems.
+ */
+static int check_homed(struct can_session *s, struct incise_error *err)
+{
+	const struct incise_actuator *a = &s->actuator;
+	double per_mm = s->axis.setup.counts_per_step / incise_actuator_step_mm(a);
+	double off_mm = s->axis.position / per_mm;
+	double brake_mm = a->home_mm_s * a->home_mm_s / (2 * a->acceleration_mm_s2);
+
+	if (fabs(off_mm) <= brake_mm + a->can.following_mm)
+		return 0;
+	s->is_homed = false;
+	s->axis.motion.status.flags &= ~INCISE_STEPPER_FLAG_HOMED;
+	return incise_error_set(
+		err, EIO,
+		"%s: after its homing it reports %.3f mm in place of 0: its "
+		"count was not set; look for a home position or an offset "
+		"of its own beside 607C in its setup",
+		s->name, off_mm);
+}
+
 int can_session_homed(struct can_session *s, struct incise_error *err)
 {
 	int rc;
@@ -434,6 +457,8 @@ int can_session_homed(struct can_session *s, struct incise_error *err)
 	begin_can_session(s, s->name, err);
 	s->is_homed = true;
 	rc = read_position(s, false);
+	if (!rc)
+		rc = check_homed(s, err);
 	if (rc)
 		return rc;
 	can_units_range(s);

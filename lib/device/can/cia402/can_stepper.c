@@ -22,7 +22,8 @@
 #include "can_stepper.h"
 
 #define MS 1000000LL
-#define START_MOST_NS (3 * INCISE_NS_PER_S) /* with the deadman: longer than any start */
+#define START_MOST_NS \
+	(3 * INCISE_NS_PER_S) /* with start_ms and the deadman: longer than any start */
 #define HOME_MOST_NS (60 * INCISE_NS_PER_S)
 #define POLL_NS MS
 #define IDLE_LOOK_NS (2 * MS) /* period of looking at the mailbox without power */
@@ -237,14 +238,21 @@ static int await_result(struct can_stepper *c, int64_t most_ns, const volatile i
 	return c->session.axis.result;
 }
 
-/* Make the message from the cause of the last stop; returns @rc without a cause. */
+/* Make the message from the cause of the last stop, else from its faults; returns @rc without either. */
 static int refuse_by_cause(struct can_stepper *c, int rc, const char *what,
 			   struct incise_error *err)
 {
 	char why[300];
 
-	if (!can_axis_cause_text(&c->session.axis, why, sizeof(why)))
-		return rc;
+	unsigned int faults = c->motor.last.faults;
+
+	if (!can_axis_cause_text(&c->session.axis, why, sizeof(why))) {
+		if (!faults)
+			return rc;
+		snprintf(why, sizeof(why), "%s",
+			 incise_stepper_fault_text(
+				 (enum incise_stepper_fault)(faults & -faults)));
+	}
 	return incise_error_set(err, -rc, "%s: %s: %s", c->motor.name, what, why);
 }
 
@@ -272,7 +280,8 @@ static int power(struct can_stepper *c, int64_t homing_ns, const volatile int *s
 						axis->setup.step_mm);
 	if (rc <= 0)
 		return rc;
-	rc = await_result(c, homing_ns + START_MOST_NS + deadman_ns, stop);
+	rc = await_result(
+		c, homing_ns + START_MOST_NS + axis->setup.start_ns + deadman_ns, stop);
 	return rc ? refuse_by_cause(c, rc, what, err) : 0;
 }
 

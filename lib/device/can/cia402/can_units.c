@@ -103,6 +103,7 @@ int can_units_axis(struct can_session *s)
 		.silence_ns = (s->setup.deadman_ms + 2 * s->setup.heartbeat_ms) * MS,
 		.following = (int32_t)ceil(a->can.following_mm / step_mm),
 		.following_ns = (int64_t)(a->can.following_s * INCISE_NS_PER_S),
+		.start_ns = (int64_t)(a->can.start_s * INCISE_NS_PER_S),
 	};
 	int rc;
 
