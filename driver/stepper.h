@@ -186,7 +186,7 @@ struct stepper {
 	struct stepper_plan *plan; /* NULL: there is none */
 
 	struct incise_stepper_controller info;
-	u32 tick_cost_ns; /* self-test: a step behind a tick is late by it */
+	u32 tick_cost_ns; /* self-test: a step behind the ticks of all motors is late by it */
 	struct incise_stepper_setpoint *setpoints;  /* page 0: untrusted */
 	struct incise_stepper_motor_status *status; /* page 1 */
 	struct gpio_desc *estop;

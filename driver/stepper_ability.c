@@ -205,7 +205,7 @@ int stepper_ability_measure(struct stepper *stepper)
 			       (u64)INCISE_PROFILE_VELOCITY_MAX);
 	info->resolution_ns = hrtimer_resolution;
 	info->lateness_ns = late;
-	stepper->tick_cost_ns = min(tick, (u64)U32_MAX);
+	stepper->tick_cost_ns = min(stepper->n_motors * tick, (u64)U32_MAX);
 	/* The limits of a config. */
 	info->pulse_ns = clamp(pulse, 500ULL, 1000000ULL);
 	info->tick_min_ns =
