@@ -15,8 +15,8 @@
  * count from the actual times of edges, taken after the write, when the line has
  * changed for sure. So a late edge shortens nothing but the interval, by what a firing costs or
  * an eighth of it (catch_ns): the usual lateness of a timer (lag_ns) is caught up, or a motor would
- * never reach its largest velocity; where it is more, the time line is put off. There is never a burst, and no acceleration that the
- * profile does not know of.
+ * never reach its largest velocity; where it is more, the time line is put off. There is never a
+ * burst, and no acceleration that the profile does not know of.
  */
 #include <linux/delay.h>
 #include <linux/hrtimer.h>
@@ -45,6 +45,7 @@
 #define WAIT_SUM_NS 10000
 
 struct stepper_waited {
+	const struct stepper_motor *first;
 	s64 since_ns;
 	s64 sum_ns;
 };
@@ -139,8 +140,8 @@ static void stepper_motor_trail(struct stepper_motor *motor, s64 now, s64 due)
 }
 
 /*
- * End a short pulse here, which costs less than another interrupt. The sum is of waits that follow one
- * another in less time than a pulse: of one interrupt.
+ * End a short pulse here, which costs less than another interrupt. A sum ends when the motor that began
+ * it has another step, which is of another interrupt, or after a pause.
  */
 static void stepper_motor_wait(struct stepper_motor *motor)
 {
@@ -152,8 +153,10 @@ static void stepper_motor_wait(struct stepper_motor *motor)
 	if (!motor->high || high_ns > INCISE_STEPPER_WAIT_MAX_NS ||
 	    motor->config.flags & INCISE_STEPPER_CONFIG_NO_WAIT)
 		return;
-	if (motor->lead_ns - waited->since_ns > WAIT_SUM_NS)
+	if (waited->first == motor || motor->lead_ns - waited->since_ns > WAIT_SUM_NS) {
+		waited->first = motor;
 		waited->sum_ns = 0;
+	}
 	if (waited->sum_ns + high_ns > WAIT_SUM_NS)
 		return;
 	do {

@@ -137,8 +137,8 @@ void incise_smooth_free(struct incise_smooth *smooth)
 	smooth->records = NULL;
 }
 
-static double apart(const struct incise_smooth_record *a,
-		    const struct incise_smooth_record *b)
+static double measure_distance(const struct incise_smooth_record *a,
+			       const struct incise_smooth_record *b)
 {
 	double sum = 0;
 
@@ -154,7 +154,7 @@ static bool continues(const struct incise_smooth *smooth, size_t i)
 	const struct incise_smooth_record *r = &smooth->records[i];
 
 	return r->t_ns - r[-1].t_ns <= smooth->fresh.gap_ns &&
-	       apart(&r[-1], r) <= INCISE_PREDICT_JUMP_MM;
+	       measure_distance(&r[-1], r) <= INCISE_PREDICT_JUMP_MM;
 }
 
 /* Slope of the straight line through a record and those that follow, mm/s. */
@@ -182,8 +182,8 @@ static void first_slope(const struct incise_smooth *smooth, size_t first, double
 }
 
 /* Whether the filter, predicted to this record, is too far off to continue. */
-static bool lost(const struct incise_predict *p, const struct incise_smooth_record *r,
-		 double dt)
+static bool is_lost_pose(const struct incise_predict *p,
+			 const struct incise_smooth_record *r, double dt)
 {
 	double sum = 0;
 
@@ -207,7 +207,7 @@ static void step_forward(struct incise_smooth *smooth, size_t i)
 
 	memcpy(sample.position_mm, r->position_mm, sizeof(sample.position_mm));
 	r->starts = !p->now.started || sample.t_ns - p->now.t_ns > p->gap_ns ||
-		    lost(p, r, dt);
+		    is_lost_pose(p, r, dt);
 	r->periods = dt / smooth->period_s;
 	next = r->starts ? smooth->fresh : *p;
 	incise_predict_add(&next, &sample);

@@ -190,7 +190,7 @@ static void try_edges(struct bench *bench, const struct incise_stepper_config *c
 {
 	static struct incise_sim_edge edges[EDGES_MAX];
 	int64_t lead = 0, trail = 0, dir = 0, up = 0, down = 0, shorts = 0;
-	/* What a late step may be caught up by: an eighth. */
+	/* A late step may be caught up by an eighth. */
 	int64_t interval = 875000000 / config->velocity;
 	bool level = false;
 	size_t n;
