@@ -7,20 +7,34 @@
 #define INCISE_GPIO_LINES_H
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <incise/backend.h>
 
+#define GPIO_PATH_MAX 64
+#define GPIO_SEVERAL_MAX 200
+
 struct gpio_lines;
+
+/* Whether the chip with this path has a name or label: 1, 0, or a negative errno. */
+int gpio_chip_called(const char *path, const char *name);
+
+/*
+ * Find the path of the one chip with this name, label or path. Returns 0, -ENOENT, -EACCES, -ENOTUNIQ: several,
+ * whose paths are listed.
+ */
+int gpio_chip_find(const char *name, char path[GPIO_PATH_MAX],
+		   char several[GPIO_SEVERAL_MAX]);
 
 /*
  * Request the lines of a chip; the first INCISE_LINES_OUT are outputs, at the levels of @idle.
  *
- * @chip: name, label or path of the chip
+ * @path: of the chip
  * @line: offsets, -1 without a line, in the order of enum incise_actuator_line
  * @idle: bits 1 << line of outputs that start high
  * Returns NULL with errno: ENOENT (no such chip), EBUSY (a line is taken), EINVAL (no such
  * line), EACCES, ENOMEM …
  */
-struct gpio_lines *gpio_lines_open(const char *chip, const int *line, unsigned int idle);
+struct gpio_lines *gpio_lines_open(const char *path, const int *line, unsigned int idle);
 
 /* Set an output's level. Returns 0 or a negative errno. One system call. */
 int gpio_lines_write(struct gpio_lines *lines, enum incise_actuator_line line, bool high);

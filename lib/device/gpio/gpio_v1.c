@@ -5,6 +5,7 @@
 #include <errno.h>
 #include <gpiod.h>
 #include <stdlib.h>
+#include <string.h>
 #include "gpio_lines.h"
 
 #define CONSUMER "incise"
@@ -48,14 +49,27 @@ static int take_inputs(struct gpio_lines *lines, const int *line)
 		       : 0;
 }
 
-struct gpio_lines *gpio_lines_open(const char *chip, const int *line, unsigned int idle)
+int gpio_chip_called(const char *path, const char *name)
+{
+	struct gpiod_chip *chip = gpiod_chip_open(path);
+	int is;
+
+	if (!chip)
+		return -errno;
+	is = !strcmp(gpiod_chip_name(chip), name) ||
+	     !strcmp(gpiod_chip_label(chip), name);
+	gpiod_chip_close(chip);
+	return is;
+}
+
+struct gpio_lines *gpio_lines_open(const char *path, const int *line, unsigned int idle)
 {
 	struct gpio_lines *lines = calloc(1, sizeof(*lines));
 	int code;
 
 	if (!lines)
 		return NULL;
-	lines->chip = gpiod_chip_open_lookup(chip);
+	lines->chip = gpiod_chip_open(path);
 	if (lines->chip && !take_outputs(lines, line, idle) && !take_inputs(lines, line))
 		return lines;
 	code = errno;

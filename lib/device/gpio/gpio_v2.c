@@ -3,9 +3,7 @@
  * GPIO lines by libgpiod 2.x; see gpio_lines.h.
  */
 #include <errno.h>
-#include <glob.h>
 #include <gpiod.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "gpio_lines.h"
@@ -20,43 +18,20 @@ struct gpio_lines {
 	size_t n_in;
 };
 
-static bool is_called(struct gpiod_chip *chip, const char *name)
+int gpio_chip_called(const char *path, const char *name)
 {
-	struct gpiod_chip_info *info = gpiod_chip_get_info(chip);
-	bool is = info && (!strcmp(gpiod_chip_info_get_name(info), name) ||
-			   !strcmp(gpiod_chip_info_get_label(info), name));
+	struct gpiod_chip *chip = gpiod_chip_open(path);
+	struct gpiod_chip_info *info = chip ? gpiod_chip_get_info(chip) : NULL;
+	int is = chip && info ? 0 : -errno;
 
-	if (info)
+	if (info) {
+		is = !strcmp(gpiod_chip_info_get_name(info), name) ||
+		     !strcmp(gpiod_chip_info_get_label(info), name);
 		gpiod_chip_info_free(info);
+	}
+	if (chip)
+		gpiod_chip_close(chip);
 	return is;
-}
-
-/* Open a chip by path, else the first one of that name or label. */
-static struct gpiod_chip *find_chip(const char *name)
-{
-	struct gpiod_chip *chip = NULL;
-	int code = ENOENT;
-	glob_t found;
-
-	if (strchr(name, '/'))
-		return gpiod_chip_open(name);
-	if (glob("/dev/gpiochip*", 0, NULL, &found)) {
-		errno = ENOENT;
-		return NULL;
-	}
-	for (size_t i = 0; i < found.gl_pathc && !chip; i++) {
-		chip = gpiod_chip_open(found.gl_pathv[i]);
-		if (!chip && errno == EACCES)
-			code = EACCES;
-		if (chip && !is_called(chip, name)) {
-			gpiod_chip_close(chip);
-			chip = NULL;
-		}
-	}
-	globfree(&found);
-	if (!chip)
-		errno = code;
-	return chip;
 }
 
 /* Add the settings of all wired lines. Returns 0, or -1 with errno. */
@@ -116,10 +91,10 @@ static struct gpiod_line_request *take_gpio_v2(struct gpio_lines *lines,
 	return request;
 }
 
-struct gpio_lines *gpio_lines_open(const char *chip, const int *line, unsigned int idle)
+struct gpio_lines *gpio_lines_open(const char *path, const int *line, unsigned int idle)
 {
 	struct gpio_lines *lines = calloc(1, sizeof(*lines));
-	struct gpiod_chip *opened = lines ? find_chip(chip) : NULL;
+	struct gpiod_chip *opened = lines ? gpiod_chip_open(path) : NULL;
 	int code;
 
 	if (opened) {

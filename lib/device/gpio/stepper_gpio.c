@@ -266,6 +266,8 @@ static int request_lines(struct gpio_stepper *g,
 {
 	const struct incise_actuator *actuator = request->actuator;
 	const char *todo;
+	char path[GPIO_PATH_MAX], several[GPIO_SEVERAL_MAX];
+	int rc;
 
 	if (!*request->arguments)
 		return incise_error_set(
@@ -286,8 +288,10 @@ static int request_lines(struct gpio_stepper *g,
 					"watch it; use that program",
 					request->where);
 	/* At rest all are inactive. */
+	rc = gpio_chip_find(request->arguments, path, several);
+	errno = -rc;
 	g->lines =
-		gpio_lines_open(request->arguments, actuator->line, actuator->active_low);
+		rc ? NULL : gpio_lines_open(path, actuator->line, actuator->active_low);
 	if (g->lines)
 		return 0;
 	switch (errno) {
@@ -295,6 +299,12 @@ static int request_lines(struct gpio_stepper *g,
 	case ENODEV:
 		todo = "no such chip; `gpiodetect` lists them";
 		break;
+	case ENOTUNIQ:
+		return incise_error_set(
+			err, ENOTUNIQ,
+			"%s: gpio chip %.60s: several have this name: %s; give "
+			"the path of yours, see `gpiodetect`",
+			request->where, request->arguments, several);
 	case EBUSY:
 		todo = "a line is in use; `gpioinfo` prints its user";
 		break;

@@ -28,6 +28,14 @@ static struct {
 	char chip[64];
 } chip;
 
+int gpio_chip_find(const char *name, char path[GPIO_PATH_MAX],
+		   char several[GPIO_SEVERAL_MAX])
+{
+	snprintf(path, GPIO_PATH_MAX, "%s", name);
+	strcpy(several, "/dev/gpiochip0, /dev/gpiochip1");
+	return chip.open_error == ENOTUNIQ ? -ENOTUNIQ : 0;
+}
+
 struct gpio_lines *gpio_lines_open(const char *name, const int *line, unsigned int idle)
 {
 	struct gpio_lines *lines = calloc(1, sizeof(*lines));
@@ -242,6 +250,8 @@ TEST(why_it_cannot_begin_is_said)
 		{"c", false, false, ENOENT, 0, 2.5, ENOENT, "gpiodetect"},
 		{"c", false, false, EBUSY, 0, 2.5, EBUSY, "gpioinfo"},
 		{"c", false, false, EACCES, 0, 2.5, EACCES, NULL},
+		{"c", false, false, ENOTUNIQ, 0, 2.5, ENOTUNIQ,
+		 "/dev/gpiochip0, /dev/gpiochip1"},
 		{"c", false, false, EINVAL, 0, 2.5, EINVAL, "line"},
 		{"c", false, false, 0, -EREMOTEIO, 2.5, EREMOTEIO, NULL},
 		/* 30 000 steps/s: more than it ever says that it holds. */
