@@ -153,12 +153,12 @@ deps: ## install the packages that building, testing and the demo need
 demo: ## walk paper 1 on the virtual rig; pictures and summary in demo.out/
 	@mk/deps build demo
 	+@$(MAKE) --no-print-directory all
-	$(O)/bin/incise demo --report $(DEMO) --overwrite
+	$(O)/bin/incise demo -o $(DEMO) --overwrite
 
 bench: ## measure everything on this machine; one report in build/bench/
 	@mk/deps build bench
 	+@$(MAKE) --no-print-directory all
-	$(O)/bin/incise bench all --report $(O)/bench --overwrite
+	$(O)/bin/incise bench all -o $(O)/bench --overwrite
 
 readme-figures: ## put the summary of that report, and two of its figures, into doc/evidence.md
 	mk/readme-figures $(O)/bench

@@ -41,8 +41,8 @@ static const struct cli_option options[] = {
 	{'o', "output", "FILE.html",
 	 "write a page with figures of the path and the force",
 	 CLI_OUTPUT(struct assess_job, page), .extensions = ".html"},
-	{0, "csv", "FILE", "write one row per session as CSV",
-	 CLI_OUTPUT(struct assess_job, csv)},
+	{'o', "output", "FILE.csv", "write one row per session",
+	 CLI_OUTPUT(struct assess_job, csv), .extensions = ".csv"},
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct assess_job, json)},
 	{0},
 };
@@ -106,7 +106,7 @@ static void parse_assess(struct assess_job *job, int argc, char **argv)
 		cli_usage("--json and - would both write to standard output; give a "
 			  "file name");
 	if (job->page && job->csv && !strcmp(job->page, "-") && !strcmp(job->csv, "-"))
-		cli_usage("-o - and --csv - would both write to standard output; give "
+		cli_usage("-o - and -o csv:- would both write to standard output; give "
 			  "a file name");
 }
 

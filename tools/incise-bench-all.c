@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise bench all --report DIR: every benchmark of incise bench, one after the other, as one
+ * incise bench all -o DIR: every benchmark of incise bench, one after the other, as one
  * report that anyone can repeat. tools/report/measure.py runs them. A new report is made within
  * the folder, hidden, and takes the old one's place when it is whole.
  *
  *   incise-bench NAME --json ─▶ data/NAME.json ─┐
- *                     --plot ─▶ plots/         ├─▶ report.{json,html,md}
+ *                     -o     ─▶ plots/         ├─▶ report.{json,html,md}
  *
  *   DIR/.unfinished/{data,plots,report.*}  ─▶  DIR/{data,plots,report.*}
  */
@@ -51,7 +51,7 @@ static void parse_only(void *options, char *text)
 }
 
 static const struct cli_option options[] = {
-	{0, "report", "DIR", "folder to write everything to",
+	{'o', "output", "DIR", "folder to write everything to",
 	 CLI_OUTPUTS(struct bench_all_job, folder)},
 	{0, "from", "DIR",
 	 "measure nothing: write report.html and report.md of DIR/report.json "
@@ -69,7 +69,7 @@ static const struct cli_option options[] = {
 
 static const struct cli_command command = {
 	.name = "bench all",
-	.synopsis = "--report DIR [OPTIONS]",
+	.synopsis = "-o DIR [OPTIONS]",
 	.summary =
 		"Run every benchmark and write one report: report.html to read, on a "
 		"phone and on paper, too; report.md, the same; report.json; plots; the "
@@ -140,8 +140,7 @@ static struct folder folder_begin(const char *path)
 	folder.made = access(path, F_OK);
 	folder_make_all(path);
 	if (!folder.made && !may_be_replaced(path))
-		cli_fail("%s: not empty and not a report; give another --report DIR",
-			 path);
+		cli_fail("%s: not empty and not a report; give another -o DIR", path);
 	reserve_files(path, false);
 	remove_all(folder.unfinished);
 	folder_make_all(data);
@@ -260,7 +259,7 @@ static bool wanted(const struct bench_all_job *job, const char *benchmark)
 static json_t *command_of(const struct bench_all_job *job)
 {
 	char line[600];
-	int n = snprintf(line, sizeof(line), "incise bench all --report DIR%s",
+	int n = snprintf(line, sizeof(line), "incise bench all -o DIR%s",
 			 job->quick ? " --quick" : "");
 
 	for (int i = 0; i < job->n_only; i++)
@@ -351,11 +350,11 @@ static void parse_bench_all(struct bench_all_job *job, int argc, char **argv)
 	if (optind < argc)
 		cli_usage("'%s': bench all takes options only", argv[optind]);
 	if (!job->folder == !job->from)
-		cli_usage("expected --report DIR, or --from DIR");
+		cli_usage("expected -o DIR, or --from DIR");
 	if (job->from && (job->quick || job->n_only || job->against))
 		cli_usage(
 			"--from measures nothing; --against, --only and --quick go with "
-			"--report");
+			"-o");
 	if (!*(job->folder ? job->folder : job->from))
 		cli_usage("the folder has no name");
 }

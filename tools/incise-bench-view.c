@@ -714,7 +714,7 @@ static const struct cli_option options[] = {
 	{0, "against", "OLD.json",
 	 "report significant changes since an older report of --json",
 	 CLI_INPUT(struct bench_run, against)},
-	{0, "plot", "NAME",
+	{'o', "output", "NAME",
 	 "plot error over run time as NAME.png and NAME.svg, and run times of "
 	 "frames as NAME-frames",
 	 CLI_OUTPUTS(struct bench_run, plot)},

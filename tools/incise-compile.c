@@ -46,7 +46,7 @@ static char *symbol_of(const char *path)
 		if (!isalnum((unsigned char)*c) || (unsigned char)*c >= 0x80)
 			*c = '_';
 	if (!*symbol || isdigit((unsigned char)*symbol))
-		cli_usage("--c-source: '%s' makes no name in C; begin the file's name "
+		cli_usage("--output: '%s' makes no name in C; begin the file's name "
 			  "with a letter",
 			  path);
 	return symbol;
@@ -59,10 +59,13 @@ static void check_c_source(void *c_source, char *path)
 }
 
 static const struct cli_option options[] = {
-	{'o', "output", "FILE",
-	 "write the compiled model (.fx) or scene (.plan) to this file; - is "
-	 "standard output",
+	{'o', "output", "FILE.fx|NAME.plan",
+	 "write the compiled model or scene; - is standard output",
 	 CLI_OUTPUT(struct compile_job, output), .extensions = ".fx .plan"},
+	{'o', "output", "FILE.c",
+	 "also write it as C for a microcontroller, with a function FILE_eval",
+	 CLI_OUTPUT(struct compile_job, c_source), .parse = check_c_source,
+	 .extensions = ".c"},
 	{0, "budget", "ERROR",
 	 "largest certified error, for example 0.1mN, 50uN or 1e-4 in the output's "
 	 "unit (default: 0.1mN)",
@@ -72,10 +75,6 @@ static const struct cli_option options[] = {
 	 CLI_PARSED(struct compile_job, options.arithmetic, parse_arithmetic)},
 	{0, "cells", "N", "at least N cells per input of tables, up to 4096",
 	 CLI_INTEGER(struct compile_job, options.cells, 1, 4096)},
-	{0, "c-source", "FILE.c",
-	 "also write it as C for a microcontroller, with a function FILE_eval",
-	 CLI_OUTPUT(struct compile_job, c_source), .parse = check_c_source,
-	 .extensions = ".c"},
 	{0, "model", "FILE", "scene: use this model instead of its own",
 	 CLI_INPUT(struct compile_job, scene.model)},
 	{'r', "rig", "RIG",
@@ -95,7 +94,7 @@ static const struct cli_command command = {
 		"haptic loop and for kernels, with a certified bound of the error, over "
 		"the whole training range by interval arithmetic.",
 	.options = options,
-	.notes = "--budget, --method, --cells and --c-source go with a model.",
+	.notes = "--budget, --method, --cells and -o FILE.c go with a model.",
 	.examples = "incise compile liver.fis --budget 0.1mN -o liver.fx\n"
 		    "incise compile neck --rig rig.conf -o neck.plan",
 };
@@ -244,7 +243,7 @@ int main(int argc, char **argv)
 		compile_model(&job, path);
 	} else {
 		if (is_of_model(&job))
-			cli_usage("%s: --budget, --method, --cells and --c-source go "
+			cli_usage("%s: --budget, --method, --cells and -o FILE.c go "
 				  "with a model, this is a scene",
 				  path);
 		cli_extension("output", job.output, ".plan");

@@ -43,7 +43,7 @@ static void parse_loop(void *loop_time, char *text)
 }
 
 static const struct cli_option option_table[] = {
-	{0, "report", "DIR", "folder to leave everything in (default: demo.out)",
+	{'o', "output", "DIR", "folder to leave everything in (default: demo.out)",
 	 CLI_OUTPUTS(struct demo_options, demo.folder)},
 	{0, "seed", "N", "of the simulated rig (default: 1)",
 	 CLI_INTEGER(struct demo_options, demo.seed, 0, SEED_MAX)},
@@ -321,7 +321,7 @@ static void walk(struct demo *demo, const char *loop_time)
 	char *by_cut = demo_path(demo, "pairs-by-cut.csv"),
 	     *new_csv = demo_path(demo, "new-cut.csv");
 	char *paper = demo_path(demo, "paper.fis"), *model = demo_path(demo, "liver.fis");
-	char *initial = demo_path(demo, "paper-initial.fis"),
+	char *initial = demo_path(demo, "paper.initial.fis"),
 	     *scene = demo_path(demo, "liver.scene");
 	char *history = demo_path(demo, "paper-epochs.csv"),
 	     *log = demo_path(demo, "haptic.csv");
@@ -355,8 +355,8 @@ static void walk(struct demo *demo, const char *loop_time)
 	print_step(demo, "Train on random halves as the paper does, then by unseen cuts");
 	json_object_set_new(demo->summary, "train_random_halves",
 			    RUN(demo, "train", pairs, "-o", paper, "--classic", "--check",
-				"0.5", "--seed", seed_text, "--history", history,
-				"--initial", initial, "--json"));
+				"0.5", "--seed", seed_text, "-o", history, "-o", initial,
+				"--json"));
 	json_object_set_new(
 		demo->summary, "check_mse_N2_of_splits",
 		other_splits(demo, pairs,
@@ -374,12 +374,11 @@ static void walk(struct demo *demo, const char *loop_time)
 	write_scene(demo);
 	json_object_set_new(demo->summary, "replay_new_cut",
 			    RUN(demo, "replay", new_rec, scene, "--poses", "acquisition",
-				"--log", replay, "--json"));
+				"-o", replay, "--json"));
 	print_step(demo, "Run the haptic loop in real time, in fixed point");
 	json_object_set_new(demo->summary, "haptic",
 			    RUN(demo, "haptic", scene, "--rig", live, "-c", "none",
-				"--no-rt", "--duration", duration, "--log", log,
-				"--json"));
+				"--no-rt", "--duration", duration, "-o", log, "--json"));
 	free(rec), free(new_rec), free(raw), free(pairs), free(by_cut), free(new_csv);
 	free(paper), free(model), free(initial), free(scene), free(history), free(log);
 	free(replay), free(sim), free(seed_text), free(new_sim), free(live),
@@ -411,10 +410,10 @@ static void film_scene(const char *scene, const char *folder)
 	char *strip = cli_text("%s/%s.png", folder, name);
 
 	begin_folder(folder);
-	run_view((char *const[]){"view", (char *)scene, "--procedure", "--video", film,
+	run_view((char *const[]){"view", (char *)scene, "--procedure", "-o", film,
 				 "--fps", "30", NULL},
 		 folder);
-	run_view((char *const[]){"view", (char *)scene, "--procedure", "--strip", strip,
+	run_view((char *const[]){"view", (char *)scene, "--procedure", "-o", strip,
 				 "--at", MOMENTS, "--size", "640x480", "--no-panel",
 				 "--viewpoint", NEAR, "--fps", "10", NULL},
 		 folder);

@@ -46,7 +46,8 @@ static const struct cli_option options[] = {
 	 "NAME.state, by the scene's name, in /run/incise, $XDG_RUNTIME_DIR/incise "
 	 "or /tmp/incise-UID)",
 	 CLI_TEXT(struct haptic_job, state)},
-	{0, "log", "FILE", "write every tick as CSV at the end; needs --duration",
+	{'o', "output", "FILE.csv",
+	 "write every tick as CSV at the end; needs --duration",
 	 CLI_OUTPUT(struct haptic_job, log), .extensions = ".csv"},
 	SESSION_OPTIONS(struct haptic_job, session),
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct haptic_job, json)},
@@ -128,9 +129,10 @@ static void parse_haptic(struct haptic_job *job, int argc, char **argv)
 		watch_kernel(job);
 	session_options_check(&job->session);
 	if (job->log && !job->duration)
-		cli_usage("--log needs --duration: it keeps all ticks in memory");
+		cli_usage("-o %s needs --duration: it keeps all ticks in memory",
+			  job->log);
 	if (job->json && job->log && !strcmp(job->log, "-"))
-		cli_usage("--json and --log - would both write to standard output");
+		cli_usage("--json and -o - would both write to standard output");
 	if (job->no_rt && job->realtime.cpu != INCISE_REALTIME_ANY_CPU)
 		cli_usage("--cpu does not go with --no-rt: only a real-time thread is "
 			  "given its own CPU");

@@ -29,12 +29,13 @@ struct replay_job {
 static const char *const times[] = {"arrival", "acquisition", NULL};
 
 static const struct cli_option options[] = {
-	{0, "log", "FILE",
+	{'o', "output", "FILE.csv",
 	 "write predicted and measured force of every tick as CSV; - is standard "
 	 "output",
 	 CLI_OUTPUT(struct replay_job, csv), .extensions = ".csv"},
-	{0, "plot", "NAME", "draw predicted and measured force as NAME.png and NAME.svg",
-	 CLI_OUTPUTS(struct replay_job, plot)},
+	{'o', "output", "NAME.png",
+	 "draw predicted and measured force as NAME.png and NAME.svg",
+	 CLI_OUTPUTS(struct replay_job, plot), .extensions = ".png .svg"},
 	{0, "real-time", NULL, "wait for each tick (default: as fast as possible)",
 	 CLI_FLAG(struct replay_job, how.real_time)},
 	{0, "poses", "WHEN",
@@ -59,7 +60,7 @@ static const struct cli_command command = {
 	.summary = "Run the haptic loop of a scene on a recording, and compare the force "
 		   "that it renders with the measured one.",
 	.options = options,
-	.examples = "incise replay liver.rec scenes/liver.scene --log liver.csv",
+	.examples = "incise replay liver.rec scenes/liver.scene -o liver.csv",
 };
 
 static void parse_replay(struct replay_job *job, int argc, char **argv)
@@ -71,7 +72,7 @@ static void parse_replay(struct replay_job *job, int argc, char **argv)
 	job->recording = file_operand(argv[optind], FILE_RECORDING);
 	scene_argument_operand(&job->scene, argc, argv, optind + 1);
 	if (job->json && job->csv && !strcmp(job->csv, "-"))
-		cli_usage("--json and --log - would both write to standard output");
+		cli_usage("--json and -o - would both write to standard output");
 }
 
 /* Measured beside predicted force, and depth, over time. */
@@ -86,10 +87,10 @@ struct plot {
 static void begin_plot(struct plot *plot, const char *path)
 {
 	plot->drawn = -1;
-	plot_place("plot", path, &plot->folder, &plot->name);
+	plot_place("output", path, &plot->folder, &plot->name);
 	if (snprintf(plot->file, sizeof(plot->file), "%s.dat", plot->name) >=
 	    (int)sizeof(plot->file))
-		cli_usage("--plot: the name '%s' is too long; give a shorter one",
+		cli_usage("--output: the name '%s' is too long; give a shorter one",
 			  plot->name);
 	plot->data = plot_data(plot->folder, plot->file);
 }

@@ -89,18 +89,23 @@ static void parse_shard(void *shard, char *text)
 }
 
 static const struct cli_option option_table[] = {
-	{'o', "output", "FILE",
-	 "write the model to this file (.fis); - is standard output (default: NAME.fis "
-	 "of one source NAME.rec or NAME.csv)",
+	{'o', "output", "FILE.fis",
+	 "write the model; - is standard output (default: NAME.fis of one source "
+	 "NAME.rec or NAME.csv)",
 	 CLI_OUTPUT(struct train_options, model), .extensions = ".fis"},
+	{'o', "output", "FILE.initial.fis",
+	 "also write the initial model, before training",
+	 CLI_OUTPUT(struct train_options, initial), .extensions = ".initial.fis"},
+	{'o', "output", "FILE.csv", "write the RMSE of each epoch",
+	 CLI_OUTPUT(struct train_options, history), .extensions = ".csv"},
+	{'o', "output", "FILE.fac",
+	 "write the sums of these sources for incise merge, instead of a "
+	 "model; needs --premises",
+	 CLI_OUTPUT(struct train_options, factor), .extensions = ".fac"},
 	{0, "premises", "FILE",
 	 "keep the membership functions and ranges of this model (.fis); only the "
 	 "consequents are learnt",
 	 CLI_INPUT(struct train_options, premises)},
-	{0, "factor", "FILE",
-	 "write the sums of these sources (.fac) for incise merge, instead of a "
-	 "model; needs --premises",
-	 CLI_OUTPUT(struct train_options, factor), .extensions = ".fac"},
 	{0, "inputs", "A,B", "input columns (default: depth_mm,velocity_mm_s)",
 	 CLI_PARSED_BY(parse_inputs)},
 	{0, "target", "COLUMN", "column to learn (default: force_N)",
@@ -160,13 +165,9 @@ static const struct cli_option option_table[] = {
 	 "train as MATLAB's anfis does: no scaling, a ridge of 1e-6; the held-out "
 	 "data choose the epoch",
 	 CLI_FLAG(struct train_options, how.train.classic)},
-	{0, "initial", "FILE", "also write the initial model, before training",
-	 CLI_OUTPUT(struct train_options, initial), .extensions = ".fis"},
-	{0, "history", "FILE", "write the RMSE of each epoch to this CSV file",
-	 CLI_OUTPUT(struct train_options, history), .extensions = ".csv"},
 	{0, "shard", "I/N",
 	 "use share I of N of the sources, from 1: for the tasks of a job array; "
-	 "needs --factor",
+	 "needs -o FILE.fac",
 	 CLI_PARSED(struct train_options, shard, parse_shard)},
 	{0, "mpi", NULL, "share the sources among the processes of mpirun",
 	 CLI_FLAG(struct train_options, mpi)},
@@ -247,22 +248,23 @@ static void parse_train(struct train_options *options, int argc, char **argv)
 			"each",
 			options->shard.of, argc - optind);
 	if (options->factor && !options->premises)
-		cli_usage(
-			"--factor: missing --premises MODEL.fis, which all factors share");
+		cli_usage("-o %s: missing --premises MODEL.fis, which all factors share",
+			  options->factor);
 	if (options->factor && options->model)
-		cli_usage(
-			"--factor and -o: give one; incise merge makes a model of factors");
+		cli_usage("-o %s -o %s: give one; incise merge makes a model of factors",
+			  options->factor, options->model);
 	if (options->factor && options->how.check > 0)
-		cli_usage("--factor takes all pairs; leave out --check");
+		cli_usage("-o %s takes all pairs; leave out --check", options->factor);
 	if (options->premises &&
 	    (options->how.train.classic || options->initial || options->history ||
 	     options->n_mfs || options->auto_mfs))
 		cli_usage("--premises keeps the membership functions; leave out --mf, "
-			  "--classic, --initial and --history");
+			  "--classic and files of a training (.initial.fis, .csv)");
 	if (options->mpi && options->how.train.classic)
 		cli_usage("--classic keeps all pairs in one memory; leave out --mpi");
 	if (options->factor && options->json)
-		cli_usage("--json reports a model; leave it out with --factor");
+		cli_usage("--json reports a model; leave it out with -o %s",
+			  options->factor);
 	if (options->factor) {
 		options->how.end = INCISE_TRAIN_TO_FACTOR;
 		return;

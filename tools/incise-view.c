@@ -67,17 +67,19 @@ static const struct cli_option options[] = {
 	{0, "procedure", NULL,
 	 "show a scripted procedure: cut, bleeding, enlarging, tube",
 	 CLI_FLAG(struct view_job, procedure)},
-	{0, "frames", "DIR",
+	{'o', "output", "DIR",
 	 "no window: write a PNG file for each frame into this folder",
 	 CLI_OUTPUTS(struct view_job, output.folder)},
-	{0, "video", "FILE.mkv", "no window: write a film (Matroska)",
+	{'o', "output", "FILE.mkv", "no window: write a film (Matroska)",
 	 CLI_OUTPUT(struct view_job, output.film_path), .extensions = ".mkv"},
-	{0, "strip", "FILE.png", "no window: write a few frames side by side",
+	{'o', "output", "FILE.png",
+	 "no window: write a few frames side by side, with --at",
 	 CLI_OUTPUT(struct view_job, output.strip_path), .extensions = ".png"},
+	SESSION_OPTIONS(struct view_job, session),
 	{0, "no-output", NULL,
 	 "no window and no files: draw in real time and report the frame rate",
 	 CLI_FLAG(struct view_job, no_output)},
-	{0, "at", "TIMES", "times of the frames of --strip, for example 2s,6s,12s,20s",
+	{0, "at", "TIMES", "times of the frames of FILE.png, for example 2s,6s,12s,20s",
 	 CLI_PARSED_BY(parse_times)},
 	{0, "size", "WxH", "width and height in pixels (default: 1280x720)",
 	 CLI_PARSED_BY(parse_size)},
@@ -90,7 +92,6 @@ static const struct cli_option options[] = {
 	{0, "no-panel", NULL, "draw the tissue without graphs",
 	 CLI_FLAG(struct view_job, no_panel)},
 	SCENE_ARGUMENT_OPTIONS(struct view_job, argument),
-	SESSION_OPTIONS(struct view_job, session),
 	{0, "json", NULL, "report the frames drawn as JSON, at the end",
 	 CLI_FLAG(struct view_job, json)},
 	{0},
@@ -108,7 +109,7 @@ static const struct cli_command command = {
 		 "the wheel zooms; b blade, n handle, t tube, + and - the depth of a "
 		 "press, s saves the image, q ends.",
 	.examples = "incise view neck --rig sim:mouse\n"
-		    "incise view neck --procedure --video neck.mkv",
+		    "incise view neck --procedure -o neck.mkv",
 };
 
 static void parse(struct view_job *job, int argc, char **argv)
@@ -122,13 +123,15 @@ static void parse(struct view_job *job, int argc, char **argv)
 		cli_usage("--rig, --from and --procedure exclude each other; give one of "
 			  "them");
 	if (job->output.strip_path && !job->output.n_strip)
-		cli_usage("--strip needs --at (times of its frames)");
+		cli_usage("-o %s needs --at (times of its frames)",
+			  job->output.strip_path);
 	if (job->output.n_strip && !job->output.strip_path)
-		cli_usage("--at needs --strip (file to write)");
+		cli_usage("--at needs -o FILE.png (file to write)");
 	if (job->no_output && view_output_wanted(&job->output))
-		cli_usage("--no-output does not go with --frames, --video or --strip");
+		cli_usage("--no-output does not go with -o (files to write)");
 	if (job->output.film_path && (job->output.width % 2 || job->output.height % 2))
-		cli_usage("--video needs an even width and height; change --size");
+		cli_usage("-o %s needs an even width and height; change --size",
+			  job->output.film_path);
 	if (view_output_wanted(&job->output) && !job->from && !job->procedure &&
 	    !job->duration_s)
 		cli_usage("missing --duration (a running loop has no end, but a file "

@@ -958,7 +958,7 @@ static struct incise_factor *decode_factor(struct decoder *in, size_t size)
 		incise_error_set(
 			in->err, ENOTSUP,
 			"%s: is of form 1, whose small parts reveal their pairs: "
-			"delete it, and write it again by incise train --factor",
+			"delete it, and write it again by incise train -o FILE.fac",
 			in->name);
 		return NULL;
 	}
@@ -1040,7 +1040,7 @@ struct incise_factor *incise_factor_load(const char *path, struct incise_error *
 {
 	static const struct incise_infile_kind kind = {
 		.name = "a .fac file",
-		.advice = "give a file that incise train --factor wrote",
+		.advice = "give a file that incise train -o FILE.fac wrote",
 		.size_max = 256 << 20,
 	};
 	struct incise_factor *factor;
@@ -1055,7 +1055,7 @@ struct incise_factor *incise_factor_load(const char *path, struct incise_error *
 		incise_error_set(err, EINVAL,
 				 "%s: a part of it reveals its pairs: expected at least "
 				 "%llu different pairs of %d groups; write it again by "
-				 "incise train --factor",
+				 "incise train -o FILE.fac",
 				 path, (unsigned long long)least_pairs(factor),
 				 INCISE_FACTOR_GROUPS_MIN);
 		incise_factor_free(factor);

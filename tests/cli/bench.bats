@@ -244,7 +244,7 @@ setup() {
 # bats test_tags=slow
 @test "bench precision draws a chart" {
 	command -v gnuplot >/dev/null || skip "gnuplot is not installed, it draws the chart"
-	run -0 --separate-stderr incise bench precision --quick --plot "a folder/b/chart"
+	run -0 --separate-stderr incise bench precision --quick -o "a folder/b/chart"
 	[ -z "$stderr" ]
 	[ "$(head -c 8 "a folder/b/chart.png" | od -An -tx1 | tr -d ' \n')" = 89504e470d0a1a0a ]
 	grep -q '<svg' "a folder/b/chart.svg"
@@ -255,7 +255,7 @@ setup() {
 	[ -f "a folder/b/plot/chart.gp" ]
 	grep -q '<svg' "a folder/b/chart-average.svg"
 	# into the current folder, and with a suffix
-	incise bench precision --quick --plot c.svg >/dev/null
+	incise bench precision --quick -o c.svg >/dev/null
 	[ -f c.png ] && [ -f c.svg ] && [ ! -e c.svg.svg ]
 }
 
@@ -293,8 +293,8 @@ setup() {
 	run --separate-stderr incise bench precision a b
 	bad_usage "'precision' takes at most 1 operand, got 2"
 	for name in "" -a - a/ a/.png "a'b" 'a;b' '$(id)' 'a b'; do
-		run --separate-stderr incise bench precision --quick --plot "$name"
-		bad_usage "--plot"
+		run --separate-stderr incise bench precision --quick -o "$name"
+		bad_usage "--output"
 	done
 }
 
@@ -332,7 +332,7 @@ setup() {
 # bats test_tags=slow
 @test "bench training as a table, with a chart" {
 	command -v gnuplot >/dev/null || skip "gnuplot is not installed, it draws the chart"
-	run -0 --separate-stderr incise bench training --quick --plot c
+	run -0 --separate-stderr incise bench training --quick -o c
 	[ -z "$stderr" ]
 	[[ "$output" == *$'\n'"classic "*$'\n'"default "* ]]
 	grep -q '>default chosen<' c.svg
@@ -421,7 +421,7 @@ in_order() {
 # bats test_tags=slow
 @test "bench loop draws lateness" {
 	command -v gnuplot >/dev/null || skip "gnuplot is not installed, it draws the chart"
-	run -0 --separate-stderr incise bench loop --quick --load idle --plot "a folder/w" \
+	run -0 --separate-stderr incise bench loop --quick --load idle -o "a folder/w" \
 		"$root/scenes/wall.scene"
 	[ -z "$stderr" ]
 	[ "$(head -c 8 "a folder/w-wakeups.png" | od -An -tx1 | tr -d ' \n')" = 89504e470d0a1a0a ]
@@ -430,8 +430,8 @@ in_order() {
 
 @test "bench loop: bad usage" {
 	run -2 --separate-stderr incise bench loop a b
-	run --separate-stderr incise bench loop --plot a/
-	bad_usage "--plot"
+	run --separate-stderr incise bench loop -o a/
+	bad_usage "--output"
 	run --separate-stderr incise bench loop --load much
 	bad_usage "--load: expected idle, cpu, memory, disk or view, found 'much'"
 	run --separate-stderr incise bench training --load cpu
@@ -502,7 +502,7 @@ in_order() {
 
 # bats test_tags=slow
 @test "bench stability as text, with a verdict on every ratio, and its maps" {
-	! command -v gnuplot >/dev/null || plot=(--plot "a folder/w")
+	! command -v gnuplot >/dev/null || plot=(-o "a folder/w")
 	run -0 --separate-stderr incise bench stability --quick "${plot[@]}"
 	[ -z "$stderr" ]
 	[[ "$output" == *"quick: a part of each grid"* ]]
@@ -524,7 +524,7 @@ in_order() {
 	run --separate-stderr incise bench stability a
 	failed_with "a: No such file"
 	[ -z "$output" ] # before any work
-	run --separate-stderr incise bench stability --plot a/
-	bad_usage "--plot"
+	run --separate-stderr incise bench stability -o a/
+	bad_usage "--output"
 }
 

@@ -11,7 +11,7 @@ setup_file() {
 	cd "$BATS_FILE_TMPDIR"
 	PATH=$INCISE_BUILD/bin:$PATH
 	mkdir -p t "$shared_reports"
-	TMPDIR=$PWD/t incise bench all --quick --report r >out 2>err && echo 0 >status || echo $? >status
+	TMPDIR=$PWD/t incise bench all --quick -o r >out 2>err && echo 0 >status || echo $? >status
 	cp r/data/*.json "$shared_reports"
 }
 
@@ -37,7 +37,7 @@ report_of() {
 	[ -n "$(key "$r/report.json" machine.cpu)" ]
 	[ -n "$(key "$r/report.json" date)" ]
 	[ "$(key "$r/report.json" quick)" = 1 ]
-	[ "$(key "$r/report.json" command)" = "incise bench all --report DIR --quick" ]
+	[ "$(key "$r/report.json" command)" = "incise bench all -o DIR --quick" ]
 	[ "incise $(key "$r/report.json" version)" = "$(incise --version | head -n 1)" ]
 	for benchmark in $benchmarks; do
 		case $(key "$r/report.json" "runs.$benchmark.state") in
@@ -198,7 +198,7 @@ report_of() {
 @test "a benchmark that fails stands in the report, and the others go on" {
 	few_files() (
 		ulimit -n 18
-		incise bench all --quick --report r --only precision,scenes
+		incise bench all --quick -o r --only precision,scenes
 	)
 	run --separate-stderr few_files
 	failed_with "1 of 2 benchmarks failed" r/report.md
@@ -209,9 +209,9 @@ report_of() {
 	grep -q "^## Force evaluation" r/report.md
 	run ! grep "^## Stability" r/report.md
 	# it is replaced by the next one
-	run --separate-stderr incise bench all --quick --report r --only training
+	run --separate-stderr incise bench all --quick -o r --only training
 	failed_with r/report.html exists --overwrite
-	incise bench all --quick --report r --overwrite --only training --json >r.json
+	incise bench all --quick -o r --overwrite --only training --json >r.json
 	cmp <(sqlite3 :memory: "SELECT json(readfile('r.json'))") \
 		<(sqlite3 :memory: "SELECT json(readfile('r/report.json'))")
 	[ "$(ls r)" = "$(printf '%s\n' data plots report.html report.json report.md)" ]
@@ -221,12 +221,12 @@ report_of() {
 # bats test_tags=slow
 @test "what changed since another report stands in it" {
 	# figures that are exact, of the same program
-	incise bench all --quick --report r --only training
-	run --separate-stderr incise bench all --quick --report r --overwrite --only training \
+	incise bench all --quick -o r --only training
+	run --separate-stderr incise bench all --quick -o r --overwrite --only training \
 		--against r/report.json
 	failed_with r/report.json "is an input"
 	cp r/report.json first.json
-	run --separate-stderr incise bench all --quick --report r --overwrite --only training,precision \
+	run --separate-stderr incise bench all --quick -o r --overwrite --only training,precision \
 		--against first.json
 	grep -q "^## Changes" r/report.md
 	# the exact ones are; times may be worse by chance
@@ -243,13 +243,13 @@ report_of() {
 	# of an older one that was better, and had more
 	jq '.benchmarks.training.figures |= map(if .name == "classic error on unseen cuts" then .value = 1e-9 else . end) +
 		[{name: "other", kind: "exact", unit: "mm", value: 1}]' r/report.json >old.json
-	run --separate-stderr incise bench all --quick --report r --overwrite --only training --against old.json
+	run --separate-stderr incise bench all --quick -o r --overwrite --only training --against old.json
 	failed_with "worse or missing compared with old.json; r/report.md says which"
 	grep -qF -- "- Missing: training: other" r/report.md
 	grep -qE "^\| training \| .* \| 1.000×10⁻⁹ \| .* \| yes \|$" r/report.md
 	# what is none is said before anything is measured
 	echo '{}' >none.json
-	run --separate-stderr incise bench all --quick --report new --against none.json
+	run --separate-stderr incise bench all --quick -o new --against none.json
 	failed_with none.json
 	[ ! -e new ]
 	run --separate-stderr incise bench all --from r --against old.json
@@ -278,12 +278,12 @@ report_of() {
 @test "what is no report is refused, and stays" {
 	mkdir other
 	echo mine >other/report.json
-	run --separate-stderr incise bench all --report other
-	failed_with "other: not empty and not a report; give another --report DIR"
+	run --separate-stderr incise bench all -o other
+	failed_with "other: not empty and not a report; give another -o DIR"
 	[ "$(cat other/report.json)" = mine ]
 	[ "$(ls -A other)" = report.json ]
 	touch file
-	run --separate-stderr incise bench all --report file
+	run --separate-stderr incise bench all -o file
 	failed_with "file: Not a directory"
 	run --separate-stderr incise bench all --from other
 	failed_with other/report.json
@@ -296,16 +296,16 @@ report_of() {
 
 @test "bad usage of bench all" {
 	run --separate-stderr incise bench all
-	bad_usage "expected --report DIR, or --from DIR"
-	run --separate-stderr incise bench all --report a --from b
-	bad_usage "expected --report DIR, or --from DIR"
-	run --separate-stderr incise bench all --report a --only precision,nosuch
+	bad_usage "expected -o DIR, or --from DIR"
+	run --separate-stderr incise bench all -o a --from b
+	bad_usage "expected -o DIR, or --from DIR"
+	run --separate-stderr incise bench all -o a --only precision,nosuch
 	bad_usage "found 'nosuch'"
 	run --separate-stderr incise bench all --from b --quick
 	bad_usage "--from measures nothing"
-	run --separate-stderr incise bench all --report ""
+	run --separate-stderr incise bench all -o ""
 	bad_usage "the folder has no name"
-	run --separate-stderr incise bench all --report a precision
+	run --separate-stderr incise bench all -o a precision
 	bad_usage "takes options only"
 	[ ! -e a ]
 }
@@ -314,7 +314,7 @@ report_of() {
 	cp -r "$r" old
 	cp old/report.json was.json
 	for folder in old "new/one"; do
-		incise bench all --report "$folder" --overwrite --only stability 2>err &
+		incise bench all -o "$folder" --overwrite --only stability 2>err &
 		pid=$!
 		until [ -e "$folder/.unfinished/data/stability.json" ]; do sleep 0.05; done
 		until child=$(ps -o pid= --ppid "$pid" | tr -d ' ') && [ -n "$child" ]; do sleep 0.05; done

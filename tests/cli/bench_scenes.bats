@@ -88,7 +88,7 @@ in_plan() {
 
 @test "bench scenes says it as text, and draws bars" {
 	command -v gnuplot >/dev/null || skip "gnuplot is not installed, it draws the bars"
-	run -0 --separate-stderr incise bench scenes --quick neck wall --plot bars
+	run -0 --separate-stderr incise bench scenes --quick neck wall -o bars
 	[ -z "$stderr" ]
 	[[ "$output" == *$'\nwall '*" same"* ]]
 	[[ "$output" == *"tissue.plane_N_mm is 0"* ]]

@@ -20,7 +20,7 @@ draws() {
 	[ "$(wc -l <out)" = 1 ]
 	[[ "$(cat out)" =~ ^[0-9.]+\ frames\ per\ second:\ [0-9]+\ in\ [0-9.]+\ s,\ 1280x720,\ 2048\ texels,\ .+ ]]
 	run --separate-stderr incise view "$root/scenes/neck.scene" --procedure --no-output \
-		--strip a.png --at 1s
+		-o a.png --at 1s
 	bad_usage "--no-output"
 }
 
@@ -28,7 +28,7 @@ draws() {
 @test "bench view reports as JSON, and draws a chart" {
 	draws
 	command -v gnuplot >/dev/null || skip "gnuplot is not installed, it draws the chart"
-	run -0 --separate-stderr incise bench view --quick --json --plot "a folder/v"
+	run -0 --separate-stderr incise bench view --quick --json -o "a folder/v"
 	[ -z "$stderr" ]
 	echo "$output" >r.json
 	[ "$(key r.json quick)" = 1 ]
@@ -65,8 +65,8 @@ draws() {
 @test "bench view: bad usage" {
 	run --separate-stderr incise bench view a b
 	bad_usage "at most one scene"
-	run --separate-stderr incise bench view --plot a/
-	bad_usage "--plot"
+	run --separate-stderr incise bench view -o a/
+	bad_usage "--output"
 	run --separate-stderr incise bench view none.scene
 	failed_with none.scene
 	run --separate-stderr incise bench --json view

@@ -14,7 +14,7 @@ setup() {
 	for latency in 4.2 11; do
 		echo 'tracker_delay_ms = 1.5;' >calibration.conf
 		incise calibrate delay --rig $rig,tracker_latency_ms=$latency --duration 15s \
-			--report rep --overwrite --json >r.json </dev/null
+			-o rep --overwrite --json >r.json </dev/null
 		left=$(key r.json 'values[0].left')
 		u=$(key r.json 'values[0].u')
 		[ "$(key r.json 'values[0].key')" = tracker_delay_ms ]
@@ -31,7 +31,7 @@ setup() {
 
 # bats test_tags=slow
 @test "the camera too, and any of them is the reference" {
-	incise calibrate delay --rig $rig --duration 12s --with-camera --keep k.rec --json --dry-run >r.json </dev/null
+	incise calibrate delay --rig $rig --duration 12s --with-camera -o k.rec --json --dry-run >r.json </dev/null
 	[ ! -e calibration.conf ]
 	holds "($(key r.json 'values[2].left'))^2 < 0.3^2"
 	[ "$(key r.json 'values[2].key')" = camera_delay_ms ]

@@ -82,7 +82,7 @@ pairs() {
 @test "two points by vision on the virtual rig" {
 	need_vision
 	run -0 --separate-stderr incise calibrate depth two-point --rig rig.conf --images 40 \
-		--nominal 0.13 --keep kept.csv --json </dev/null
+		--nominal 0.13 -o kept.csv --json </dev/null
 	[ -z "$stderr" ]
 	echo "$output" >report.json
 	# 0.1 % is what is to be reached
@@ -204,7 +204,7 @@ pairs() {
 @test "a recording gives both" {
 	need_vision
 	need_recording
-	run -0 incise calibrate depth line --from "$BATS_FILE_TMPDIR/cut.rec" --nominal 0.13 --keep pairs.csv --json
+	run -0 incise calibrate depth line --from "$BATS_FILE_TMPDIR/cut.rec" --nominal 0.13 -o pairs.csv --json
 	echo "$output" >line.json
 	holds "($(key line.json depth_mm_px) - 0.13)^2 < 0.00013^2"
 	holds "$(key line.json readings) > 200"
@@ -222,7 +222,7 @@ pairs() {
 	need_board
 	truth=$BATS_FILE_TMPDIR/truth.json
 	run -0 --separate-stderr incise calibrate depth board --from "$BATS_FILE_TMPDIR"/board/view*.pgm \
-		--board 9x6 --square 5mm --keep corners.csv --report report
+		--board 9x6 --square 5mm -o corners.csv -o report
 	[ -z "$stderr" ]
 	[ "$(key report/report.json pass)" = 1 ]
 	holds "($(key report/report.json depth_mm_px) / $(key "$truth" mm_px) - 1)^2 < 0.001^2"

@@ -24,7 +24,7 @@ made_weights() {
 	command -v gnuplot || skip "gnuplot is not installed"
 	run -0 --separate-stderr incise calibrate force \
 		--rig sim:clock=simulated,seed=5,force_mV_N=1265.5,force_zero_mV=160 \
-		--weights 50g,100g,0.15kg,200g,300g --keep pairs.csv --report r --zero </dev/null
+		--weights 50g,100g,0.15kg,200g,300g -o pairs.csv -o r --zero </dev/null
 	# the sim's force is exact: codes and noise leave 0.01 %
 	mV_N=$(key r/report.json sensitivity_mV_N)
 	holds "$mV_N > 1265.5 * 0.9999 && $mV_N < 1265.5 * 1.0001"
@@ -69,7 +69,7 @@ made_weights() {
 	[[ "${lines[-2]}" == *", within 5 %; U = "* ]]
 	[ "${lines[-1]}" = "wrote calibration.conf: active from now on" ]
 	# the next one has the date of this one, whose value is the same
-	run -0 incise calibrate force --from w.csv --latitude 48 --dry-run --report r
+	run -0 incise calibrate force --from w.csv --latitude 48 --dry-run -o r
 	[[ "${lines[-5]}" =~ ^result\ +value\ ±\ U\ \(k\ =\ 2\)\ +previous\ +change$ ]] || complain "$output"
 	[[ "${lines[-4]}" == "force_mV_N  12"*" ± "*" mV/N  12"*" ($(date -u +%Y)-"*")  +0.0"*" mV/N (+0.00 %)" ]] || complain "$output"
 	[ "${lines[-2]}" = "calibration.conf: not written (--dry-run)" ]
@@ -85,12 +85,12 @@ made_weights() {
 
 @test "outliers up to one in ten are listed, more are refused" {
 	made_weights "if (i == 9 || i == 20) r += 400" >w.csv
-	run -0 incise calibrate force --from w.csv --report r
+	run -0 incise calibrate force --from w.csv -o r
 	[[ "$output" == *"26 of 28 used"*"2 outliers"* ]]
 	[[ "$output" == *"pair 9 "*"outlier"*"pair 20 "*"outlier"* ]]
 	cp calibration.conf before
 	made_weights "if (i % 7 == 3) r += 400 + 50 * s" >w.csv
-	run --separate-stderr incise calibrate force --from w.csv --report r --overwrite
+	run --separate-stderr incise calibrate force --from w.csv -o r --overwrite
 	failed_with "refused" "of 28 pairs are outliers" "calibration.conf stays as it was"
 	cmp calibration.conf before
 	grep -q "^refused: " r/report.txt

@@ -48,7 +48,7 @@ made_points() {
 
 # bats test_tags=check
 @test "finds what the virtual actuator is made of, and writes it" {
-	stepper --rig $bench,backlash_mm=0.04,stall_mm_s=9 --json --keep points.csv
+	stepper --rig $bench,backlash_mm=0.04,stall_mm_s=9 --json -o points.csv
 	[ "$status" -eq 0 ] || complain "$stderr"
 	[ -z "$stderr" ]
 	echo "$output" >r.json
@@ -172,7 +172,7 @@ made_points() {
 @test "a report with pictures, text and JSON" {
 	command -v gnuplot >/dev/null || skip "needs gnuplot"
 	made_points '' >p.csv
-	incise calibrate stepper --from p.csv --dry-run --report bench >out
+	incise calibrate stepper --from p.csv --dry-run -o bench >out
 	for file in fit.png residuals.png; do
 		[ "$(head -c 4 bench/$file | tail -c 3)" = PNG ]
 	done

@@ -21,7 +21,7 @@ within() {
 
 # bats test_tags=check
 @test "the tip of the virtual rig is found, with its uncertainty, and kept" {
-	incise calibrate tip --rig $rig --duration 20s --keep p.csv --report rep --json >r.json </dev/null
+	incise calibrate tip --rig $rig --duration 20s -o p.csv -o rep --json >r.json </dev/null
 	within 0 3
 	within 1 -20
 	within 2 60
@@ -57,8 +57,8 @@ within() {
 	paste -d '|' a.rows b.rows | awk -F '|' '
 		$1 == $3 { n++; if (($2 - $4) ^ 2 > 0.35 ^ 2) bad = 1 } END { exit bad || n < 400 }'
 	incise haptic "$root/scenes/liver.scene" --rig "$cut" --duration 3s \
-		--log a.csv
-	incise haptic "$root/scenes/liver.scene" --rig sim:clock=simulated --duration 3s -c none --log b.csv
+		-o a.csv
+	incise haptic "$root/scenes/liver.scene" --rig sim:clock=simulated --duration 3s -c none -o b.csv
 	holds "$(paste -d, a.csv b.csv | awk -F, 'NR == 1 {
 			for (i = 1; i <= NF / 2; i++) if ($i == "depth_mm") c = i
 			n = NF / 2; next }
@@ -81,7 +81,7 @@ within() {
 	failed_with "a cone of" "at least 60 are required"
 	run --separate-stderr incise calibrate tip --rig sim:clock=simulated --duration 10s </dev/null
 	failed_with "one axis only"
-	incise calibrate tip --rig $rig --duration 10s --keep p.csv --dry-run </dev/null
+	incise calibrate tip --rig $rig --duration 10s -o p.csv --dry-run </dev/null
 	head -n 10 p.csv >few.csv
 	run --separate-stderr incise calibrate tip --from few.csv
 	failed_with "too few"
@@ -122,7 +122,7 @@ within() {
 	run -0 --separate-stderr incise export --no-lineage a.rec --uncertainty total --rate 100 -o a.csv
 	[[ "$stderr" != *depth* && "$stderr" != *delay* ]] || complain "$stderr"
 	# typed, left out, ended by Ctrl-C, which writes nothing
-	incise calibrate tip --rig sim:clock=simulated,motion=1 --duration 20s --keep p.csv -c x.conf </dev/null
+	incise calibrate tip --rig sim:clock=simulated,motion=1 --duration 20s -o p.csv -c x.conf </dev/null
 	for answer in '0.2\n' '\n' '\x03' 'far\n'; do
 		rm -f x.conf
 		status=0

@@ -81,7 +81,7 @@ setup() {
 }
 
 @test "the C that is exported computes what the compiled model does" {
-	incise compile m.fis -o m.fx --c-source "pig liver.c"
+	incise compile m.fis -o m.fx -o "pig liver.c"
 	cat >main.c <<-E
 		#include <inttypes.h>
 		#include <stdio.h>

@@ -88,7 +88,7 @@ sorted() {
 	# options in between are no operands, and their arguments neither
 	complete_words incise tool --json neck tu
 	[ "${COMPREPLY[*]}" = tube ]
-	complete_words incise replay --log ticks.csv a.rec ne
+	complete_words incise replay -o ticks.csv a.rec ne
 	[[ " ${COMPREPLY[*]} " == *" neck "* ]]
 }
 
@@ -127,7 +127,7 @@ sorted() {
 	[ "$(sorted)" = "cuts.rec folder s.session" ]
 	complete_words incise info m
 	[ "$(sorted)" = "m.fis m.fx" ]
-	complete_words incise bench all --report ""
+	complete_words incise bench all -o ""
 	[ "$(sorted)" = "cuts.rec folder" ]
 	# where none has such a name, any file
 	complete_words incise train m.f

@@ -12,7 +12,7 @@ setup() {
 # Made once, from a folder of its own, into one whose name is awkward.
 need_demo() {
 	[ -e "$demo" ] || (cd "$BATS_FILE_TMPDIR" &&
-		incise demo --report "my demo's" --duration 6s --seed 3 >printed 2>warned)
+		incise demo -o "my demo's" --duration 6s --seed 3 >printed 2>warned)
 }
 
 pictures="fig2-force fig3a-membership fig3b-surface fig5-prediction tick-lateness camera"
@@ -115,7 +115,7 @@ pictures="fig2-force fig3a-membership fig3b-surface fig5-prediction tick-latenes
 @test "demo does not write into a folder that exists" {
 	need_demo
 	before=$(sha256sum <"$demo/summary.json")
-	run --separate-stderr incise demo --report "$demo" --duration 1s
+	run --separate-stderr incise demo -o "$demo" --duration 1s
 	failed_with "my demo's" "File exists" --overwrite
 	[ -z "$output" ]
 	[ "$(sha256sum <"$demo/summary.json")" = "$before" ]
@@ -125,7 +125,7 @@ pictures="fig2-force fig3a-membership fig3b-surface fig5-prediction tick-latenes
 # demo catches it.
 interrupted_in() {
 	local group pid mask
-	env --default-signal=INT setsid incise demo --report part --duration 1h >out 2>err 3>&- &
+	env --default-signal=INT setsid incise demo -o part --duration 1h >out 2>err 3>&- &
 	group=$!
 	for ((i = 0; i < 6000; i++)); do
 		pid=$(awk -v group=$group -v name="(incise-$1)" '$5 == group && $2 == name { print $1 }' \
@@ -152,7 +152,7 @@ interrupted_in() {
 	interrupted_in capture
 	# A folder of something else is none of its own, and one that is whole is no part.
 	mkdir other
-	run --separate-stderr incise demo --report other
+	run --separate-stderr incise demo -o other
 	failed_with other "File exists"
 	[ ! -e "$demo/.unfinished" ]
 }
@@ -160,17 +160,17 @@ interrupted_in() {
 # bats test_tags=check
 @test "demo without gnuplot says what to install, and leaves nothing" {
 	mkdir empty
-	run --separate-stderr env PATH="$PWD/empty" "$INCISE_BUILD/bin/incise" demo --report x
+	run --separate-stderr env PATH="$PWD/empty" "$INCISE_BUILD/bin/incise" demo -o x
 	failed_with gnuplot-nox
 	[ ! -e x ]
 }
 
 @test "demo where it cannot write" {
-	run --separate-stderr incise demo --report no/such/folder
+	run --separate-stderr incise demo -o no/such/folder
 	failed_with no/such/folder "No such file"
 	touch file
-	run --separate-stderr incise demo --report file
+	run --separate-stderr incise demo -o file
 	failed_with file
-	run --separate-stderr incise demo --report file --overwrite
+	run --separate-stderr incise demo -o file --overwrite
 	failed_with file
 }

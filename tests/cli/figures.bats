@@ -106,11 +106,11 @@ finds() {
 
 @test "the style can be changed, and stays" {
 	incise capture -o a.rec --rig sim:clock=simulated,times=1,pause_s=0.1 --duration 2s >/dev/null
-	incise replay a.rec wall --plot a >/dev/null
+	incise replay a.rec wall -o a.png >/dev/null
 	sed -i "s/^blue = .*/blue = '#123456'/" plot/style.gp
-	incise replay a.rec wall --plot b >/dev/null
+	incise replay a.rec wall -o b.png >/dev/null
 	grep -qi 'rgb( *18, *52, *86)' b.svg
-	incise replay a.rec wall --plot b --overwrite >/dev/null
+	incise replay a.rec wall -o b.png --overwrite >/dev/null
 	cmp plot/style.gp "$root/tools/cli/style.gp"
 	(cd plot && gnuplot -e "ext='pdf'" a.gp)
 	[ "$(head -c 5 a.pdf)" = %PDF- ]
@@ -131,21 +131,21 @@ finds() {
 		--duration 3s >/dev/null
 	cp "$root/scenes/liver.scene" .
 	cp m.fis liver.fis
-	incise replay a.rec liver.scene --plot replay >/dev/null
+	incise replay a.rec liver.scene -o replay.png >/dev/null
 	measured replay.svg
 	grep -q '>recorded<' replay.svg
 }
 
 @test "figures of calibrations" {
 	calibrate() {
-		incise calibrate "$1" "${@:3}" --report "$2" --overwrite </dev/null >/dev/null 2>&1
+		incise calibrate "$1" "${@:3}" -o "$2" --overwrite </dev/null >/dev/null 2>&1
 		measured "$2"/fit.svg "$2"/residuals.svg
 	}
 	sim=sim:clock=simulated
 	calibrate force force --rig $sim,seed=5 --weights 50g,100g,200g,300g --zero
 	calibrate tip tip --rig $sim,motion=1,tip_x_mm=3,tip_y_mm=-20,tip_z_mm=60 --duration 20s
 	calibrate stepper stepper --rig $sim,bench=1,handle_friction_N=0,backlash_mm=0.04,stall_mm_s=9
-	incise calibrate delay --rig $sim,motion=2 --duration 15s --report delay </dev/null >/dev/null
+	incise calibrate delay --rig $sim,motion=2 --duration 15s -o delay </dev/null >/dev/null
 	measured delay/fit.svg
 	awk 'BEGIN { print "depth_mm,length_px"; for (i = 0; i < 40; i++)
 		printf "%.3f,%.3f\n", i / 2, 380 - i * 4 + 0.1 * ((i * 7919 % 101) / 101 - 0.5) - (i == 9) * 30 }' >p.csv

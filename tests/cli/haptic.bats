@@ -23,7 +23,7 @@ teardown() {
 
 # The scene bad.scene is refused with these texts; nothing is printed.
 refuses() {
-	run --separate-stderr incise haptic bad.scene --rig $quick --duration 1s --log l.csv
+	run --separate-stderr incise haptic bad.scene --rig $quick --duration 1s -o l.csv
 	failed_with "$@" || return
 	[ -z "$output" ] || complain "printed: $output" || return
 	[ ! -e l.csv ] || complain "wrote a log"
@@ -38,7 +38,7 @@ refuses() {
 
 # bats test_tags=check
 @test "haptic reports as JSON" {
-	incise haptic liver.scene --rig $quick --duration 3s --json --log l.csv >r.json
+	incise haptic liver.scene --rig $quick --duration 3s --json -o l.csv >r.json
 	[ "$(key r.json ticks)" = 3000 ]
 	[ "$(key r.json skipped)" = 0 ]
 	[ "$(key r.json rate_hz)" = 1000.0 ]
@@ -67,7 +67,7 @@ refuses() {
 @test "the log has every tick, and its forces are the model's" {
 	# but for that along the cut
 	sed -i 's/fracture_J_m2 = .*;/fracture_J_m2 = 0.0;/' liver.scene
-	incise haptic liver.scene --rig $quick --duration 3s --arith double --log l.csv
+	incise haptic liver.scene --rig $quick --duration 3s --arith double -o l.csv
 	[ "$(head -n 1 l.csv)" = \
 		t_s,x_mm,y_mm,z_mm,depth_mm,velocity_mm_s,command_N,rendered_N,flags,phase,command_x_N,command_y_N,command_z_N,tool ]
 	[ "$(wc -l <l.csv)" -eq 3001 ]
@@ -87,7 +87,7 @@ refuses() {
 		sed 's/^tissue = {/& withdrawal = "paper";/' liver.scene
 		echo 'device = { damping_N_s_mm = 0.05; };'
 	} >paper.scene
-	incise haptic paper.scene --rig $quick --duration 3s --arith double --log p.csv
+	incise haptic paper.scene --rig $quick --duration 3s --arith double -o p.csv
 	beside_the_model p.csv >both
 	awk '($3 - $4)^2 > 1e-8 { print; exit 1 }' both
 }
@@ -101,32 +101,32 @@ beside_the_model() {
 }
 
 @test "fixed point and double feel alike" {
-	incise haptic liver.scene --rig $quick --duration 2s --arith double --log double.csv
-	incise haptic liver.scene --rig $quick --duration 2s --arith fixed --log fixed.csv
+	incise haptic liver.scene --rig $quick --duration 2s --arith double -o double.csv
+	incise haptic liver.scene --rig $quick --duration 2s --arith fixed -o fixed.csv
 	# what was promised is 1 mN; they are not the same, so two arithmetics ran
 	paste -d, double.csv fixed.csv | awk -F, '
 		NR > 1 { e = $7 - $21; if (e < 0) e = -e; if (e > m) m = e }
 		END { print m; exit !(m < 1e-3 && m > 0) }'
 	# the scene says fixed
-	incise haptic liver.scene --rig $quick --duration 2s --log scene.csv
+	incise haptic liver.scene --rig $quick --duration 2s -o scene.csv
 	cmp fixed.csv scene.csv
 }
 
 @test "haptic is the same every time" {
-	incise haptic liver.scene --rig $quick --duration 2s --log a.csv
-	incise haptic liver.scene --rig $quick --duration 2s --log b.csv
+	incise haptic liver.scene --rig $quick --duration 2s -o a.csv
+	incise haptic liver.scene --rig $quick --duration 2s -o b.csv
 	cmp a.csv b.csv
-	incise haptic liver.scene --rig $quick,seed=2 --duration 2s --log c.csv
+	incise haptic liver.scene --rig $quick,seed=2 --duration 2s -o c.csv
 	run ! cmp -s a.csv c.csv
 }
 
 @test "no force is over the limit, and none changes faster than it may" {
-	incise haptic liver.scene --rig $quick --duration 3s --log free.csv
+	incise haptic liver.scene --rig $quick --duration 3s -o free.csv
 	cat >tight.scene <<-'EOF'
 		model = "liver.fis";
 		limits = { force_N = 0.2; slew_N_s = 5.0; };
 	EOF
-	incise haptic tight.scene --rig $quick --duration 3s --log l.csv --json >r.json
+	incise haptic tight.scene --rig $quick --duration 3s -o l.csv --json >r.json
 	# five decimals are printed; the slew is 5 mN a tick
 	awk -F, 'NR > 1 { if ($7 > 0.200005 || $7 < 0) exit 1
 		d = $7 - last; if (d > 0.00501 || d < -0.00501) exit 1; last = $7 }' l.csv
@@ -162,8 +162,8 @@ beside_the_model() {
 		model = "liver.fis";
 		surface = { point_mm = [0.0, 0.0, -2.0]; normal = [0, 0, 7]; };
 	EOF
-	incise haptic liver.scene --rig $quick --duration 2s --log a.csv
-	incise haptic deep.scene --rig $quick --duration 2s --log b.csv
+	incise haptic liver.scene --rig $quick --duration 2s -o a.csv
+	incise haptic deep.scene --rig $quick --duration 2s -o b.csv
 	# 2 mm lower: where it is touched, depth is 2 mm less, to the printed 0.1 um
 	paste -d, a.csv b.csv | awk -F, '$23 ~ /^c/ && $19 > 0 { n++; if (($5 - $19 - 2)^2 > 4.1e-8) exit 1 }
 		END { exit n < 500 }'
@@ -200,14 +200,14 @@ beside_the_model() {
 }
 
 @test "a log that cannot be is said before the run, and so is one that does not fit" {
-	run --separate-stderr timeout 60 incise haptic liver.scene --rig sim: --no-rt --duration 1h --log none/l.csv
+	run --separate-stderr timeout 60 incise haptic liver.scene --rig sim: --no-rt --duration 1h -o none/l.csv
 	failed_with none/l.csv
 	# the most ticks that there can be: 1.7 billion of some 200 bytes
 	sed 's/^rate_hz.*/rate_hz = 20000.0;/' liver.scene >quick.scene
 	[ "$(awk '/^MemTotal/ { print $2 }' /proc/meminfo)" -lt 600000000 ] || skip "the longest log fits"
 	run --separate-stderr timeout 60 incise haptic quick.scene --rig sim: --no-rt --duration 24h \
-		--log l.csv
-	failed_with --log --duration
+		-o l.csv
+	failed_with l.csv --duration
 	[ ! -e l.csv ]
 }
 
@@ -245,7 +245,7 @@ beside_the_model() {
 	incise export --no-lineage d.rec --rate 100 -o d.csv
 	incise train d.csv --inputs depth_mm,velocity_mm_s,acceleration_mm_s2 --mf 3,2,1 -o d.fis
 	printf 'model = "d.fis"; arithmetic = "double"; tissue = { gain = 0.5; };\n' >d.scene
-	incise haptic d.scene --rig $quick --duration 3s --log l.csv --json >r.json
+	incise haptic d.scene --rig $quick --duration 3s -o l.csv --json >r.json
 	[ "$(key r.json ticks)" = 3000 ]
 	# a force, and none beyond the limit
 	python3 - <<-'END'
@@ -264,7 +264,7 @@ beside_the_model() {
 	refuses bad.scene "not stable"
 	# in integers the same, within what is certified
 	printf 'model = "d.fis"; tissue = { gain = 0.5; };\n' >f.scene
-	incise haptic f.scene --rig $quick --duration 3s --log f.csv >out
+	incise haptic f.scene --rig $quick --duration 3s -o f.csv >out
 	incise plan f.scene --json >p.json
 	[ "$(key p.json model.evaluator)" = direct ]
 	python3 - "$(key p.json bound_N)" <<-'END'
@@ -300,18 +300,18 @@ beside_the_model() {
 }
 
 @test "haptic: a full disk loses the log, not the summary of the run" {
-	run --separate-stderr incise haptic liver.scene --rig $quick --duration 1s --log /dev/full
+	run --separate-stderr incise haptic liver.scene --rig $quick --duration 1s -o /dev/full
 	failed_with /dev/full "No space left"
 	[[ "$output" == *"1000 ticks at 1000 Hz"* && "$output" == *"force      largest"* ]] ||
 		complain "$output"
-	run --separate-stderr incise haptic liver.scene --rig $quick --duration 1s --log /dev/full --json
+	run --separate-stderr incise haptic liver.scene --rig $quick --duration 1s -o /dev/full --json
 	failed_with /dev/full "No space left"
 	[ "$(jq .ticks <<<"$output")" = 1000 ]
 }
 
 @test "the log to standard output is all that is there" {
-	incise haptic liver.scene --rig $quick --duration 200ms --log - >out
-	incise haptic liver.scene --rig $quick --duration 200ms --log l.csv >report
+	incise haptic liver.scene --rig $quick --duration 200ms -o - >out
+	incise haptic liver.scene --rig $quick --duration 200ms -o l.csv >report
 	cmp out l.csv
 	[ -s report ]
 }
@@ -338,7 +338,7 @@ rms() { awk -F, "NR > 1 { sum += ($2) ^ 2 } END { printf \"%.9f\", sqrt(sum / (N
 @test "two axes feel the plane constraint, and one counts it as not felt" {
 	turned_blade
 	for n in 1 2 3; do
-		incise haptic side.scene --rig $cut,axes=$n --duration 2s --json --log $n.csv >$n.json
+		incise haptic side.scene --rig $cut,axes=$n --duration 2s --json -o $n.csv >$n.json
 		[ "$(key $n.json "actuators[#-1].direction")" = "$(key $n.json "actuators[$((n - 1))].direction")" ]
 	done
 	[ "$(key 3.json "actuators[0].direction")" = "[0.0,0.0,1.0]" ]

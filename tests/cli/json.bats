@@ -20,7 +20,7 @@ models() {
 	printf '5 20\n' >points
 	report train train pairs.csv -o m.fis
 	report train.groups train pairs.csv -o g.fis --group cut --check 0.3
-	incise train <(many_pairs 8) --premises m.fis --group cut --factor m.fac >/dev/null
+	incise train <(many_pairs 8) --premises m.fis --group cut -o m.fac >/dev/null
 	report merge merge m.fac -o merged.fis
 	report eval eval m.fis points
 	report eval.sd eval m.fis points --sd
@@ -70,7 +70,7 @@ loops() {
 	printf 'surface = { kind = "mesh"; file = "open.obj"; };\ntissue = { reaction_N_mm = 0.1; };\n' >open.scene
 	report plan.open plan open.scene
 	report plan.rig plan neck.scene --rig "$short"
-	report haptic haptic neck.scene --rig "$short" --duration 4s --session s.session
+	report haptic haptic neck.scene --rig "$short" --duration 4s -o s.session
 	report haptic.real_time haptic liver.scene --rig sim: --no-rt --overruns 0 --duration 1s
 	cp s.session out/session.json
 	report assess assess s.session
@@ -113,10 +113,10 @@ calibrations() {
 	report calibrate-force calibrate force --weights 50g,100g,0.15kg,200g,300g --zero \
 		--rig sim:clock=simulated,force_zero_mV=160
 	report calibrate-depth calibrate depth two-point --length 47.5mm --pixels 400
-	report calibrate-tip calibrate tip --duration 20s --keep poses.csv \
+	report calibrate-tip calibrate tip --duration 20s -o poses.csv \
 		--rig sim:clock=simulated,motion=1,tip_x_mm=3,tip_y_mm=-20,tip_z_mm=60
 	report calibrate-delay calibrate delay --rig sim:clock=simulated,motion=2 --duration 15s
-	report calibrate-stepper calibrate stepper --keep points.csv \
+	report calibrate-stepper calibrate stepper -o points.csv \
 		--rig sim:clock=simulated,bench=1,handle_friction_N=0,backlash_mm=0.04,stall_mm_s=9
 	report calibrate-stepper.from calibrate stepper --from points.csv --dry-run
 	report calibrate-check calibrate check
@@ -137,8 +137,8 @@ setup_file() {
 	devices
 	calibrations
 	[ ! -x "$INCISE_BUILD/bin/incise-view" ] ||
-		report view view neck.scene --procedure --frames fr --fps 2 --duration 1s --size 160x120
-	! command -v gnuplot >/dev/null || report demo demo --report demo --duration 1s
+		report view view neck.scene --procedure -o fr --fps 2 --duration 1s --size 160x120
+	! command -v gnuplot >/dev/null || report demo demo -o demo --duration 1s
 }
 
 setup() {

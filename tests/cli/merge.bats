@@ -65,9 +65,9 @@ large_shares() {
 	large_shares
 	incise train s1.csv --group cut --mf 3,3 -o start.fis >/dev/null
 	incise train s?.csv --premises start.fis --group cut -o all.fis >/dev/null
-	incise train s1.csv --premises start.fis --group cut --factor a.fac >/dev/null
-	incise train s4.csv s3.csv --premises start.fis --group cut --factor b.fac >/dev/null
-	incise train s2.csv --premises start.fis --group cut --factor c.fac >/dev/null
+	incise train s1.csv --premises start.fis --group cut -o a.fac >/dev/null
+	incise train s4.csv s3.csv --premises start.fis --group cut -o b.fac >/dev/null
+	incise train s2.csv --premises start.fis --group cut -o c.fac >/dev/null
 	incise merge c.fac a.fac b.fac -o merged.fis >out
 	grep -q "3 factors: 32000 pairs of 320 groups from 4 sources" out
 	cmp all.fis merged.fis
@@ -75,7 +75,7 @@ large_shares() {
 	incise merge a.fac b.fac -o ab.fac >/dev/null
 	incise merge ab.fac c.fac -o - >twice.fis
 	cmp all.fis twice.fis
-	incise train s?.csv --premises start.fis --group cut --factor all.fac >/dev/null
+	incise train s?.csv --premises start.fis --group cut -o all.fac >/dev/null
 	incise merge ab.fac c.fac -o abc.fac >/dev/null
 	cmp all.fac abc.fac
 	[ "$(stat -c %s all.fac)" -lt 160000 ]
@@ -87,20 +87,20 @@ large_shares() {
 	shares
 	cuts tiny.csv 90 93 400
 	incise train s1.csv --group cut --mf 3,3 -o start.fis >/dev/null
-	incise train s1.csv --premises start.fis --group cut --factor a.fac >out
+	incise train s1.csv --premises start.fis --group cut -o a.fac >out
 	grep -q "^1 of 5 parts, as small ones would reveal their pairs" out
 	grep -aq "^part 5 1250 1000 5$" a.fac
-	incise train s2.csv --premises start.fis --group cut --factor b.fac >/dev/null
+	incise train s2.csv --premises start.fis --group cut -o b.fac >/dev/null
 	incise merge a.fac b.fac -o m.fis >out
 	grep -q "^1 of 5 parts: the factors have small ones joined$" out
 	# 4 cuts; 41 elements of a row have 1711 sums; rows without cuts may be of one
-	run --separate-stderr incise train tiny.csv --premises start.fis --group cut --factor few.fac
+	run --separate-stderr incise train tiny.csv --premises start.fis --group cut -o few.fac
 	failed_with few.fac "1600 different pairs of 4 groups" "of 5 groups"
 	incise train s1.csv --group cut --mf 5,4 -o big.fis >/dev/null 2>&1
-	run --separate-stderr incise train s1.csv --premises big.fis --group cut --factor few.fac
+	run --separate-stderr incise train s1.csv --premises big.fis --group cut -o few.fac
 	failed_with few.fac "1250 different pairs of 5 groups" "1953 pairs"
 	sed 's/^cut/number/' s1.csv >plain.csv
-	run --separate-stderr incise train plain.csv --premises start.fis --factor few.fac
+	run --separate-stderr incise train plain.csv --premises start.fis -o few.fac
 	failed_with few.fac "of 0 groups"
 	[ ! -e few.fac ]
 	# of before
@@ -112,17 +112,17 @@ large_shares() {
 @test "merge refuses what does not belong together, by name" {
 	shares
 	incise train s1.csv --mf 3,3 -o start.fis >/dev/null
-	incise train s1.csv --premises start.fis --group cut --factor a.fac >/dev/null
+	incise train s1.csv --premises start.fis --group cut -o a.fac >/dev/null
 	run --separate-stderr incise merge a.fac a.fac -o m.fis
 	failed_with a.fac "the recording s1.csv"
 	# another ridge of the premises, another range, another unit
 	sed '/MF2/s/\[\([0-9]\)/[1\1/' start.fis >mf.fis
 	awk '/^Range/ && !done { sub(/\[.* /, "[-1 "); done = 1 } 1' start.fis >range.fis
-	incise train s2.csv --premises mf.fis --group cut --factor mf.fac >/dev/null
-	incise train s2.csv --premises range.fis --group cut --factor range.fac >/dev/null
+	incise train s2.csv --premises mf.fis --group cut -o mf.fac >/dev/null
+	incise train s2.csv --premises range.fis --group cut -o range.fac >/dev/null
 	sed 's/depth_mm/depth_cm/' s2.csv >cm.csv
 	sed 's/depth_mm/depth_cm/' start.fis >cm.fis
-	incise train cm.csv --premises cm.fis --group cut --factor cm.fac >/dev/null
+	incise train cm.csv --premises cm.fis --group cut -o cm.fac >/dev/null
 	for other in "mf.fac:has other membership functions" "range.fac:has other ranges" \
 		"cm.fac:has other inputs, or other units"; do
 		run --separate-stderr incise merge a.fac "${other%%:*}" -o m.fis
@@ -137,7 +137,7 @@ large_shares() {
 	[ ! -e m.fis ]
 	# values far outside have no place
 	sed '5s/,[^,]*,/,99,/' s3.csv >far.csv
-	run --separate-stderr incise train far.csv --premises start.fis --factor far.fac
+	run --separate-stderr incise train far.csv --premises start.fis -o far.fac
 	failed_with far.csv "depth_mm = 99"
 	[ ! -e far.fac ]
 }
@@ -285,7 +285,7 @@ train_killed_soon() {
 	rm -r other
 	incise train 2.rec --mf 2,2 -o start.fis >/dev/null 2>&1
 	for name in 1 copy; do
-		incise train $name.rec --premises start.fis --factor $name.fac >/dev/null
+		incise train $name.rec --premises start.fis -o $name.fac >/dev/null
 	done
 	run --separate-stderr incise merge 1.fac copy.fac -o m.fis
 	failed_with copy.fac "the recording copy.rec (SHA-256 "
@@ -295,10 +295,10 @@ train_killed_soon() {
 @test "a factor goes to a pipe, pipes are told apart by their rows, and options that differ are noted" {
 	shares
 	incise train s1.csv --mf 3,2 -o start.fis >/dev/null
-	incise train s1.csv --premises start.fis --group cut --factor a.fac >/dev/null
-	incise train s1.csv --premises start.fis --group cut --factor - >b.fac
+	incise train s1.csv --premises start.fis --group cut -o a.fac >/dev/null
+	incise train s1.csv --premises start.fis --group cut -o fac:- >b.fac
 	cmp a.fac b.fac
-	incise train s2.csv --premises start.fis --group cut --all-rows --factor b.fac --overwrite >/dev/null
+	incise train s2.csv --premises start.fis --group cut --all-rows -o b.fac --overwrite >/dev/null
 	incise merge a.fac b.fac -o m.fis >/dev/null
 	incise merge b.fac a.fac -o n.fis >/dev/null
 	cmp m.fis n.fis

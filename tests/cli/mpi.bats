@@ -36,7 +36,7 @@ train_by() {
 	done
 	incise train s1.csv --group cut --mf 3,3 -o start.fis >/dev/null
 	for i in 1 2; do
-		incise train l?.csv --shard $i/2 --premises start.fis --group cut --factor $i.fac >/dev/null
+		incise train l?.csv --shard $i/2 --premises start.fis --group cut -o $i.fac >/dev/null
 	done
 	incise merge ?.fac -o merged.fis >/dev/null
 	train_by 3 l?.csv --premises start.fis --group cut -o all.fis >/dev/null

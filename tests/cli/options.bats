@@ -21,7 +21,7 @@ setup() {
 	while read -r old now command; do
 		# shellcheck disable=SC2086 # "calibrate delay" is two words
 		run -2 --separate-stderr incise $command $old
-		[ "${stderr_lines[0]}" = "incise $command: $old: this option is now called $now" ]
+		[ "${stderr_lines[0]}" = "incise $command: $old: this option is now ${now/_/ }" ]
 	done <<-END
 		--time --duration calibrate delay
 		--range --max-delay calibrate delay
@@ -33,11 +33,17 @@ setup() {
 		--time --duration calibrate tip
 		--arith --method compile
 		--loop --duration demo
-		--output --report demo
-		-o --report demo
 		-r --rate export
 		--at --poses replay
-		--csv --log replay
+		--csv -o_FILE.csv replay
+		--log -o_FILE.csv replay
+		--plot -o_NAME.png replay
+		--plot -o_NAME bench
+		--log -o_FILE.csv haptic
+		--session -o_FILE.session view
+		--keep -o_NAME.rec calibrate delay
+		--report -o_DIR calibrate depth
+		--initial -o_FILE.initial.fis train
 		--for --duration stepper
 		--output-model --output train
 		--camera --viewpoint view
@@ -47,5 +53,5 @@ setup() {
 	run -2 --separate-stderr incise capture --camera pictures
 	[[ "${stderr_lines[0]}" == *"auto, off, frames or depth"* ]]
 	run -2 --separate-stderr incise info m.fis --plot m
-	[ "${stderr_lines[0]}" = "incise info: --plot: this option is now called incise plot MODEL.fis -o NAME.png" ]
+	[ "${stderr_lines[0]}" = "incise info: --plot: this option is now incise plot MODEL.fis -o NAME.png" ]
 }

@@ -16,13 +16,13 @@ setup_file() {
 		'surface = { kind = "mesh"; file = "s.obj"; };' >m.scene
 	printf '%s\n' 'v -50 -50 0' 'v 50 -50 0' 'v 50 50 0' 'v -50 50 0' 'f 1 2 3' 'f 1 3 4' >s.obj
 	incise calibrate force --rig sim:clock=simulated --weights 0,50g,100g,200g \
-		--series 3 --duration 200ms -c calibration.conf --keep forces.csv >/dev/null
+		--series 3 --duration 200ms -c calibration.conf -o forces.csv >/dev/null
 	cat >rig.conf <<-END
 		tracker = "sim"; force = "sim"; camera = "sim"; stepper = "sim";
 	END
-	incise haptic "$root/scenes/neck.scene" --rig $quick --duration 1s --session s.session >/dev/null
+	incise haptic "$root/scenes/neck.scene" --rig $quick --duration 1s -o s.session >/dev/null
 	many_pairs 8 >many.csv
-	incise train many.csv --premises m.fis --group cut --factor m.fac >/dev/null
+	incise train many.csv --premises m.fis --group cut -o m.fac >/dev/null
 	incise capture -o n.rec --rig sim:clock=simulated,seed=2 --duration 1s --clock-source sim:1000 >/dev/null
 	incise capture -o w.rec --rig sim:clock=simulated,seed=3 --duration 1s --clock-source sim:1000 >/dev/null
 }
@@ -57,30 +57,29 @@ spares_inputs() {
 	mkdir folder
 	for path in m.fis ./m.fis link.fis hard.fis folder/../m.fis "$PWD/m.fis" m.fis.sd; do
 		spares_inputs compile m.fis -o $path
-		spares_inputs compile m.fis -o m.fx --c-source $path
+		spares_inputs compile m.fis -o m.fx -o c:$path
 	done
 	spares_inputs compile link.fis -o m.fis
-	for option in -o --initial --history; do
-		spares_inputs train pairs.csv -o new.fis $option pairs.csv
-	done
+	spares_inputs train pairs.csv -o pairs.csv
+	spares_inputs train pairs.csv -o new.fis -o pairs.csv
 	spares_inputs export d.rec -o d.rec/recording.db
 	spares_inputs export d.rec -o calibration.conf -c calibration.conf
 	# The extension of a log is .csv, by which name ever.
 	for path in d.rec/recording.db m.scene m.fis s.obj calibration.conf; do
 		ln -sf $path log.csv
-		spares_inputs replay d.rec m.scene -c calibration.conf --log log.csv
+		spares_inputs replay d.rec m.scene -c calibration.conf -o log.csv
 	done
 	for path in m.scene m.fis s.obj calibration.conf; do
 		ln -sf $path log.csv
-		spares_inputs haptic m.scene --rig $quick --duration 100ms -c calibration.conf --log log.csv
+		spares_inputs haptic m.scene --rig $quick --duration 100ms -c calibration.conf -o log.csv
 	done
 	ln -sf m.fis log.csv
-	spares_inputs haptic m.scene --rig $quick --duration 100ms --model link.fis --log log.csv
+	spares_inputs haptic m.scene --rig $quick --duration 100ms --model link.fis -o log.csv
 	mkdir report
 	ln -s ../forces.csv report/fit.png
-	spares_inputs calibrate force --from forces.csv -c calibration.conf --report report
+	spares_inputs calibrate force --from forces.csv -c calibration.conf -o report
 	ln -s m.scene link.session
-	spares_inputs haptic m.scene --rig $quick --duration 100ms --session link.session
+	spares_inputs haptic m.scene --rig $quick --duration 100ms -o link.session
 	spares_inputs assess s.session -o s.session
 	ln -s pairs.csv pairs.svg
 	spares_inputs plot pairs.csv -o pairs.svg
@@ -93,20 +92,20 @@ spares_inputs() {
 	for path in d.rec/new.csv link.rec/new.csv d.rec/../d.rec/new.csv d.rec/plot/new.csv; do
 		spares_inputs export d.rec -o $path
 		spares_inputs export link.rec -o $path
-		spares_inputs replay d.rec m.scene --log $path
+		spares_inputs replay d.rec m.scene -o $path
 	done
 	spares_inputs plot d.rec -o d.rec/new.svg
 	ln -s d.rec/recording.db into.csv
 	spares_inputs export d.rec -o into.csv
-	spares_inputs calibrate tip --from d.rec --report d.rec/new
+	spares_inputs calibrate tip --from d.rec -o d.rec/new
 	spares_inputs calibrate tip --from d.rec -c d.rec/calibration.conf
 	if command -v gnuplot >/dev/null; then
-		spares_inputs replay d.rec m.scene --plot d.rec/picture
-		spares_inputs replay d.rec m.scene --plot d.rec/new/picture
+		spares_inputs replay d.rec m.scene -o d.rec/picture.png
+		spares_inputs replay d.rec m.scene -o d.rec/new/picture.png
 	fi
 	if [ -x "$INCISE_BUILD/bin/incise-view" ]; then
-		spares_inputs view m.scene --from d.rec --frames d.rec/new --duration 1s
-		spares_inputs view m.scene --from d.rec --video d.rec/new.mkv --duration 1s
+		spares_inputs view m.scene --from d.rec -o d.rec/new --duration 1s
+		spares_inputs view m.scene --from d.rec -o d.rec/new.mkv --duration 1s
 	fi
 }
 
@@ -114,7 +113,7 @@ spares_inputs() {
 	cp "${BATS_FILE_TMPDIR:?}/rig.conf" .
 	for path in rig.conf m.scene; do
 		ln -sf $path log.csv
-		run --separate-stderr incise haptic m --duration 100ms --log log.csv --overwrite
+		run --separate-stderr incise haptic m --duration 100ms -o log.csv --overwrite
 		failed_with "$path" "is an input"
 	done
 	cmp rig.conf "$BATS_FILE_TMPDIR/rig.conf"
@@ -130,12 +129,12 @@ spares_inputs() {
 # bats test_tags=check
 @test "two outputs are two files" {
 	for more in a.fis ./a.fis "$PWD/a.fis"; do
-		run --separate-stderr incise train pairs.csv -o a.fis --initial $more --overwrite
+		run --separate-stderr incise train pairs.csv -o a.fis -o initial.fis:$more --overwrite
 		failed_with a.fis "written twice"
 	done
 	touch a.fis.sd
 	ln -s a.fis.sd history.csv
-	run --separate-stderr incise train pairs.csv -o a.fis --history history.csv --overwrite
+	run --separate-stderr incise train pairs.csv -o a.fis -o history.csv --overwrite
 	failed_with a.fis.sd "written twice"
 	[ ! -e a.fis ]
 }
@@ -159,27 +158,27 @@ replaces_when_told() {
 
 @test "an existing file is replaced with --overwrite only, in each command" {
 	replaces_when_told a.fx compile m.fis -o a.fx
-	replaces_when_told b.c compile m.fis -o b.fx --c-source b.c
+	replaces_when_told b.c compile m.fis -o b.fx -o b.c
 	replaces_when_told a.csv export d.rec -o a.csv
 	replaces_when_told a.fis train pairs.csv -o a.fis --epochs 2
 	replaces_when_told b.fis.sd train pairs.csv -o b.fis --epochs 2
-	replaces_when_told c0.fis train pairs.csv -o c.fis --epochs 2 --initial c0.fis
-	replaces_when_told dh.csv train pairs.csv -o d.fis --epochs 2 --history dh.csv
-	replaces_when_told r.csv replay d.rec wall --log r.csv
-	replaces_when_told l.csv haptic wall --rig $quick --duration 100ms --log l.csv
-	replaces_when_told a.session haptic wall --rig $quick --duration 100ms --session a.session
-	replaces_when_told sessions.csv assess s.session --csv sessions.csv
+	replaces_when_told c0.fis train pairs.csv -o c.fis --epochs 2 -o c0.initial.fis
+	replaces_when_told dh.csv train pairs.csv -o d.fis --epochs 2 -o dh.csv
+	replaces_when_told r.csv replay d.rec wall -o r.csv
+	replaces_when_told l.csv haptic wall --rig $quick --duration 100ms -o l.csv
+	replaces_when_told a.session haptic wall --rig $quick --duration 100ms -o a.session
+	replaces_when_told sessions.csv assess s.session -o sessions.csv
 	replaces_when_told new.fis merge m.fac -o new.fis
 	cp "$BATS_FILE_TMPDIR/many.csv" .
-	replaces_when_told new.fac train many.csv --premises m.fis --group cut --factor new.fac
+	replaces_when_told new.fac train many.csv --premises m.fis --group cut -o new.fac
 	replaces_when_told k.csv calibrate force --rig sim:clock=simulated --weights 0,50g,100g,200g \
-		--series 3 --duration 200ms -c k.conf --keep k.csv
-	replaces_when_told report/report.txt calibrate force --from forces.csv -c k.conf --report report
-	replaces_when_told report2/report.json calibrate force --from forces.csv -c k.conf --report report2
+		--series 3 --duration 200ms -c k.conf -o k.csv
+	replaces_when_told report/report.txt calibrate force --from forces.csv -c k.conf -o report
+	replaces_when_told report2/report.json calibrate force --from forces.csv -c k.conf -o report2
 }
 
 @test "a kept recording is replaced with --overwrite only, and by a whole one" {
-	delay="calibrate delay --rig sim:clock=simulated,motion=2 -c k.conf --keep k.rec"
+	delay="calibrate delay --rig sim:clock=simulated,motion=2 -c k.conf -o k.rec"
 	incise $delay --duration 12s >/dev/null </dev/null
 	before=$(content)
 	run --separate-stderr incise $delay --duration 12s </dev/null
@@ -203,9 +202,9 @@ replaces_when_told() {
 @test "pictures are replaced with --overwrite only" {
 	command -v gnuplot >/dev/null || skip "gnuplot is not installed"
 	replaces_when_told i.png plot m.fis -o i.png
-	replaces_when_told r.png replay d.rec wall --plot r
+	replaces_when_told r.png replay d.rec wall -o r.png
 	replaces_when_told p.png plot d.rec -o p.png
-	replaces_when_told r3/fit.png calibrate force --from forces.csv -c k.conf --report r3
+	replaces_when_told r3/fit.png calibrate force --from forces.csv -c k.conf -o r3
 }
 
 @test "frames, films and strips are replaced with --overwrite only" {
@@ -214,22 +213,22 @@ replaces_when_told() {
 	export XDG_RUNTIME_DIR="$PWD"
 	cp "$root"/scenes/wall.scene .
 	small="--size 160x120 --no-panel --duration 0.2s --fps 10"
-	incise view wall --procedure --strip probe.png --at 0s --duration 0.05s $small 2>why ||
+	incise view wall --procedure -o probe.png --at 0s --duration 0.05s $small 2>why ||
 		skip "no OpenGL here: $(cat why)"
-	replaces_when_told strip.png view wall --procedure --strip strip.png --at 0s $small
-	replaces_when_told f/frame-000000.png view wall --procedure --frames f $small
+	replaces_when_told strip.png view wall --procedure -o strip.png --at 0s $small
+	replaces_when_told f/frame-000000.png view wall --procedure -o f $small
 	rm f/frame-000000.png
-	run --separate-stderr incise view wall --procedure --frames f $small
+	run --separate-stderr incise view wall --procedure -o f $small
 	failed_with f/frame-000001.png exists
-	incise view wall --procedure --video a.mkv $small 2>why || skip "no film here: $(cat why)"
-	replaces_when_told b.mkv view wall --procedure --video b.mkv $small
+	incise view wall --procedure -o a.mkv $small 2>why || skip "no film here: $(cat why)"
+	replaces_when_told b.mkv view wall --procedure -o b.mkv $small
 	# A link stays one, and a pipe a pipe.
 	ln -s b.mkv link.mkv
-	incise view wall --procedure --video link.mkv --overwrite $small
+	incise view wall --procedure -o link.mkv --overwrite $small
 	[ -L link.mkv ]
 	mkfifo pipe
 	cat pipe >piped.mkv 3>&- &
-	incise view wall --procedure --video pipe $small
+	incise view wall --procedure -o pipe $small
 	wait $!
 	[ -p pipe ]
 	[ "$(head -c 4 piped.mkv | od -An -tx1)" = " 1a 45 df a3" ]
@@ -242,8 +241,8 @@ replaces_when_told() {
 	for i in 1 2; do
 		incise compile m.fis -o /dev/null
 		incise export d.rec -o /dev/null
-		incise train pairs.csv -o /dev/null --epochs 2 --initial /dev/null --history /dev/null
-		incise haptic wall --rig $quick --duration 100ms --log /dev/null
+		incise train pairs.csv -o /dev/null --epochs 2 -o initial.fis:/dev/null -o csv:/dev/null
+		incise haptic wall --rig $quick --duration 100ms -o /dev/null
 	done
 	[ -c /dev/null ]
 	mkfifo pipe
@@ -258,18 +257,18 @@ replaces_when_told() {
 writers() {
 	cat <<-END
 		compile m.fis -o PLACE
-		compile m.fis -o /dev/null --c-source PLACE
+		compile m.fis -o /dev/null -o c:PLACE
 		export d.rec -o PLACE
 		train pairs.csv --mf 2,2 --epochs 1 -o PLACE
-		train pairs.csv --mf 2,2 --epochs 1 -o /dev/null --initial PLACE
-		train pairs.csv --mf 2,2 --epochs 1 -o /dev/null --history PLACE
-		train many.csv --premises m.fis --group cut --factor PLACE
+		train pairs.csv --mf 2,2 --epochs 1 -o /dev/null -o initial.fis:PLACE
+		train pairs.csv --mf 2,2 --epochs 1 -o /dev/null -o csv:PLACE
+		train many.csv --premises m.fis --group cut -o fac:PLACE
 		merge m.fac -o PLACE
-		replay d.rec wall --log PLACE
-		haptic wall --rig $quick --duration 100ms --log PLACE
-		haptic wall --rig $quick --duration 100ms --session PLACE
-		assess s.session --csv PLACE
-		calibrate force --rig sim:clock=simulated --weights 0,50g,100g,200g --series 3 --duration 200ms -c k.conf --keep PLACE
+		replay d.rec wall -o PLACE
+		haptic wall --rig $quick --duration 100ms -o PLACE
+		haptic wall --rig $quick --duration 100ms -o session:PLACE
+		assess s.session -o csv:PLACE
+		calibrate force --rig sim:clock=simulated --weights 0,50g,100g,200g --series 3 --duration 200ms -c k.conf -o csv:PLACE
 	END
 }
 
@@ -373,23 +372,20 @@ full() {
 	done <<-'END'
 		export d.rec -o out.odd|--output: out.odd: unknown extension .odd; give .csv, .h5, .hdf5 or .mcap
 		export d.rec -o out.CSV|--output: out.CSV: unknown extension .CSV; give .csv, .h5, .hdf5 or .mcap
-		train pairs.csv -o out.odd|--output: out.odd: unknown extension .odd; give .fis
-		train pairs.csv -o out.fis --initial out.odd|--initial: out.odd: unknown extension .odd; give .fis
-		train pairs.csv -o out.fis --history out.odd|--history: out.odd: unknown extension .odd; give .csv
-		compile m.fis -o out.odd|--output: out.odd: unknown extension .odd; give .fx or .plan
+		train pairs.csv -o out.odd|--output: out.odd: unknown extension .odd; give .fis, .initial.fis, .csv or .fac
+		compile m.fis -o out.odd|--output: out.odd: unknown extension .odd; give .fx, .plan or .c
 		compile m.fis -o out.plan|--output: out.plan: unknown extension .plan; give .fx
 		compile m.scene -o out.fx|--output: out.fx: unknown extension .fx; give .plan
-		compile m.fis -o out.fx --c-source out.odd|--c-source: out.odd: unknown extension .odd; give .c
-		replay d.rec m.scene --log out.odd|--log: out.odd: unknown extension .odd; give .csv
-		haptic m.scene --log out.odd|--log: out.odd: unknown extension .odd; give .csv
-		haptic m.scene --session out.odd|--session: out.odd: unknown extension .odd; give .session
+		compile m.fis -o out.fx -o other.fx|--output other.fx: FILE.fx|NAME.plan is given twice
+		replay d.rec m.scene -o out.odd|--output: out.odd: unknown extension .odd; give .csv, .png or .svg
+		haptic m.scene -o out.odd|--output: out.odd: unknown extension .odd; give .csv or .session
 		plot d.rec -o out.odd|--output: out.odd: unknown extension .odd; give .png, .svg or .pdf
-		calibrate tip --from none.csv --keep out.odd|--keep: out.odd: unknown extension .odd; give .csv
+		calibrate tip --from none.csv -o out.odd|--output: out.odd: unknown extension .odd; give .csv
 		capture -o out.odd|expected a name that ends in .rec
 	END
 	if [ -x "$INCISE_BUILD/bin/incise-view" ]; then
-		run --separate-stderr incise view wall --procedure --video a.mp4
-		bad_usage "--video: a.mp4:"
+		run --separate-stderr incise view wall --procedure -o a.mp4
+		bad_usage "--output: a.mp4:"
 	fi
 	# No extension is none that is wrong.
 	incise export d.rec -o out
@@ -408,23 +404,23 @@ full() {
 	}
 	ends "wrote a.fis and a.fis.sd" train pairs.csv -o a.fis --epochs 2
 	mkdir deep
-	ends "wrote b.fis, deep/i.fis, h.csv and b.fis.sd" train pairs.csv -o b.fis --epochs 2 \
-		--initial deep/i.fis --history h.csv
+	ends "wrote b.fis, deep/i.initial.fis, h.csv and b.fis.sd" train pairs.csv -o b.fis --epochs 2 \
+		-o deep/i.initial.fis -o h.csv
 	ends "wrote a.fis and a.fis.sd" train pairs.csv -o a.fis --epochs 2 --overwrite
-	ends "wrote m.fx and m.c" compile m.fis -o m.fx --c-source m.c
-	ends "wrote l.csv and l.session" haptic m.scene --rig $quick --duration 100ms --log l.csv --session l.session
-	ends "wrote r.csv" replay d.rec m.scene --log r.csv
+	ends "wrote m.fx and m.c" compile m.fis -o m.fx -o m.c
+	ends "wrote l.csv and l.session" haptic m.scene --rig $quick --duration 100ms -o l.csv -o l.session
+	ends "wrote r.csv" replay d.rec m.scene -o r.csv
 	ends "wrote c.rec" capture -o c.rec --rig $quick --duration 1s
 	ends "wrote k.csv" calibrate force --rig sim:clock=simulated --weights 0,50g,100g,200g \
-		--series 3 --duration 200ms -c k.conf --keep k.csv
+		--series 3 --duration 200ms -c k.conf -o k.csv
 	grep -q '^wrote k.conf: active from now on$' out
 	if command -v gnuplot >/dev/null; then
 		ends "wrote f.png" plot d.rec -o f.png
 		# more than a few files of a folder are one name
-		ends "wrote deep/r/ (6 files)" calibrate force --from forces.csv -c k.conf --report deep/r
+		ends "wrote deep/r/ (6 files)" calibrate force --from forces.csv -c k.conf -o deep/r
 	fi
 	# nothing where the data go to standard output, or where nothing is written
-	incise train pairs.csv -o - --epochs 2 --history h2.csv 2>/dev/null | grep -c wrote | grep -qx 0
+	incise train pairs.csv -o - --epochs 2 -o h2.csv 2>/dev/null | grep -c wrote | grep -qx 0
 	incise haptic m.scene --rig $quick --duration 100ms >out
 	run ! grep -q wrote out
 }

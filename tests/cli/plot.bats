@@ -308,7 +308,7 @@ keep_data() {
 }
 
 @test "a session: the path, depth and force, and the tools that were in the tissue" {
-	incise haptic neck --procedure --state none --session a.session >/dev/null
+	incise haptic neck --procedure --state none -o a.session >/dev/null
 	incise assess a.session --json >a.json
 	draws a.session
 	shows "x / mm" "y / mm" "depth / mm" "force / N" "time / s" cut membrane blade handle tube \
@@ -316,7 +316,7 @@ keep_data() {
 	grep -q "^a.session, neck.scene, 22.0 s, $(key a.json 'sessions[0].met') of $(
 		key a.json 'sessions[0].judged') criteria met$" texts
 	incise haptic liver --rig sim:clock=simulated --duration 4s --state none \
-		--session b.session >/dev/null
+		-o b.session >/dev/null
 	draws b.session
 	shows "force / N" blade
 	! grep -qxE 'handle|tube|membrane' texts

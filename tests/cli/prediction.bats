@@ -115,7 +115,7 @@ train() {
 # bats test_tags=check
 @test "what cannot carry uncertainties is refused, and what lacks them is named" {
 	train a.csv -o m.fis
-	for way in "--classic -o x.fis" "--premises m.fis --factor x.fac" "--mpi -o x.fis"; do
+	for way in "--classic -o x.fis" "--premises m.fis -o x.fac" "--mpi -o x.fis"; do
 		# shellcheck disable=SC2086 # several words
 		run --separate-stderr incise train a.csv b.csv $way
 		bad_usage "cannot take uncertainties, which a.csv has; give --uncertainty none"

@@ -34,9 +34,9 @@ teardown() {
 }
 
 @test "forces are the same from run to run and at both speeds" {
-	incise replay liver.rec liver.scene --log a.csv | grep ^crc32c >a
-	incise replay liver.rec liver.scene --log b.csv | grep ^crc32c >b
-	incise replay liver.rec liver.scene --log c.csv --real-time >report
+	incise replay liver.rec liver.scene -o a.csv | grep ^crc32c >a
+	incise replay liver.rec liver.scene -o b.csv | grep ^crc32c >b
+	incise replay liver.rec liver.scene -o c.csv --real-time >report
 	grep ^crc32c report >c
 	cmp a.csv b.csv
 	cmp a.csv c.csv
@@ -58,8 +58,8 @@ teardown() {
 }
 
 @test "what is predicted is what the live loop does on the same poses" {
-	incise haptic liver.scene --rig $quick --duration 3s --log live.csv >/dev/null
-	incise replay liver.rec liver.scene --log replay.csv >/dev/null
+	incise haptic liver.scene --rig $quick --duration 3s -o live.csv >/dev/null
+	incise replay liver.rec liver.scene -o replay.csv >/dev/null
 	# the log begins with the first tick, as the recording's ticks do; it is rounded to 0.01 mN
 	paste -d, <(sed 1d live.csv) <(sed 1d replay.csv) | head -n 2999 | awk -F, '
 		{ e = $13 - $19; if (e < 0) e = -e; if (e > 0.6e-5 || $9 != $22) { print; exit 1 }
@@ -69,7 +69,7 @@ teardown() {
 
 # bats test_tags=check
 @test "the table has every tick, and the report is the table's" {
-	incise replay liver.rec liver.scene --log t.csv --json >r.json
+	incise replay liver.rec liver.scene -o t.csv --json >r.json
 	[ "$(head -n 1 t.csv)" = \
 		t_s,cut,depth_mm,velocity_mm_s,predicted_N,measured_N,clipped,flags ]
 	[ "$(key r.json ticks)" = "$(($(wc -l <t.csv) - 1))" ]
@@ -97,7 +97,7 @@ teardown() {
 }
 
 @test "measured forces and cuts are those of the export" {
-	incise replay liver.rec liver.scene --log t.csv >/dev/null
+	incise replay liver.rec liver.scene -o t.csv >/dev/null
 	incise export --no-lineage liver.rec -o e.csv >/dev/null
 	# the samples of a cut, in the millisecond around each tick that lies inside of it
 	awk -F, 'NR == FNR { if (FNR > 1) { k = int($2 * 1000 + 0.5 + 1e-7); s[k] += $5; n[k]++ } next }
@@ -109,18 +109,18 @@ teardown() {
 }
 
 @test "the table to standard output" {
-	run -0 --separate-stderr incise replay liver.rec liver.scene --log -
+	run -0 --separate-stderr incise replay liver.rec liver.scene -o -
 	[ -z "$stderr" ]
 	[ "${#lines[@]}" -eq 3000 ]
 	[[ "${lines[0]}" == t_s,* ]]
-	run --separate-stderr incise replay liver.rec liver.scene --log - --json
+	run --separate-stderr incise replay liver.rec liver.scene -o - --json
 	bad_usage "standard output"
 }
 
 @test "another calibration, model and tool" {
 	echo 'force_mV_N = 620.0;' >half.conf
-	incise replay liver.rec liver.scene --log a.csv >/dev/null
-	incise replay liver.rec liver.scene --log b.csv -c half.conf >/dev/null
+	incise replay liver.rec liver.scene -o a.csv >/dev/null
+	incise replay liver.rec liver.scene -o b.csv -c half.conf >/dev/null
 	# half the sensitivity: twice the force; six decimals
 	paste -d, a.csv b.csv | awk -F, 'NR > 1 { e = 2 * $6 - $14; if (e * e > 9e-12) exit 1 }
 		NR > 1 && $5 != $13 { exit 1 }'
@@ -131,7 +131,7 @@ teardown() {
 
 @test "a picture of it" {
 	command -v gnuplot >/dev/null || skip "gnuplot is not installed"
-	incise replay liver.rec liver.scene --plot pictures/liver >/dev/null
+	incise replay liver.rec liver.scene -o pictures/liver.png >/dev/null
 	[ "$(head -c 8 pictures/liver.png | od -An -tx1 | tr -d ' ')" = 89504e470d0a1a0a ]
 	grep -q '<svg' pictures/liver.svg
 	# all ticks of a short one
@@ -148,7 +148,7 @@ teardown() {
 	echo old >t.csv
 	# a minute that is made in a moment: it does not end before the signal
 	incise capture -o minute.rec --rig sim:clock=simulated,force_hz=100 --duration 60s >/dev/null
-	incise replay minute.rec liver.scene --real-time --log t.csv --overwrite >out 2>err &
+	incise replay minute.rec liver.scene --real-time -o t.csv --overwrite >out 2>err &
 	pid=$!
 	until_it_catches $pid incise-replay 2
 	kill -INT $pid
@@ -164,14 +164,14 @@ teardown() {
 
 # bats test_tags=check
 @test "what cannot be replayed" {
-	run --separate-stderr incise replay none.rec liver.scene --log t.csv
+	run --separate-stderr incise replay none.rec liver.scene -o t.csv
 	failed_with none.rec "no such recording"
-	run --separate-stderr incise replay liver.rec none.scene --log t.csv
+	run --separate-stderr incise replay liver.rec none.scene -o t.csv
 	failed_with none.scene
-	run --separate-stderr incise replay liver.rec liver.scene --log no/folder/t.csv
+	run --separate-stderr incise replay liver.rec liver.scene -o no/folder/t.csv
 	failed_with no/folder
 	sqlite3 liver.rec/recording.db "UPDATE tracker SET x_mm = 9e999 WHERE seq = 100"
-	run --separate-stderr incise replay liver.rec liver.scene --log t.csv
+	run --separate-stderr incise replay liver.rec liver.scene -o t.csv
 	failed_with liver.rec "damaged" "stream tracker, block 8"
 	[ ! -e t.csv ]
 	sqlite3 liver.rec/recording.db "DELETE FROM tracker;

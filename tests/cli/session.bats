@@ -17,7 +17,7 @@ setup_file() {
 		force_most_N = 0.1; time_most_s = 100.0; };' | cat neck.scene - >hard.scene
 	for scene in easy hard; do
 		"$INCISE_BUILD/bin/incise" haptic $scene.scene --rig $rig --duration 8s \
-			--session $scene.session --code S-$scene >/dev/null
+			-o $scene.session --code S-$scene >/dev/null
 	done
 }
 
@@ -34,11 +34,11 @@ teardown() {
 
 # bats test_tags=check
 @test "in simulated time the same run gives the same session, and another one another" {
-	incise haptic neck --rig $quick --duration 8s --session a.session --code P07 >a.txt
-	incise haptic neck --rig $quick --duration 8s --session b.session --code P07 >b.txt
+	incise haptic neck --rig $quick --duration 8s -o a.session --code P07 >a.txt
+	incise haptic neck --rig $quick --duration 8s -o b.session --code P07 >b.txt
 	cmp a.session b.session
 	cmp <(grep -v ^wrote a.txt) <(grep -v ^wrote b.txt)
-	incise haptic neck --rig $quick,seed=2 --duration 8s --session c.session --code P07 >/dev/null
+	incise haptic neck --rig $quick,seed=2 --duration 8s -o c.session --code P07 >/dev/null
 	run ! cmp -s a.session c.session
 	# every tick was seen, and the loop's own report agrees
 	[ "$(key a.session ticks)" = 8000 ]
@@ -52,8 +52,8 @@ teardown() {
 }
 
 @test "a session changes nothing of the run" {
-	incise haptic neck --rig $quick --duration 4s --log a.csv >/dev/null
-	incise haptic neck --rig $quick --duration 4s --log b.csv --session b.session >/dev/null
+	incise haptic neck --rig $quick --duration 4s -o a.csv >/dev/null
+	incise haptic neck --rig $quick --duration 4s -o b.csv -o b.session >/dev/null
 	cmp a.csv b.csv
 }
 
@@ -67,7 +67,7 @@ until_it_runs() {
 
 @test "in real time every tick is in the session, at 20 kHz too; SIGINT ends it with its reason" {
 	sed -i 's/rate_hz = .*/rate_hz = 20000.0;/' neck.scene
-	incise haptic neck --rig sim: --no-rt --state page --overruns 0 --session a.session \
+	incise haptic neck --rig sim: --no-rt --state page --overruns 0 -o a.session \
 		--json >r.json 3>&- &
 	pid=$!
 	until_it_runs
@@ -84,7 +84,7 @@ until_it_runs() {
 }
 
 @test "a fault ends a session with its reason" {
-	incise haptic neck --rig sim: --no-rt --state page --overruns 1 --session a.session \
+	incise haptic neck --rig sim: --no-rt --state page --overruns 1 -o a.session \
 		>/dev/null 2>err 3>&- &
 	pid=$!
 	# one tick too late ends it: on a busy machine before this one, which is stopped for 0.1 s
@@ -101,13 +101,13 @@ until_it_runs() {
 }
 
 @test "a session is of one scene: it is not read again" {
-	setsid incise haptic neck --rig sim: --no-rt --state page --overruns 0 --session a.session \
+	setsid incise haptic neck --rig sim: --no-rt --state page --overruns 0 -o a.session \
 		>/dev/null 2>err 3>&- </dev/null &
 	pid=$!
 	until_it_runs
 	kill -HUP $pid
 	await grep -q "not reloaded" err
-	grep -q "not reloaded.*--session .*keep their scene" err
+	grep -q "not reloaded.*a session .*keep their scene" err
 	kill -INT $pid
 	wait $pid
 	pid=
@@ -173,7 +173,7 @@ print(max(math.dist(p, q) for i, p in ends for k, q in ends if i == k))')
 }
 
 @test "a row for each of many, as table and CSV" {
-	run -0 --separate-stderr incise assess easy.session hard.session --csv all.csv
+	run -0 --separate-stderr incise assess easy.session hard.session -o all.csv
 	[ "${lines[1]%% *}" = easy.session ]
 	[[ "${lines[2]}" == hard.session*"!"*" 1 of 4" ]]
 	[ "${lines[-1]}" = "wrote all.csv" ]
@@ -185,10 +185,10 @@ print(max(math.dist(p, q) for i, p in ends for k, q in ends if i == k))')
 	[ "$(cell all.csv 0 cut_length_mm_met)" = yes ]
 	[ -z "$(cell all.csv 0 off_target_mm)" ]
 	holds "($(cell all.csv 0 force_most_N) - $(key easy.session force.largest_N))^2 < 1e-12"
-	incise assess easy.session --reference hard.session --csv - 2>/dev/null >r.csv
+	incise assess easy.session --reference hard.session -o csv:- 2>/dev/null >r.csv
 	[ "$(cell r.csv 1 role)" = reference ]
 	cp easy.session 'a,"b.session'
-	incise assess 'a,"b.session' --csv q.csv >/dev/null
+	incise assess 'a,"b.session' -o q.csv >/dev/null
 	[ "$(cell q.csv 0 file)" = 'a,"b.session' ]
 }
 
@@ -219,7 +219,7 @@ print(max(math.dist(p, q) for i, p in ends for k, q in ends if i == k))')
 }
 
 @test "a session without a tick, or without a contact, is reported too" {
-	incise haptic neck --rig $quick --duration 0.5s --session a.session >/dev/null
+	incise haptic neck --rig $quick --duration 0.5s -o a.session >/dev/null
 	[ -z "$(key a.session first_contact_s)" ]
 	run -0 --separate-stderr incise assess a.session
 	[ -z "$stderr" ]
@@ -272,14 +272,14 @@ refused() {
 }
 
 @test "the script meets every criterion of the neck, and without the tube all but one" {
-	incise haptic neck --procedure --session a.session >/dev/null
+	incise haptic neck --procedure -o a.session >/dev/null
 	incise assess a.session --json >a.json
 	[ "$(key a.json 'sessions[0].judged')" = 9 ]
 	[ "$(key a.json 'sessions[0].met')" = 9 ]
 	[ "$(key a.session target.punctured)" = 1 ]
 	[ "$(key a.session target.missed)" = 0 ]
 	# before the tube is in
-	incise haptic neck --procedure --duration 14s --session b.session >/dev/null
+	incise haptic neck --procedure --duration 14s -o b.session >/dev/null
 	incise assess b.session --json >b.json
 	[ "$(key b.json 'sessions[0].met')" = 8 ]
 	[ "$(key b.json 'sessions[0].criteria.insertion_depth_mm.met')" = 0 ]
@@ -296,9 +296,9 @@ refused() {
 	[ -x "$INCISE_BUILD/bin/incise-view" ] ||
 		skip "incise view was not built: SDL2, epoxy, cairo or EGL were absent"
 	small="--size 160x120 --no-panel --fps 1 --duration 4s"
-	incise view neck --procedure --frames gl $small 2>why || skip "no OpenGL here: $(cat why)"
-	incise view neck --procedure --frames f --session a.session $small
-	incise view neck --procedure --frames f --session b.session --overwrite --json $small >r.json
+	incise view neck --procedure -o gl $small 2>why || skip "no OpenGL here: $(cat why)"
+	incise view neck --procedure -o f -o a.session $small
+	incise view neck --procedure -o f -o b.session --overwrite --json $small >r.json
 	cmp a.session b.session
 	[ "$(key a.session source)" = procedure ]
 	# the picture's cuts are the session's, but for a place, 0.5 mm, at each end

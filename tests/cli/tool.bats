@@ -271,7 +271,7 @@ at_terminal() {
 	[[ "$stderr" == *"with a tracker of 60 Hz and 4.2 ms; "* ]]
 	incise plan neck.scene --rig $rig >/dev/null
 	phases() {
-		incise haptic soft.scene --duration 40s --log - "$@" |
+		incise haptic soft.scene --duration 40s -o - "$@" |
 			awk -F, 'NR > 1 { n[$10]++ }
 				END { printf "%d %d\n", n["cutting"], n["insertion"] }'
 	}

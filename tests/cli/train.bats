@@ -145,8 +145,8 @@ parameters() {
 }
 
 @test "train writes the first model and the history" {
-	incise train pairs.csv --classic --check 0.5 --epochs 7 -o m.fis --initial first.fis \
-		--history epochs.csv --json >r.json 2>/dev/null
+	incise train pairs.csv --classic --check 0.5 --epochs 7 -o m.fis -o first.initial.fis \
+		-o epochs.csv --json >r.json 2>/dev/null
 	[ "$(head -n 1 epochs.csv)" = epoch,train_rmse,check_rmse ]
 	[ "$(tail -n 1 epochs.csv | cut -d, -f1)" = "$(key r.json epochs)" ]
 	# the report's errors are those of the epoch that was kept

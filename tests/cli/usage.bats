@@ -16,7 +16,7 @@ setup() {
 table() {
 	cat <<-END
 		assess|missing NAME.session
-		assess a.session --json --csv -|standard output
+		assess a.session --json -o csv:-|standard output
 		calibrate check a.rec|unexpected argument 'a.rec'; did you mean --recording a.rec?
 		calibrate delay --rig $rig|--duration or --from
 		calibrate depth|missing method: two-point, line or board
@@ -26,12 +26,12 @@ table() {
 		calibrate depth line|missing --from pairs.csv
 		calibrate depth two-point a.png|unexpected argument 'a.png'; images are given with --from
 		calibrate depth line --pixels 400|--pixels goes with two-point
-		calibrate force --from w.csv --weights 0,1,2|--from does not go with --rig, --weights or --keep
+		calibrate force --from w.csv --weights 0,1,2|--from does not go with --rig, --weights or -o FILE.csv
 		calibrate force --rig sim:|missing --weights or --from
 		calibrate force --rig sim: --weights 100g|the empty pan and 2 weights or more
 		calibrate force --rig sim: --weights 100g,100g,50g|100 g is listed twice
 		calibrate force extra|unexpected argument 'extra'; did you mean --from extra?
-		calibrate stepper --from p.csv --range 0mm..1mm|--from does not go with --rig, --keep, --range
+		calibrate stepper --from p.csv --range 0mm..1mm|--from does not go with --rig, -o FILE.csv, --range
 		calibrate stepper --step-mm 1|--step-mm goes with --from
 		calibrate stepper now|unexpected argument 'now'
 		calibrate tip --rig $rig|--duration or --from
@@ -45,9 +45,9 @@ table() {
 		capture -o a.rec --rig sim: --clock-source none --start-at 2037-01-15T08:00:10Z|--start-at: needs the wall time, which --clock-source none leaves out
 		compile m.fis m.fis -o a.fx|m.fis
 		compile m.fis -o - --json|standard output
-		compile m.fis -o a.fx --c-source 7.c|7
+		compile m.fis -o a.fx -o 7.c|7
 		compile m.fis --rig sim: -o a.fx|go with a scene
-		compile neck --budget 1mN -o a.plan|--budget, --method, --cells and --c-source go with a model
+		compile neck --budget 1mN -o a.plan|--budget, --method, --cells and -o FILE.c go with a model
 		demo somewhere|'somewhere'
 		eval m.fis a b|; give a model, and one file of inputs
 		eval m.fis points --grid 3x3|grid
@@ -67,10 +67,10 @@ table() {
 		export a.rec --profile ros2 -o -|--profile needs -o FILE with .mcap
 		haptic|missing SCENE (
 		haptic neck more.scene|; give one SCENE at a time
-		haptic neck --rig $rig --log l.csv|--duration
-		haptic neck --rig $rig --duration 1s --json --log -|standard output
+		haptic neck --rig $rig -o l.csv|--duration
+		haptic neck --rig $rig --duration 1s --json -o -|standard output
 		haptic neck --rig sim: --cpu 0 --no-rt --duration 0.1s|--cpu does not go with --no-rt
-		haptic neck --rig $rig --duration 1s --code P07|--code needs --session
+		haptic neck --rig $rig --duration 1s --code P07|--code needs -o FILE.session
 		haptic neck --in-kernel --procedure|--procedure runs on the simulated rig
 		haptic neck --in-kernel --arith double|the kernel computes in fixed point
 		info|missing FILE (
@@ -79,7 +79,7 @@ table() {
 		plan a b|b
 		replay a.rec|missing SCENE (
 		replay a.rec liver more|; give one SCENE at a time
-		replay a.rec liver --log - --json|standard output
+		replay a.rec liver -o - --json|standard output
 		serve --rig sim: --speed 2|--speed: only for a recording
 		serve --rig sim: a.rec|--rig: 'a.rec' is a source, too
 		sign a.rec|--key
@@ -117,11 +117,11 @@ table() {
 		view|missing SCENE (
 		view neck --procedure --rig sim:|--procedure
 		view neck --procedure --from x.rec|--procedure
-		view neck --frames f|
-		view neck --strip x.png|
+		view neck -o f|
+		view neck -o x.png.png|
 		view neck --at 1s|--at
-		view neck --procedure --at 2s,1s --strip x|--at
-		view neck --procedure --video x --size 641x480|
+		view neck --procedure --at 2s,1s -o x.png|--at
+		view neck --procedure -o x.mkv --size 641x480|
 	END
 }
 

@@ -637,7 +637,7 @@ void bench_measure(struct bench_run *run)
 
 	/* A wrong name fails before the work, not after. */
 	if (run->plot)
-		plot_place("plot", run->plot, &run->folder, &run->name);
+		plot_place("output", run->plot, &run->folder, &run->name);
 	for (const struct bench_plot *p = run->bench->plots; run->plot && p->script; p++)
 		reserve(run, p);
 	run->machine = machine_json();

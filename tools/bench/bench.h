@@ -5,7 +5,7 @@
  *
  *   run() ─▶ rows ─▶ bench_table ─┬─▶ text table        (without --json)
  *                                 ├─▶ JSON, metrics     (--json, compare, bench all)
- *                                 └─▶ data, bench_plot  (--plot)
+ *                                 └─▶ data, bench_plot  (-o)
  *
  * The report of incise bench all is made of the JSON, by tools/report.
  */
@@ -141,7 +141,7 @@ struct bench {
 	int n_operands;		     /* at most */
 	bool takes_duration, takes_load, takes_profile, takes_seed;
 	void (*run)(struct bench_run *run);
-	struct bench_plot plots[5]; /* end with {0}; without plots --plot is bad usage */
+	struct bench_plot plots[5]; /* end with {0}; without plots -o is bad usage */
 };
 
 extern const struct bench bench_loop, bench_precision, bench_scenes, bench_stability,

@@ -281,8 +281,9 @@ void calibrate_check_source(const struct calibrate *c, double time_s, const char
 	if (c->from && c->rig)
 		cli_usage("--from and --rig exclude each other; give one of them");
 	if (c->from && c->keep)
-		cli_usage("--keep does not go with --from: the data are in that file "
-			  "already");
+		cli_usage(
+			"-o %s does not go with --from: the data are in that file already",
+			c->keep);
 }
 
 void calibrate_check_stop(void)

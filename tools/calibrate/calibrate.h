@@ -4,7 +4,7 @@
  * options, and a table of what is its own. Every failure ends the program.
  *
  *   options ─▶ read | measure ─▶ fit ─▶ text, JSON, plots ─▶ calibration.conf ─▶ verdict
- *                      └─▶ write (--keep)
+ *                      └─▶ write (-o FILE.csv)
  */
 #ifndef INCISE_CALIBRATE_H
 #define INCISE_CALIBRATE_H
@@ -36,13 +36,14 @@ struct calibrate {
 			"else /etc/incise/calibration.conf where that is)",            \
 			CLI_INPUT(type, common.calibration)                            \
 	}
-#define CALIBRATE_REPORT_OPTIONS(type)                                                   \
-	{0, "report", "DIR", "write report.txt, report.json and plots into this folder", \
-	 CLI_OUTPUTS(type, common.report)},                                              \
-		{0, "dry-run", NULL, "do everything except writing calibration.conf",    \
-		 CLI_FLAG(type, common.dry_run)},                                        \
-	{                                                                                \
-		0, "json", NULL, "report as JSON", CLI_FLAG(type, common.json)           \
+#define CALIBRATE_REPORT_OPTIONS(type)                                                \
+	{'o', "output", "DIR",                                                        \
+	 "write report.txt, report.json and plots into this folder",                  \
+	 CLI_OUTPUTS(type, common.report)},                                           \
+		{0, "dry-run", NULL, "do everything except writing calibration.conf", \
+		 CLI_FLAG(type, common.dry_run)},                                     \
+	{                                                                             \
+		0, "json", NULL, "report as JSON", CLI_FLAG(type, common.json)        \
 	}
 
 /* The functions of one kind of calibration; @run is the command's struct. */
@@ -51,7 +52,7 @@ struct calibrate_kind {
 	const struct cli_command *command;
 	/* Options that do not go together, and operands, are bad usage. */
 	void (*check)(void *run, int argc, char **argv);
-	/* Data from --from, or without it from a rig; and as a file for --keep, or NULL. */
+	/* Data from --from, or without it from a rig; and as a file, or NULL. */
 	void (*read)(void *run, const char *path);
 	void (*measure)(void *run);
 	void (*write)(const void *run, FILE *out);
@@ -81,7 +82,7 @@ int calibrate_check(int argc, char **argv);
 void calibrate_find(struct calibrate *calibrate, bool required);
 
 /*
- * Reject --from with --rig, --keep or --duration, of which @source ("the file") has its own; and
+ * Reject --from with --rig, -o FILE.csv or --duration, of which @source ("the file") has its own; and
  * neither of --from and --duration (0: not given) without a terminal.
  */
 void calibrate_check_source(const struct calibrate *calibrate, double time_s,

@@ -68,8 +68,8 @@ static const struct cli_option option_table[] = {
 	 CLI_FLAG(struct delay, camera)},
 	{0, "from", "NAME.rec", "use this recording instead of a rig",
 	 CLI_INPUT(struct delay, common.from)},
-	{0, "keep", "NAME.rec", "keep the recording here, for --from",
-	 CLI_OUTPUTS(struct delay, common.keep)},
+	{'o', "output", "NAME.rec", "keep the recording here, for --from",
+	 CLI_OUTPUTS(struct delay, common.keep), .extensions = ".rec"},
 	CALIBRATE_REPORT_OPTIONS(struct delay),
 	{0},
 };
@@ -83,7 +83,7 @@ static const struct cli_command command = {
 		"cut, for example foam or rubber, and lift it off again, two or three "
 		"times a second, at an uneven pace.",
 	.options = option_table,
-	.examples = "incise calibrate delay --rig rig.conf --duration 15s --report delay",
+	.examples = "incise calibrate delay --rig rig.conf --duration 15s -o delay",
 	.success = "the calibration is active",
 	.failure = "failed or refused",
 };
@@ -95,10 +95,6 @@ static void check_delay_options(void *run, int argc, char **argv)
 
 	cli_no_operands(argc, argv, "--from");
 	calibrate_check_source(common, delay->time_s, "a recording");
-	if (common->keep &&
-	    (strlen(common->keep) < 5 || !cli_ends_with(common->keep, ".rec")))
-		cli_usage("--keep: expected a name that ends in .rec, found '%s'",
-			  common->keep);
 	if (common->keep)
 		cli_output(common->keep);
 	cli_catch_signals();

@@ -42,7 +42,7 @@ static const struct cli_option option_table[] = {
 	 "images (more may follow), FILE.csv or NAME.rec instead of the rig's "
 	 "camera",
 	 CLI_INPUT(struct depth, common.from)},
-	{0, "keep", "FILE", "write the raw data to this file, for --from",
+	{'o', "output", "FILE.csv", "write the raw data as CSV, for --from",
 	 CLI_OUTPUT(struct depth, common.keep), .extensions = ".csv"},
 	CALIBRATE_REPORT_OPTIONS(struct depth),
 	{0, "nominal", "MM_PX", "nominal scale to compare with (default: 0.11875)",

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * incise calibrate force: sensitivity of the force channel, from pairs of loads and readings:
- * measured with weights on a rig, or as CSV, which --from reads and --keep writes.
+ * measured with weights on a rig, or as CSV, which --from reads and -o FILE.csv writes.
  *
  *     mass_g,reading_mV,series,direction
  *     100,1395.2,1,up
@@ -133,7 +133,7 @@ static const struct cli_option option_table[] = {
 	 "pairs instead of a rig: CSV with mass_g or force_N, reading_mV, and "
 	 "optionally series and direction (up, down)",
 	 CLI_INPUT(struct force, common.from)},
-	{0, "keep", "FILE", "write the pairs to this file, for --from",
+	{'o', "output", "FILE.csv", "write the pairs as CSV, for --from",
 	 CLI_OUTPUT(struct force, common.keep), .extensions = ".csv"},
 	CALIBRATE_REPORT_OPTIONS(struct force),
 	{0, "weights", "LIST",
@@ -209,7 +209,7 @@ static void check_force_options(void *run, int argc, char **argv)
 
 	cli_no_operands(argc, argv, "--from");
 	if (common->from && (common->rig || force->weights.n || common->keep))
-		cli_usage("--from does not go with --rig, --weights or --keep: it "
+		cli_usage("--from does not go with --rig, --weights or -o FILE.csv: it "
 			  "takes the place of a rig");
 	if (!isnan(force->latitude_deg) && force->gravity)
 		cli_usage("--gravity and --latitude exclude each other; give one of "

@@ -52,7 +52,7 @@ static const struct cli_option option_table[] = {
 	{0, "from", "FILE",
 	 "CSV with position_mm or steps, and force_N, instead of devices",
 	 CLI_INPUT(struct stepper, common.from)},
-	{0, "keep", "FILE", "write the points to this CSV file, for --from",
+	{'o', "output", "FILE.csv", "write the points as CSV, for --from",
 	 CLI_OUTPUT(struct stepper, common.keep), .extensions = ".csv"},
 	CALIBRATE_REPORT_OPTIONS(struct stepper),
 	{0, "range", "MM..MM",
@@ -82,7 +82,7 @@ static const struct cli_command command = {
 		"not hold it. Ctrl-C ends with the motor at rest and without power. Not a "
 		"safety device: keep a hand on the emergency stop.",
 	.options = option_table,
-	.examples = "incise calibrate stepper --range 0mm..1.5mm --report bench",
+	.examples = "incise calibrate stepper --range 0mm..1.5mm -o bench",
 	.success = "the calibration is active",
 	.failure = "failed, refused or stopped",
 };
@@ -98,8 +98,9 @@ static void check_stepper_options(void *run, int argc, char **argv)
 		cli_usage("--step-mm goes with --from: a rig knows the travel of a step");
 	if (common->from && (common->rig || common->keep || !isnan(live->low_mm) ||
 			     !isnan(live->max_N) || live->strokes || stepper->no_rate))
-		cli_usage("--from does not go with --rig, --keep, --range, --strokes, "
-			  "--max-force or --no-rate: it drives nothing");
+		cli_usage(
+			"--from does not go with --rig, -o FILE.csv, --range, --strokes, "
+			"--max-force or --no-rate: it drives nothing");
 	if (!live->strokes)
 		live->strokes = 3;
 }
@@ -120,7 +121,7 @@ static void find_sensor_u(struct stepper *stepper)
 }
 
 /*
- * --- points as CSV: --keep writes, --from reads ----------------------------------------
+ * --- points as CSV: -o writes, --from reads --------------------------------------------
  *
  *     t_s,steps,position_mm,force_N
  */

@@ -51,7 +51,7 @@ static const struct cli_option option_table[] = {
 	{0, "from", "FILE",
 	 "take the poses from a CSV file or a recording instead of a rig",
 	 CLI_INPUT(struct tip, common.from)},
-	{0, "keep", "FILE", "write the poses to this CSV file, for --from",
+	{'o', "output", "FILE.csv", "write the poses as CSV, for --from",
 	 CLI_OUTPUT(struct tip, common.keep), .extensions = ".csv"},
 	CALIBRATE_REPORT_OPTIONS(struct tip),
 	{0},
@@ -66,7 +66,7 @@ static const struct cli_command command = {
 		"move, and rotate the tool about it in all directions, by at least 60 "
 		"degrees from side to side.",
 	.options = option_table,
-	.examples = "incise calibrate tip --rig rig.conf --duration 20s --report tip",
+	.examples = "incise calibrate tip --rig rig.conf --duration 20s -o tip",
 	.success = "the calibration is active",
 	.failure = "failed or refused",
 };

@@ -54,25 +54,50 @@ static void fill_streams(void)
 static const struct {
 	const char *command, *old, *now;
 } renamed[] = {
-	{"calibrate delay", "--time", "--duration"},
-	{"calibrate delay", "--range", "--max-delay"},
+	{"assess", "--csv", "-o FILE.csv"},
+	{"bench", "--plot", "-o NAME"},
+	{"bench all", "--report", "-o DIR"},
+	{"bench view", "--plot", "-o NAME"},
 	{"calibrate delay", "--camera", "--with-camera"},
+	{"calibrate delay", "--keep", "-o NAME.rec"},
+	{"calibrate delay", "--range", "--max-delay"},
+	{"calibrate delay", "--report", "-o DIR"},
+	{"calibrate delay", "--time", "--duration"},
 	{"calibrate depth", "--axis", "--handle"},
+	{"calibrate depth", "--keep", "-o FILE.csv"},
 	{"calibrate depth", "--pictures", "--images"},
-	{"calibrate force", "--time", "--duration"},
+	{"calibrate depth", "--report", "-o DIR"},
+	{"calibrate force", "--keep", "-o FILE.csv"},
 	{"calibrate force", "--range", "--input-range"},
+	{"calibrate force", "--report", "-o DIR"},
+	{"calibrate force", "--time", "--duration"},
+	{"calibrate stepper", "--keep", "-o FILE.csv"},
+	{"calibrate stepper", "--report", "-o DIR"},
+	{"calibrate tip", "--keep", "-o FILE.csv"},
+	{"calibrate tip", "--report", "-o DIR"},
 	{"calibrate tip", "--time", "--duration"},
 	{"compile", "--arith", "--method"},
+	{"compile", "--c-source", "-o FILE.c"},
 	{"demo", "--loop", "--duration"},
-	{"demo", "--output", "--report"},
-	{"demo", "-o", "--report"},
+	{"demo", "--report", "-o"},
 	{"export", "-r", "--rate"},
+	{"haptic", "--log", "-o FILE.csv"},
+	{"haptic", "--session", "-o FILE.session"},
 	{"info", "--plot", "incise plot MODEL.fis -o NAME.png"},
 	{"replay", "--at", "--poses"},
-	{"replay", "--csv", "--log"},
+	{"replay", "--csv", "-o FILE.csv"},
+	{"replay", "--log", "-o FILE.csv"},
+	{"replay", "--plot", "-o NAME.png"},
 	{"stepper", "--for", "--duration"},
+	{"train", "--factor", "-o FILE.fac"},
+	{"train", "--history", "-o FILE.csv"},
+	{"train", "--initial", "-o FILE.initial.fis"},
 	{"train", "--output-model", "--output"},
 	{"view", "--camera", "--viewpoint"},
+	{"view", "--frames", "-o DIR"},
+	{"view", "--session", "-o FILE.session"},
+	{"view", "--strip", "-o FILE.png"},
+	{"view", "--video", "-o FILE.mkv"},
 };
 
 /* Bad usage if @option, "-x" or "--name", is an old name. */
@@ -81,8 +106,7 @@ static void refuse_renamed(const struct cli_command *command, const char *option
 	for (size_t i = 0; i < sizeof(renamed) / sizeof(*renamed); i++)
 		if (!strcmp(command->name, renamed[i].command) &&
 		    !strcmp(option, renamed[i].old))
-			cli_usage("%s: this option is now called %s", option,
-				  renamed[i].now);
+			cli_usage("%s: this option is now %s", option, renamed[i].now);
 }
 
 /* The name of what option @given, "-x" or "--name", takes. */
@@ -152,6 +176,11 @@ static const struct cli_option *next(const struct cli_command *command, int argc
 	for (int n = 0; (opt = help_option(command, n)); n++) {
 		if (n == OPTIONS_MAX)
 			abort();
+		if (n &&
+		    !strcmp(opt->name, longs[n - 1].name)) { /* another of its rows */
+			longs[n] = longs[n - 1];
+			continue;
+		}
 		/* Each has a number of its own, or getopt would complete "--m" to any. */
 		longs[n] = (struct option){opt->name,
 					   opt->arg ? required_argument : no_argument,
@@ -318,15 +347,37 @@ static void answer_completion(const char *const *names)
 
 static void check_extensions(const struct cli_command *command, const void *options)
 {
-	for (const struct cli_option *opt = command->options; opt->name; opt++) {
-		const char *path = NULL;
+	const struct cli_option *first = command->options;
 
+	for (const struct cli_option *opt = first; opt->name; opt++) {
+		const char *path = NULL;
+		char *all;
+
+		if (strcmp(opt->name, first->name))
+			first = opt;
 		if (opt->extensions)
 			path = *(const char *const *)((const char *)options +
 						      opt->offset);
-		if (path)
-			cli_extension(opt->name, path, opt->extensions);
+		if (!path)
+			continue;
+		all = cli_output_extensions(first);
+		cli_extension(opt->name, path, all);
+		free(all);
 	}
+}
+
+/* The row of the output in optarg, of several; each may be given once. */
+static const struct cli_option *choose_output(const struct cli_command *command,
+					      const struct cli_option *first)
+{
+	static uint64_t given;
+	const struct cli_option *row = cli_output_row(first, &optarg);
+	uint64_t bit = UINT64_C(1) << (row - command->options);
+
+	if (given & bit)
+		cli_usage("--%s %s: %s is given twice", row->name, optarg, row->arg);
+	given |= bit;
+	return row;
 }
 
 void cli_parse(const struct cli_command *command, int argc, char **argv, void *options)
@@ -340,8 +391,11 @@ void cli_parse(const struct cli_command *command, int argc, char **argv, void *o
 		cli_finish();
 		exit(0);
 	}
-	while ((opt = next(command, argc, argv)))
+	while ((opt = next(command, argc, argv))) {
+		if (opt[1].name && !strcmp(opt->name, opt[1].name))
+			opt = choose_output(command, opt);
 		store(opt, (char *)options + opt->offset);
+	}
 	cli_input("-");
 	for (int i = optind; i < argc; i++)
 		cli_input(argv[i]);

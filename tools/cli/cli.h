@@ -168,6 +168,18 @@ void cli_written(void);
  */
 void cli_extension(const char *option, const char *path, const char *list);
 
+/*
+ * A command that writes several files has several rows of one name, one after the other, such as
+ * "output": each with its own member and .extensions, one without for a folder. Returns the row
+ * that takes this path: that of its extension; of "csv:PATH", which is cut to PATH, that of .csv;
+ * of "-", a pipe or a device the first file; of a folder or a name without an extension the one
+ * without a list, else the first.
+ */
+const struct cli_option *cli_output_row(const struct cli_option *first, char **path);
+
+/* The extensions of all these rows, ".fis .csv": free(3). */
+char *cli_output_extensions(const struct cli_option *first);
+
 /* Whether it ends with an extension of the list. */
 bool cli_extension_in(const char *path, const char *list);
 

@@ -204,11 +204,10 @@ static void value(const struct cli_option *option, const char *text,
 	static const struct {
 		const char *name, *globs;
 	} kinds[] = {
-		{"calibration", "*.conf"}, {"model", "*.fis *.fx"},
-		{"data", "*.csv"},	   {"history", "*.csv"},
-		{"initial", "*.fis"},	   {"log", "*.csv"},
-		{"csv", "*.csv"},	   {"reference", "*.session"},
-		{"session", "*.session"},
+		{"calibration", "*.conf"},
+		{"model", "*.fis *.fx"},
+		{"data", "*.csv"},
+		{"reference", "*.session"},
 	};
 	const char *comma = strrchr(text, ',');
 
@@ -239,10 +238,14 @@ static void value(const struct cli_option *option, const char *text,
 static void options(const struct cli_command *command, bool letters)
 {
 	const struct cli_option *opt;
+	const char *before = "";
 
-	for (int i = 0; (opt = help_option(command, i)); i++) {
-		char *word = cli_text("--%s", opt->name);
+	for (int i = 0; (opt = help_option(command, i)); before = opt->name, i++) {
+		char *word;
 
+		if (!strcmp(opt->name, before)) /* another of its rows */
+			continue;
+		word = cli_text("--%s", opt->name);
 		complete_word(word, opt->help);
 		free(word);
 		word = cli_text("-%c", opt->id);
@@ -348,7 +351,9 @@ void complete_command(const struct cli_command *command, int n, char **words,
 			return;
 	}
 	if (option)
-		value(option, text, choices);
+		for (const char *name = option->name;
+		     option->name && !strcmp(option->name, name); option++)
+			value(option, text, choices);
 	else if (*text == '-')
 		options(command, !text[1]);
 	else

@@ -240,17 +240,26 @@ static const char *extension_of(const char *path)
 	return dot == name ? NULL : dot;
 }
 
+/* Length of the longest extension of the list that ends the path; 0: none does. */
+static size_t match_extension(const char *path, const char *list)
+{
+	size_t longest = 0;
+
+	for (size_t n; extension_of(path) && *(list += strspn(list, " ")); list += n) {
+		char *extension;
+
+		n = strcspn(list, " ");
+		extension = cli_text("%.*s", (int)n, list);
+		if (n > longest && cli_ends_with(path, extension))
+			longest = n;
+		free(extension);
+	}
+	return longest;
+}
+
 bool cli_extension_in(const char *path, const char *list)
 {
-	const char *extension = extension_of(path);
-	size_t length = extension ? strlen(extension) : 0;
-
-	for (size_t n; extension && *(list += strspn(list, " ")); list += n) {
-		n = strcspn(list, " ");
-		if (n == length && !strncmp(list, extension, n))
-			return true;
-	}
-	return false;
+	return match_extension(path, list);
 }
 
 void cli_extension(const char *option, const char *path, const char *list)
@@ -262,6 +271,72 @@ void cli_extension(const char *option, const char *path, const char *list)
 		return;
 	cli_usage("--%s: %s: unknown extension %s; give %s", option, path,
 		  extension_of(path), alternatives(list));
+}
+
+/* --- several files of one option -------------------------------------------------------- */
+
+static bool is_row_of(const struct cli_option *row, const struct cli_option *first)
+{
+	return row->name && !strcmp(row->name, first->name);
+}
+
+/* The row whose extension ends this path; NULL: none. */
+static const struct cli_option *row_of(const struct cli_option *first, const char *path)
+{
+	const struct cli_option *found = NULL;
+	size_t longest = 0;
+
+	for (const struct cli_option *row = first; is_row_of(row, first); row++) {
+		size_t n = row->extensions ? match_extension(path, row->extensions) : 0;
+
+		if (n > longest) {
+			longest = n;
+			found = row;
+		}
+	}
+	return found;
+}
+
+char *cli_output_extensions(const struct cli_option *first)
+{
+	char *list = cli_text("%s", first->extensions ? first->extensions : ""), *before;
+
+	for (const struct cli_option *row = first + 1; is_row_of(row, first); row++)
+		if (row->extensions) {
+			before = list;
+			list = cli_text("%s%s%s", before, *before ? " " : "",
+					row->extensions);
+			free(before);
+		}
+	return list;
+}
+
+const struct cli_option *cli_output_row(const struct cli_option *first, char **path)
+{
+	size_t form = strcspn(*path, ":/");
+	char *named = cli_text("x.%.*s", (int)form, *path);
+	const struct cli_option *row = first, *found = row_of(first, named);
+	struct stat st;
+	bool there = !stat(*path, &st), folder = there && S_ISDIR(st.st_mode);
+
+	free(named);
+	if ((*path)[form] == ':' && found) {
+		*path += form + 1;
+		return found;
+	}
+	if (!strcmp(*path, "-") || (there && !S_ISREG(st.st_mode) && !folder)) {
+		while (row->kind != CLI_KIND_OUTPUT && is_row_of(row + 1, first))
+			row++;
+		return row;
+	}
+	found = row_of(first, *path);
+	if (found)
+		return found;
+	/* An extension that none has is refused later: that the file is an input counts more. */
+	for (row = first; is_row_of(row, first); row++)
+		if (!row->extensions == !(extension_of(*path) && !folder))
+			return row;
+	return first;
 }
 
 /* --- files written ---------------------------------------------------------------------- */

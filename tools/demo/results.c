@@ -293,7 +293,7 @@ static void figure_force(const struct demo *demo)
 /* Draw the memberships of the paper's training, which moves them; the default one keeps them. */
 static void figure_membership(const struct demo *demo)
 {
-	struct incise_model *before = demo_model(demo, "paper-initial.fis");
+	struct incise_model *before = demo_model(demo, "paper.initial.fis");
 	struct incise_model *model = demo_model(demo, "paper.fis");
 	FILE *script;
 

@@ -353,7 +353,7 @@ static void make_log(double duration_s, struct incise_loop_options *loop)
 	if (ticks <= most)
 		loop->log = calloc((size_t)ticks, sizeof(*loop->log));
 	if (!loop->log)
-		cli_fail("--log: not enough memory for %.0f ticks; give a --duration "
+		cli_fail("--output: not enough memory for %.0f ticks; give a --duration "
 			 "of up to %.0f s, which takes half of it",
 			 ticks, floor(most / loop->rate_hz));
 	loop->log_size = (size_t)ticks;

@@ -346,7 +346,7 @@ static int prepare_next(struct supervisor *s, struct incise_error *err)
 	if (haptic->session || haptic->loop.ticked)
 		return incise_error_set(
 			err, EBUSY,
-			"--session and --procedure keep their scene; end this run, and "
+			"a session and --procedure keep their scene; end this run, and "
 			"start another with the changed scene");
 	if (haptic->mode != HAPTIC_LOOP)
 		return incise_error_set(

@@ -75,7 +75,7 @@ def measure(name, job, folder, title):
         return "left out", why, [], None
     command = [program] + ([] if own else [name]) + ["--json"] + (["--quick"] if job["quick"] else [])
     if shutil.which("gnuplot"):
-        command += ["--plot", os.path.join(folder, "plots", name)]
+        command += ["-o", os.path.join(folder, "plots", name)]
     with open(data, "wb") as out, open(os.memfd_create("said"), "w+b") as said:
         status = run(command, out, said, title)
         said.seek(0)

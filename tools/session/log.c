@@ -18,7 +18,7 @@ void session_path_parse(void *path, char *text)
 {
 	(void)path;
 	if (!strcmp(text, "-"))
-		cli_usage("--session: expected a file, not standard output, which "
+		cli_usage("--output: expected a file, not standard output, which "
 			  "reports use");
 }
 
@@ -34,7 +34,7 @@ void session_code_parse(void *code, char *text)
 void session_options_check(const struct session_options *options)
 {
 	if (options->code && !options->path)
-		cli_usage("--code needs --session (file to write)");
+		cli_usage("--code needs -o FILE.session (file to write)");
 }
 
 /* As much of the end of a path as there is place for. */

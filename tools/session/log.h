@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * The options --session and --code of a command that runs or shows a loop: it gives every tick, and
+ * The options -o FILE.session and --code of a command that runs or shows a loop: it gives every tick, and
  * the file is written at the end.
  */
 #ifndef INCISE_SESSION_LOG_H
@@ -17,9 +17,9 @@ struct session_options {
 
 /* Rows of the table of options, without the outer braces. */
 #define SESSION_OPTIONS(type, member)                                                   \
-	{0,                                                                             \
-	 "session",                                                                     \
-	 "FILE",                                                                        \
+	{'o',                                                                           \
+	 "output",                                                                      \
+	 "FILE.session",                                                                \
 	 "write a session file at the end, for incise assess",                          \
 	 CLI_OUTPUT(type, member.path),                                                 \
 	 .parse = session_path_parse,                                                   \
@@ -35,7 +35,7 @@ struct session_options {
 void session_path_parse(void *path, char *text);
 void session_code_parse(void *code, char *text);
 
-/* After parsing: --code without --session is bad usage. */
+/* After parsing: --code without a session is bad usage. */
 void session_options_check(const struct session_options *options);
 
 struct session_log;
@@ -48,7 +48,7 @@ struct session_start {
 	bool real; /* the clock is: the session has the time of the day */
 };
 
-/* Open the file, so that a wrong path fails before the run. NULL without --session, else fails. */
+/* Open the file, so that a wrong path fails before the run. NULL without a path, else fails. */
 struct session_log *session_log_begin(const struct session_options *options,
 				      const struct session_start *start);
 

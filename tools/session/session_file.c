@@ -19,7 +19,7 @@
 
 static const struct incise_infile_kind session_kind = {
 	.name = "a session",
-	.advice = "give a file that incise haptic --session wrote",
+	.advice = "give a file that incise haptic -o FILE.session wrote",
 	.size_max = FILE_MOST,
 };
 

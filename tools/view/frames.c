@@ -429,8 +429,8 @@ void view_job_view(struct view_job *job)
 	job->view = incise_view_new(job->scene, job->plan, &setup, &err);
 	if (!job->view)
 		cli_fail("%s%s", err.text,
-			 window ? "; without a display give --frames, --video or "
-				  "--strip"
+			 window ? "; without a display give -o FILE.mkv, FILE.png "
+				  "or DIR"
 				: "");
 	incise_view_panel(job->view, !job->no_panel, false);
 	incise_view_keys(job->view, keys, sizeof(keys) / sizeof(*keys));
