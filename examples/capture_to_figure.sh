@@ -13,7 +13,7 @@ cd "$1"
 
 incise capture -o cuts.rec --rig "$rig"
 incise verify cuts.rec
-incise export cuts.rec --average 12x10 --by-cut | tee pairs.csv |
+incise export cuts.rec --average 12x10,by-cut | tee pairs.csv |
 	incise train - --group cut -o force.fis
 incise plot cuts.rec -o recording.png
 incise plot force.fis --data pairs.csv -o force.svg

@@ -27,13 +27,19 @@ struct compile_job {
 static const struct cli_unit newtons[] = {
 	{"N", 1}, {"mN", 1e-3}, {"uN", 1e-6}, {"µN", 1e-6}, {0}};
 
-static void parse_arithmetic(void *arithmetic, char *text)
+static void parse_method(void *member, char *text)
 {
+	struct incise_fixed_options *options = member;
+	char *colon = strchr(text, ':');
 	const char *names[INCISE_FIXED_FORCE - INCISE_FIXED_DIRECT + 2] = {NULL};
 
 	for (int a = INCISE_FIXED_DIRECT; a <= INCISE_FIXED_FORCE; a++)
 		names[a - INCISE_FIXED_DIRECT] = incise_fixed_arithmetic_name(a);
-	*(int *)arithmetic = INCISE_FIXED_DIRECT + cli_choice("method", text, names);
+	if (colon)
+		*colon++ = '\0';
+	options->arithmetic = INCISE_FIXED_DIRECT + cli_choice("method", text, names);
+	if (colon)
+		options->cells = (int)cli_integer("method", colon, 1, 4096);
 }
 
 /* "out/pig liver.c" makes pig_liver, a C name of the file's own: free(3). */
@@ -70,11 +76,10 @@ static const struct cli_option options[] = {
 	 "largest certified error, for example 0.1mN, 50uN or 1e-4 in the output's "
 	 "unit (default: 0.1mN)",
 	 CLI_QUANTITY(struct compile_job, options.budget, newtons, 1e-9, 1e9)},
-	{0, "method", "KIND",
-	 "direct, table or force (default: the cheapest within the budget)",
-	 CLI_PARSED(struct compile_job, options.arithmetic, parse_arithmetic)},
-	{0, "cells", "N", "at least N cells per input of tables, up to 4096",
-	 CLI_INTEGER(struct compile_job, options.cells, 1, 4096)},
+	{0, "method", "KIND[:CELLS]",
+	 "direct, table or force (default: the cheapest within the budget); of "
+	 "tables with at least so many cells per input, up to 4096",
+	 CLI_PARSED(struct compile_job, options, parse_method)},
 	{0, "model", "FILE", "scene: use this model instead of its own",
 	 CLI_INPUT(struct compile_job, scene.model)},
 	{'r', "rig", "RIG",
@@ -94,7 +99,7 @@ static const struct cli_command command = {
 		"haptic loop and for kernels, with a certified bound of the error, over "
 		"the whole training range by interval arithmetic.",
 	.options = options,
-	.notes = "--budget, --method, --cells and -o FILE.c go with a model.",
+	.notes = "--budget, --method and -o FILE.c go with a model.",
 	.examples = "incise compile liver.fis --budget 0.1mN -o liver.fx\n"
 		    "incise compile neck --rig rig.conf -o neck.plan",
 };
@@ -243,7 +248,7 @@ int main(int argc, char **argv)
 		compile_model(&job, path);
 	} else {
 		if (is_of_model(&job))
-			cli_usage("%s: --budget, --method, --cells and -o FILE.c go "
+			cli_usage("%s: --budget, --method and -o FILE.c go "
 				  "with a model, this is a scene",
 				  path);
 		cli_extension("output", job.output, ".plan");

@@ -295,8 +295,8 @@ static json_t *other_splits(struct demo *demo, char *pairs, const json_t *first)
 		demo->quiet = true;
 		if (i)
 			report = RUN(demo, "train", pairs, "-o", model, "--overwrite",
-				     "--classic", "--check", "0.5", "--seed", seed,
-				     "--json");
+				     "--search", "classic", "--check", "0.5", "--seed",
+				     seed, "--json");
 		json_array_append(
 			errors,
 			json_object_get(json_object_get(i ? report : first, "check"),
@@ -350,13 +350,13 @@ static void walk(struct demo *demo, const char *loop_time)
 			    RUN(demo, "export", rec, "-o", pairs, "--average", BINS,
 				"--json"));
 	json_object_set_new(demo->summary, "export_by_cut",
-			    RUN(demo, "export", rec, "-o", by_cut, "--average", BINS,
-				"--by-cut", "--json"));
+			    RUN(demo, "export", rec, "-o", by_cut, "--average",
+				BINS ",by-cut", "--json"));
 	print_step(demo, "Train on random halves as the paper does, then by unseen cuts");
 	json_object_set_new(demo->summary, "train_random_halves",
-			    RUN(demo, "train", pairs, "-o", paper, "--classic", "--check",
-				"0.5", "--seed", seed_text, "-o", history, "-o", initial,
-				"--json"));
+			    RUN(demo, "train", pairs, "-o", paper, "--search", "classic",
+				"--check", "0.5", "--seed", seed_text, "-o", history,
+				"-o", initial, "--json"));
 	json_object_set_new(
 		demo->summary, "check_mse_N2_of_splits",
 		other_splits(demo, pairs,
@@ -411,11 +411,11 @@ static void film_scene(const char *scene, const char *folder)
 
 	begin_folder(folder);
 	run_view((char *const[]){"view", (char *)scene, "--procedure", "-o", film,
-				 "--fps", "30", NULL},
+				 "--rate", "30", NULL},
 		 folder);
 	run_view((char *const[]){"view", (char *)scene, "--procedure", "-o", strip,
 				 "--at", MOMENTS, "--size", "640x480", "--no-panel",
-				 "--viewpoint", NEAR, "--fps", "10", NULL},
+				 "--viewpoint", NEAR, "--rate", "10", NULL},
 		 folder);
 	end_folder(folder);
 	printf("\nwrote %s and %s\n", film, strip);

@@ -17,8 +17,11 @@
 
 struct eval_job {
 	const char *arith, *grid;
-	bool no_clamp, sd, parts, json;
+	bool no_clamp, json;
+	enum { NONE, TOTAL, PARTS } uncertainty;
 };
+
+static const char *const uncertainties[] = {"none", "total", "parts", NULL};
 
 static const struct cli_option options[] = {
 	{0, "arith", "KIND", "double (default) or fixed; a .fx is always fixed",
@@ -29,12 +32,11 @@ static const struct cli_option options[] = {
 	 "evaluate on a grid over the support instead of reading; prints inputs "
 	 "and output, an empty line after each row",
 	 CLI_TEXT(struct eval_job, grid)},
-	{0, "sd", NULL,
+	{0, "uncertainty", "WHICH",
 	 "also print the standard deviation of a new measurement, from "
-	 "MODEL.fis.sd, which incise train writes",
-	 CLI_FLAG(struct eval_job, sd)},
-	{0, "parts", NULL, "also print its parts: data, model and calibration; with --sd",
-	 CLI_FLAG(struct eval_job, parts)},
+	 "MODEL.fis.sd, which incise train writes: total, or parts, also its parts "
+	 "data, model and calibration (default: none)",
+	 CLI_CHOICE(struct eval_job, uncertainty, uncertainties)},
 	{0, "json", NULL, "report as JSON, one row for each evaluation",
 	 CLI_FLAG(struct eval_job, json)},
 	{0},
@@ -179,12 +181,13 @@ static void load_uncertainty(struct evaluator *e, const char *model)
 	char *path;
 
 	if (!e->model)
-		cli_usage("--sd: %s is compiled; give the .fis file that it was "
+		cli_usage("--uncertainty: %s is compiled; give the .fis file that it was "
 			  "compiled from",
 			  model);
 	if (!strcmp(model, "-"))
-		cli_fail("--sd: the model comes from standard input; give its file, "
-			 "next to which MODEL.fis.sd is");
+		cli_fail(
+			"--uncertainty: the model comes from standard input; give its file, "
+			"next to which MODEL.fis.sd is");
 	path = cli_text("%s.sd", model);
 	e->uncertainty = cli_require(incise_uncertainty_load(path, e->model, &err), &err);
 	free(path);
@@ -309,8 +312,6 @@ static void parse_eval(struct eval_job *job, int argc, char **argv)
 	if (job->no_clamp && job->arith && !strcmp(job->arith, "fixed"))
 		cli_usage("--no-clamp needs --arith double: fixed point cannot "
 			  "extrapolate");
-	if (job->parts && !job->sd)
-		cli_usage("--parts goes with --sd: it prints what that is made of");
 	if (job->grid && argc - optind == 2)
 		cli_usage("--grid does not go with a file of inputs: it evaluates "
 			  "points of its own");
@@ -337,8 +338,8 @@ int main(int argc, char **argv)
 	parse_eval(&job, argc, argv);
 	open_model(&e, argv[optind], job.arith, !job.no_clamp);
 	e.rows = job.json ? json_array() : NULL;
-	e.parts = job.parts;
-	if (job.sd)
+	e.parts = job.uncertainty == PARTS;
+	if (job.uncertainty)
 		load_uncertainty(&e, argv[optind]);
 	if (job.grid)
 		eval_grid(&e, job.grid);

@@ -2,6 +2,7 @@
 /*
  * incise export: makes a dataset of recordings, raw or averaged as in paper 1, §4.1.
  */
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -27,12 +28,27 @@ struct export_job {
 	struct incise_export_options how;
 };
 
-/* "12x10" */
+/* "12x10", "12x10,by-cut,depth=8" */
 static void parse_bins(void *options, char *text)
 {
+	static const struct cli_option keys[] = {
+		{0, "average by-cut", NULL, NULL,
+		 CLI_FLAG(struct export_job, how.by_cut)},
+		{0, "average depth", "MM", NULL,
+		 CLI_NUMBER(struct export_job, how.depth_max_mm, 0.1, 1e6)},
+		{0, "average velocity", "MM_S", NULL,
+		 CLI_NUMBER(struct export_job, how.velocity_max_mm_s, 0.1, 1e6)},
+		{0, "average count", "N", NULL,
+		 CLI_INTEGER(struct export_job, min_count, 1, 1000000000)},
+		{0},
+	};
 	struct incise_export_options *how = &((struct export_job *)options)->how;
-	char extra;
+	char extra, *comma = strchr(text, ',');
 
+	if (comma) {
+		*comma++ = '\0';
+		cli_keys(comma, keys, options);
+	}
 	if (sscanf(text, "%5d%*1[xX]%5d%c", &how->depth_bins, &how->velocity_bins,
 		   &extra) != 2 ||
 	    how->depth_bins < 1 || how->depth_bins > BINS_MAX || how->velocity_bins < 1 ||
@@ -40,6 +56,15 @@ static void parse_bins(void *options, char *text)
 		cli_usage("--average: expected DEPTHxVELOCITY, for example 12x10, each 1 "
 			  "to %d, found '%s'",
 			  BINS_MAX, text);
+}
+
+static void parse_part(void *options, char *text)
+{
+	struct incise_export_options *how = &((struct export_job *)options)->how;
+
+	cli_time_range("range", text, &how->from_s, &how->to_s);
+	if (isinf(how->to_s))
+		how->to_s = 0;
 }
 
 static void load_calibration(void *options, char *path)
@@ -68,25 +93,19 @@ static const struct cli_option options[] = {
 	 "export the whole recording with the pose, at each force sample or at "
 	 "--rate, with uncertainty and flags",
 	 CLI_FLAG(struct export_job, how.resample)},
-	{0, "from", "TIME", "begin so long after the first sample, for example 90s",
-	 CLI_DURATION(struct export_job, how.from_s, 0, 1e9)},
-	{0, "to", "TIME", "end so long after the first sample",
-	 CLI_DURATION(struct export_job, how.to_s, 1e-3, 1e9)},
+	{0, "range", "TIME..TIME",
+	 "the part to export, such as 2s..4.5s, 90s.. or ..1min; from the first "
+	 "sample (default: all)",
+	 CLI_PARSED_BY(parse_part)},
 	{0, "cut", "N", "only this cut, from 1",
 	 CLI_INTEGER(struct export_job, how.cut, 1, 1000000000)},
-	{'a', "average", "DEPTHxVELOCITY",
-	 "average in bins of depth and velocity, for example 12x10",
+	{'a', "average", "DEPTHxVELOCITY[,KEY...]",
+	 "average in bins of depth and velocity, for example 12x10; keys: by-cut "
+	 "averages each cut separately and names it in the column 'cut'; depth=MM "
+	 "and velocity=MM_S are the upper ends of the bins (default: largest where "
+	 "the blade advances); count=N leaves out bins with fewer samples (default: "
+	 "50)",
 	 CLI_PARSED_BY(parse_bins)},
-	{0, "by-cut", NULL, "average each cut separately and name it in the column 'cut'",
-	 CLI_FLAG(struct export_job, how.by_cut)},
-	{0, "depth-max", "MM",
-	 "upper end of the bins (default: largest where the blade advances)",
-	 CLI_NUMBER(struct export_job, how.depth_max_mm, 0.1, 1e6)},
-	{0, "velocity-max", "MM_S",
-	 "upper end of the bins (default: largest where the blade advances)",
-	 CLI_NUMBER(struct export_job, how.velocity_max_mm_s, 0.1, 1e6)},
-	{0, "min-count", "N", "leave out bins with fewer samples (default: 50)",
-	 CLI_INTEGER(struct export_job, min_count, 1, 1000000000)},
 	{'c', "calibration", "FILE",
 	 "use this calibration of force, camera and delays instead of that of the "
 	 "recordings; none: nominal values",
@@ -217,17 +236,11 @@ static void parse_export(struct export_job *job, int argc, char **argv)
 	if (how->resample && (how->depth_bins || (how->rate_hz > 0 && how->rate_hz < 1)))
 		cli_usage("--resample needs a --rate of 1 or more, and excludes "
 			  "--average");
-	if (how->to_s > 0 && how->to_s <= how->from_s)
-		cli_usage("--to %g s is not behind --from %g s", how->to_s, how->from_s);
 	if (how->cut && (how->resample || has_messages(job)))
-		cli_usage("--cut is of cuts; give --from and --to with --resample "
+		cli_usage("--cut is of cuts; give --range with --resample "
 			  "and" INCISE_MESSAGE_EXTENSIONS);
 	if (how->rate_hz > 0 && how->depth_bins)
 		cli_usage("--rate and --average exclude each other; give one of them");
-	if (!how->depth_bins && (how->by_cut || job->min_count || how->depth_max_mm > 0 ||
-				 how->velocity_max_mm_s > 0))
-		cli_usage("--by-cut, --depth-max, --velocity-max and --min-count go with "
-			  "--average");
 	if (how->tai && (how->depth_bins || has_messages(job)))
 		cli_usage("--tai goes with rows of" INCISE_ROW_EXTENSIONS
 			  ", without --average");

@@ -11,6 +11,19 @@
 
 static const char *const policies[] = {"fifo", "deadline", NULL};
 
+static void parse_policy(void *member, char *text)
+{
+	struct incise_realtime_setup *realtime = member;
+	char *colon = strncmp(text, "fifo:", 5) ? NULL : text + 4;
+
+	if (colon) {
+		*colon = '\0';
+		realtime->priority = (int)cli_integer("policy", colon + 1, 1,
+						      INCISE_REALTIME_PRIORITY_MAX);
+	}
+	realtime->policy = cli_choice("policy", text, policies);
+}
+
 static const struct cli_option options[] = {
 	{CLI_RIG_OPTION(struct haptic_job, rig)},
 	HAPTIC_TIP_OPTION,
@@ -29,11 +42,9 @@ static const struct cli_option options[] = {
 	 "outlives this program; starts incise feed, unless it runs",
 	 CLI_FLAG(struct haptic_job, in_kernel)},
 	HAPTIC_HOLD_OPTIONS,
-	{0, "policy", "POLICY", "fifo or deadline (default: fifo)",
-	 CLI_CHOICE(struct haptic_job, realtime.policy, policies)},
-	{0, "priority", "N", "priority of fifo, 1 to 84 (default: 80)",
-	 CLI_INTEGER(struct haptic_job, realtime.priority, 1,
-		     INCISE_REALTIME_PRIORITY_MAX)},
+	{0, "policy", "POLICY",
+	 "fifo, fifo:N of priority N, 1 to 84, or deadline (default: fifo:80)",
+	 CLI_PARSED(struct haptic_job, realtime, parse_policy)},
 	{0, "cpu", "N", "run the loop's thread on this CPU only (default: any)",
 	 CLI_INTEGER(struct haptic_job, realtime.cpu, 0, 1023)},
 	{0, "no-rt", NULL, "run with normal scheduling: ticks may be late",

@@ -24,7 +24,7 @@ static const char *const aligns[] = {"clocks", "tap", "sync", NULL};
 static const struct cli_option options[] = {
 	{'o', "output", "NAME.rec", "joined recording to write: a folder",
 	 CLI_OUTPUT(struct join_job, output), .extensions = ".rec"},
-	{0, "within", "TIME",
+	{0, "tolerance", "TIME",
 	 "refuse times that are uncertain by more, for example 1ms (default: state "
 	 "the uncertainty)",
 	 CLI_QUANTITY(struct join_job, how.within_s, joined_times, 1e-9, 3600)},
@@ -44,7 +44,7 @@ static const struct cli_command command = {
 		   "first one, by their wall time or by a signal that all recorded. The "
 		   "recordings stay as they are.",
 	.options = options,
-	.examples = "incise join force.rec tracker.rec --within 1ms -o day.rec",
+	.examples = "incise join force.rec tracker.rec --tolerance 1ms -o day.rec",
 };
 
 static void print_note(void *context, const char *text)

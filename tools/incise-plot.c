@@ -23,22 +23,11 @@ struct plot_job {
 };
 
 /* Either end may be missing. */
-static void parse_range(void *whole, char *text)
+static void parse_part(void *whole, char *text)
 {
 	struct plot_job *job = whole;
-	char *dots = strstr(text, "..");
 
-	if (!dots || (dots == text && !dots[2]))
-		cli_usage("--range: expected two times such as 2s..4.5s, got '%.40s'",
-			  text);
-	*dots = 0;
-	if (*text)
-		job->figure.from_s = cli_duration("range", text, 0, 1e9);
-	if (dots[2])
-		job->figure.to_s = cli_duration("range", dots + 2, 0, 1e9);
-	if (!(job->figure.from_s < job->figure.to_s))
-		cli_usage("--range: it ends at %g s, where it begins or before",
-			  job->figure.to_s);
+	cli_time_range("range", text, &job->figure.from_s, &job->figure.to_s);
 	job->range = true;
 }
 
@@ -49,7 +38,7 @@ static const struct cli_option options[] = {
 	{0, "range", "TIME..TIME",
 	 "of a recording: the part to draw, such as 2s..4.5s, 90s.. or ..1min; "
 	 "from its first force sample (default: all)",
-	 CLI_PARSED_BY(parse_range)},
+	 CLI_PARSED_BY(parse_part)},
 	{0, "data", "DATA.csv", "of a model: also draw the residuals of this dataset",
 	 CLI_INPUT(struct plot_job, figure.data)},
 	{0},

@@ -23,7 +23,6 @@
 
 enum camera { CAMERA_AUTO, CAMERA_OFF, CAMERA_FRAMES };
 static const char *const cameras[] = {"auto", "off", "frames", NULL};
-static const char *const versions[] = {"auto", "1", "2", NULL};
 
 struct serve_job {
 	const char *rig, *calibration, *lsl;
@@ -34,20 +33,29 @@ struct serve_job {
 	bool json, verbose;
 };
 
+static void parse_igtl(void *member, char *text)
+{
+	struct serve_igtl_options *igtl = member;
+	char *slash = strchr(text, '/');
+
+	if (slash) {
+		*slash = '\0';
+		igtl->version = (int)cli_integer("igtl", slash + 1, 1, 2);
+	}
+	igtl->address = text;
+}
+
 static const struct cli_option options[] = {
 	{'r', "rig", "RIG",
 	 "serve the devices of this rig: file rig.conf, or sim:KEY=VALUE,… for the "
 	 "simulated rig",
 	 CLI_INPUT(struct serve_job, rig)},
 	CALIBRATION_OPTION(struct serve_job, calibration),
-	{0, "igtl", "[ADDR:]PORT",
+	{0, "igtl", "[ADDR:]PORT[/VERSION]",
 	 "serve OpenIGTLink there (default: 127.0.0.1:18944); without ADDR to this "
-	 "machine only; there is no authentication",
-	 CLI_TEXT(struct serve_job, igtl.address)},
-	{0, "igtl-version", "VERSION",
-	 "header version: 1, 2, or auto, which is 1 until a client sends 2 "
-	 "(default: auto)",
-	 CLI_CHOICE(struct serve_job, igtl.version, versions)},
+	 "machine only; there is no authentication; headers of version 1 or 2 "
+	 "(default: 1 until a client sends 2)",
+	 CLI_PARSED(struct serve_job, igtl, parse_igtl)},
 	{0, "lsl", "PREFIX",
 	 "offer streams of the Lab Streaming Layer, too: PREFIX-pose, "
 	 "PREFIX-force, PREFIX-events; to the whole network",

@@ -64,7 +64,7 @@ static void parse_type(void *type, char *text)
 	const char *const names[] = {incise_mf_type_name(types[0]),
 				     incise_mf_type_name(types[1]), NULL};
 
-	*(enum incise_mf_type *)type = types[cli_choice("mf-type", text, names)];
+	*(enum incise_mf_type *)type = types[cli_choice("search type", text, names)];
 }
 
 static void parse_uncertainty(void *wanted, char *text)
@@ -76,16 +76,47 @@ static void parse_uncertainty(void *wanted, char *text)
 						       : UNCERTAINTIES_NONE;
 }
 
-static void parse_shard(void *shard, char *text)
+static void parse_share(void *whole, char *text)
 {
-	struct shard *to = shard;
+	struct train_options *options = whole;
 	char *slash = strchr(text, '/');
 
+	options->mpi = !strcmp(text, "mpi");
+	if (options->mpi)
+		return;
 	if (!slash)
-		cli_usage("--shard %s: expected I/N, for example 3/16", text);
+		cli_usage("--share %s: expected I/N, for example 3/16, or mpi", text);
 	*slash = '\0';
-	to->of = cli_integer("shard", slash + 1, 1, 1000000);
-	to->at = cli_integer("shard", text, 1, to->of);
+	options->shard.of = cli_integer("share", slash + 1, 1, 1000000);
+	options->shard.at = cli_integer("share", text, 1, options->shard.of);
+}
+
+static void parse_part(void *whole, char *text)
+{
+	struct recording_rows *rows = &((struct train_options *)whole)->rows;
+
+	cli_time_range("range", text, &rows->from_s, &rows->to_s);
+	if (isinf(rows->to_s))
+		rows->to_s = 0;
+}
+
+static void parse_search(void *whole, char *text)
+{
+	static const struct cli_option keys[] = {
+		{0, "search type", "KIND", NULL,
+		 CLI_PARSED(struct train_options, how.type, parse_type)},
+		{0, "search starts", "N", NULL,
+		 CLI_INTEGER(struct train_options, how.train.starts, 1, 100)},
+		{0, "search sample", "N", NULL,
+		 CLI_INTEGER(struct train_options, sample, 0, 1000000000)},
+		{0, "search classic", NULL, NULL,
+		 CLI_FLAG(struct train_options, how.train.classic)},
+		{0, "search step", "K", NULL,
+		 CLI_NUMBER(struct train_options, how.train.step, 1e-9, 10)},
+		{0},
+	};
+
+	cli_keys(text, keys, whole);
 }
 
 static const struct cli_option option_table[] = {
@@ -118,11 +149,10 @@ static const struct cli_option option_table[] = {
 	 "rows per second of a recording, each the mean of its samples (default: "
 	 "all samples)",
 	 CLI_NUMBER(struct train_options, rows.rate_hz, 0.1, 1e6)},
-	{0, "from", "TIME",
-	 "of each recording: begin so long after its first sample, for example 90s",
-	 CLI_DURATION(struct train_options, rows.from_s, 0, 1e9)},
-	{0, "to", "TIME", "of each recording: end so long after its first sample",
-	 CLI_DURATION(struct train_options, rows.to_s, 1e-3, 1e9)},
+	{0, "range", "TIME..TIME",
+	 "of each recording: the part to use, such as 90s.., from its first sample "
+	 "(default: all)",
+	 CLI_PARSED_BY(parse_part)},
 	{0, "cut", "N", "of each recording: only this cut, from 1",
 	 CLI_INTEGER(struct train_options, rows.cut, 1, 1000000000)},
 	RECORDING_DAMAGED(struct train_options, rows.damaged),
@@ -142,35 +172,23 @@ static const struct cli_option option_table[] = {
 	 "membership functions per input (default: 5,4 for two inputs, else 3 "
 	 "each), or auto: chosen by cross-validation",
 	 CLI_PARSED_BY(parse_mfs)},
-	{0, "mf-type", "KIND", "gaussmf (default) or gbellmf",
-	 CLI_PARSED(struct train_options, how.type, parse_type)},
 	{0, "epochs", "N", "largest number of epochs (default: 80)",
 	 CLI_INTEGER(struct train_options, how.train.epochs, 1, 100000)},
-	{0, "step", "K",
-	 "initial step of the membership functions' parameters (default: 0.01); "
-	 "only with --classic",
-	 CLI_NUMBER(struct train_options, how.train.step, 1e-9, 10)},
+	{0, "search", "KEY[=VALUE],...",
+	 "of the membership functions: type=gaussmf (default) or gbellmf; starts=N, "
+	 "starting points (default: 3); sample=N, pairs at random, 0 for all "
+	 "(default: 3000); classic: train as MATLAB's anfis does, with no scaling "
+	 "and a ridge of 1e-6, and the held-out data choose the epoch; step=K, with "
+	 "classic: initial step (default: 0.01)",
+	 CLI_PARSED_BY(parse_search)},
 	{0, "ridge", "R",
 	 "one ridge on scaled data (default: an average of fits, weighted by "
 	 "cross-validation)",
 	 CLI_NUMBER(struct train_options, how.train.ridge, 0, 1e12)},
-	{0, "starts", "N",
-	 "number of starting points of the membership functions (default: 3)",
-	 CLI_INTEGER(struct train_options, how.train.starts, 1, 100)},
-	{0, "sample", "N",
-	 "pairs that the search of the membership functions uses, at random; 0: "
-	 "all (default: 3000)",
-	 CLI_INTEGER(struct train_options, sample, 0, 1000000000)},
-	{0, "classic", NULL,
-	 "train as MATLAB's anfis does: no scaling, a ridge of 1e-6; the held-out "
-	 "data choose the epoch",
-	 CLI_FLAG(struct train_options, how.train.classic)},
-	{0, "shard", "I/N",
-	 "use share I of N of the sources, from 1: for the tasks of a job array; "
-	 "needs -o FILE.fac",
-	 CLI_PARSED(struct train_options, shard, parse_shard)},
-	{0, "mpi", NULL, "share the sources among the processes of mpirun",
-	 CLI_FLAG(struct train_options, mpi)},
+	{0, "share", "I/N|mpi",
+	 "use share I of N of the sources, from 1, for the tasks of a job array, "
+	 "with -o FILE.fac; or share the sources among the processes of mpirun",
+	 CLI_PARSED_BY(parse_share)},
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct train_options, json)},
 	{0},
 };
@@ -231,12 +249,12 @@ static void parse_train(struct train_options *options, int argc, char **argv)
 			options->sample ? (size_t)options->sample : SIZE_MAX;
 	if (options->sample >= 0 && (options->premises || options->how.train.classic))
 		cli_usage(
-			"--sample: --premises and --classic do not search on a sample; leave "
-			"it out");
+			"--search sample: --premises and classic do not search on a sample; "
+			"leave it out");
 	if (options->shard.of && !options->factor)
 		cli_usage(
-			"--shard: missing --factor SHARE.fac; incise merge makes a model of "
-			"all shares");
+			"--share: missing -o FILE.fac; incise merge makes a model of all "
+			"shares");
 	for (long i = options->shard.at - 1, n = 0;
 	     options->shard.of && i < (argc - optind); i += options->shard.of) {
 		options->paths[n++] = options->paths[i];
@@ -244,7 +262,7 @@ static void parse_train(struct train_options *options, int argc, char **argv)
 	}
 	if (options->shard.of > argc - optind)
 		cli_usage(
-			"--shard: %ld shares of %d sources; give at least one source for "
+			"--share: %ld shares of %d sources; give at least one source for "
 			"each",
 			options->shard.of, argc - optind);
 	if (options->factor && !options->premises)
@@ -259,9 +277,10 @@ static void parse_train(struct train_options *options, int argc, char **argv)
 	    (options->how.train.classic || options->initial || options->history ||
 	     options->n_mfs || options->auto_mfs))
 		cli_usage("--premises keeps the membership functions; leave out --mf, "
-			  "--classic and files of a training (.initial.fis, .csv)");
+			  "classic and files of a training (.initial.fis, .csv)");
 	if (options->mpi && options->how.train.classic)
-		cli_usage("--classic keeps all pairs in one memory; leave out --mpi");
+		cli_usage("--search classic keeps all pairs in one memory; leave out "
+			  "--share mpi");
 	if (options->factor && options->json)
 		cli_usage("--json reports a model; leave it out with -o %s",
 			  options->factor);
@@ -427,9 +446,9 @@ static void choose_columns(struct train_options *options, const char **columns)
 /* Ways that cannot carry uncertainties are refused. */
 static void check_weighed(const struct train_options *options)
 {
-	const char *way = options->factor	       ? "--factor"
-			  : options->mpi	       ? "--mpi"
-			  : options->how.train.classic ? "--classic"
+	const char *way = options->factor	       ? "-o FILE.fac"
+			  : options->mpi	       ? "--share mpi"
+			  : options->how.train.classic ? "--search classic"
 						       : NULL;
 
 	/* All processes find the same. */
@@ -540,7 +559,7 @@ static json_t *warnings(const struct train_options *options,
 		{"linear regression", baselines->linear},
 		{"k nearest neighbours", baselines->knn},
 	};
-	/* With --classic the check data chose the epoch: they were seen. */
+	/* With classic the check data chose the epoch: they were seen. */
 	const char *data = !options->how.check		? "its own"
 			   : options->how.train.classic ? "the check"
 							: "unseen";
@@ -862,8 +881,9 @@ int main(int argc, char **argv)
 	choose_columns(&options, columns);
 	choose_uncertainties(&options, &uncertainties);
 	if (job && job->size == 1)
-		cli_warn("--mpi: a single process; start several by 'mpirun -n N incise "
-			 "train …'");
+		cli_warn(
+			"--share mpi: a single process; start several by 'mpirun -n N incise "
+			"train …'");
 	sources = sources_new(options.paths, options.n_paths, &options.rows);
 	data = cli_text("%d sources", options.n_paths);
 	options.data = options.n_paths > 1	 ? data

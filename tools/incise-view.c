@@ -68,7 +68,8 @@ static const struct cli_option options[] = {
 	 "show a scripted procedure: cut, bleeding, enlarging, tube",
 	 CLI_FLAG(struct view_job, procedure)},
 	{'o', "output", "DIR",
-	 "no window: write a PNG file for each frame into this folder",
+	 "no window: write a PNG file for each frame into this folder; none: write "
+	 "nothing, draw in real time and report the frame rate",
 	 CLI_OUTPUTS(struct view_job, output.folder)},
 	{'o', "output", "FILE.mkv", "no window: write a film (Matroska)",
 	 CLI_OUTPUT(struct view_job, output.film_path), .extensions = ".mkv"},
@@ -76,14 +77,11 @@ static const struct cli_option options[] = {
 	 "no window: write a few frames side by side, with --at",
 	 CLI_OUTPUT(struct view_job, output.strip_path), .extensions = ".png"},
 	SESSION_OPTIONS(struct view_job, session),
-	{0, "no-output", NULL,
-	 "no window and no files: draw in real time and report the frame rate",
-	 CLI_FLAG(struct view_job, no_output)},
 	{0, "at", "TIMES", "times of the frames of FILE.png, for example 2s,6s,12s,20s",
 	 CLI_PARSED_BY(parse_times)},
 	{0, "size", "WxH", "width and height in pixels (default: 1280x720)",
 	 CLI_PARSED_BY(parse_size)},
-	{0, "fps", "N", "frames per second of files, 1 to 240 (default: 60)",
+	{0, "rate", "HZ", "frames per second of files, 1 to 240 (default: 60)",
 	 CLI_INTEGER(struct view_job, output.fps, 1, 240)},
 	{0, "duration", "TIME", "end after this time",
 	 CLI_DURATION(struct view_job, duration_s, 0.01, 86400)},
@@ -127,8 +125,11 @@ static void parse(struct view_job *job, int argc, char **argv)
 			  job->output.strip_path);
 	if (job->output.n_strip && !job->output.strip_path)
 		cli_usage("--at needs -o FILE.png (file to write)");
+	job->no_output = job->output.folder && !strcmp(job->output.folder, "none");
+	if (job->no_output)
+		job->output.folder = NULL;
 	if (job->no_output && view_output_wanted(&job->output))
-		cli_usage("--no-output does not go with -o (files to write)");
+		cli_usage("-o none does not go with files to write");
 	if (job->output.film_path && (job->output.width % 2 || job->output.height % 2))
 		cli_usage("-o %s needs an even width and height; change --size",
 			  job->output.film_path);

@@ -13,8 +13,8 @@ int incise_ranks_open(const struct incise_ranks **ranks, struct incise_error *er
 {
 	struct incise_module module;
 	joiner *join;
-	int rc = incise_module_find(&module, FILE_NAME, "incise_ranks_join", "--mpi",
-				    "libopenmpi-dev is", err);
+	int rc = incise_module_find(&module, FILE_NAME, "incise_ranks_join",
+				    "--share mpi", "libopenmpi-dev is", err);
 
 	if (rc)
 		return rc;
@@ -24,6 +24,6 @@ int incise_ranks_open(const struct incise_ranks **ranks, struct incise_error *er
 	return *ranks ? 0
 		      : incise_error_set(
 				err, EIO,
-				"--mpi: MPI does not start; run 'mpirun -n N incise "
-				"train --mpi …'");
+				"--share mpi: MPI does not start; run 'mpirun -n N incise "
+				"train --share mpi …'");
 }

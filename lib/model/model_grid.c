@@ -165,8 +165,8 @@ static int check_input(const struct incise_model *model, int i, struct incise_er
 			return incise_error_set(
 				err, ENOTSUP,
 				"fixed point: input %s, function %s is a %s, only "
-				"gaussmf has a fixed-point form; train with --mf-type "
-				"gaussmf or use double",
+				"gaussmf has a fixed-point form; train with "
+				"--search type=gaussmf or use double",
 				v->name, mf->name, incise_mf_type_name(mf->type));
 		if (fabs(mf->p[1]) > X_MAX)
 			return incise_error_set(

@@ -461,7 +461,7 @@ static int no_cut(const struct pass *pass, const char *path, const char *others)
 		return incise_error_set(
 			pass->err, ENODATA,
 			"%s%s: no cut in the part from %g s; give another "
-			"--from and --to, or the rows of all of it "
+			"--range, or the rows of all of it "
 			"(--resample)",
 			path, others, o->from_s);
 	if (isinf(pass->depth_deepest_mm))

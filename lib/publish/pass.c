@@ -110,10 +110,9 @@ int incise_export_check_part(const struct incise_export_pass *pass)
 
 	if (pass->report.rows || !first->range.limited)
 		return 0;
-	return incise_error_set(
-		pass->err, ENODATA,
-		"%s: has nothing in this part; give another --from and --to",
-		first->path);
+	return incise_error_set(pass->err, ENODATA,
+				"%s: has nothing in this part; give another --range",
+				first->path);
 }
 
 int incise_export_each(struct incise_export_pass *pass,

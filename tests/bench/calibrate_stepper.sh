@@ -48,7 +48,7 @@ awk -v n="${1:-200}" '
 	}' >"$work/rigs"
 
 while read -r seed truth backlash rig; do
-	"$program" --rig "$rig" -c "$work/c.conf" --dry-run --json --no-rate --strokes 2 \
+	"$program" --rig "$rig" -c "$work/c.conf" --dry-run --json --no-rate --repeat 2 \
 		>"$work/r.json" || echo "seed $seed failed" >&2
 	sed -n 's/^  "\(N_step\|N_step_u\|backlash_mm\|backlash_u_mm\)": \([^,]*\),*$/\1 \2/p' \
 		"$work/r.json" | awk -v truth="$truth" -v backlash="$backlash" '

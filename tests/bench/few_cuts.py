@@ -68,7 +68,7 @@ def simulate(folder, number, keys):
     pairs = os.path.join(folder, "rig%02d.csv" % number)
     rig = "sim:seed=%d,clock=simulated%s" % (SEED + number, keys)
     incise("capture", "-o", recording, "--rig", rig)
-    incise("export", recording, "-o", pairs, "--average", "12x10", "--by-cut")
+    incise("export", recording, "-o", pairs, "--average", "12x10,by-cut")
     return pairs
 
 
@@ -140,7 +140,7 @@ def ours(folder, x, y, cut, unseen):
     inputs = ["--inputs", "depth,velocity", "--group", "cut"]
     incise("train", data, *inputs, "-o", model, "--overwrite")
     lines = "".join("%.17g %.17g\n" % tuple(row) for row in unseen)
-    text = incise("eval", model, "--sd", "--no-clamp", text=lines)
+    text = incise("eval", model, "--uncertainty", "total", "--no-clamp", text=lines)
     return numpy.array([line.split()[:2] for line in text.splitlines()], dtype=float).T
 
 

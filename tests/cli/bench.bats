@@ -268,7 +268,7 @@ setup() {
 	holds "$(row r.json fixed_table max_error_N) < 1e-4"
 	run --separate-stderr incise bench precision none.fis
 	failed_with none.fis
-	incise train pairs.csv --mf-type gbellmf -o bell.fis 2>/dev/null
+	incise train pairs.csv --search type=gbellmf -o bell.fis 2>/dev/null
 	run --separate-stderr incise bench precision bell.fis
 	failed_with gbellmf
 }

@@ -11,17 +11,17 @@ setup() {
 
 # Whether OpenGL draws here without a screen.
 draws() {
-	incise view "$root/scenes/neck.scene" --procedure --no-output --duration 0.1s \
+	incise view "$root/scenes/neck.scene" --procedure -o none --duration 0.1s \
 		>out 2>err || skip "nothing draws here: $(cat err)"
 }
 
-@test "incise view --no-output says how often it drew" {
+@test "incise view -o none says how often it drew" {
 	draws
 	[ "$(wc -l <out)" = 1 ]
 	[[ "$(cat out)" =~ ^[0-9.]+\ frames\ per\ second:\ [0-9]+\ in\ [0-9.]+\ s,\ 1280x720,\ 2048\ texels,\ .+ ]]
-	run --separate-stderr incise view "$root/scenes/neck.scene" --procedure --no-output \
+	run --separate-stderr incise view "$root/scenes/neck.scene" --procedure -o none \
 		-o a.png --at 1s
-	bad_usage "--no-output"
+	bad_usage "-o none"
 }
 
 # bats test_tags=slow

@@ -31,7 +31,7 @@ setup() {
 
 # bats test_tags=slow
 @test "the camera too, and any of them is the reference" {
-	incise calibrate delay --rig $rig --duration 12s --with-camera -o k.rec --json --dry-run >r.json </dev/null
+	incise calibrate delay --rig $rig --duration 12s --camera frames -o k.rec --json --dry-run >r.json </dev/null
 	[ ! -e calibration.conf ]
 	holds "($(key r.json 'values[2].left'))^2 < 0.3^2"
 	[ "$(key r.json 'values[2].key')" = camera_delay_ms ]

@@ -70,8 +70,8 @@ pairs() {
 	[[ "$output" == *"known length "*"together "*"pass: +0.00 % from the nominal 0.11875 mm/px, within 5 %; U is "* ]]
 	[ "$(in_force depth_mm_px)" = 0.11875 ]
 	# the next one has it as found; units, repeats and uncertainties as given
-	run -0 incise calibrate depth two-point --length 4.75cm --length-u 0.01mm \
-		--pixels 380,380.2,379.8 --pixels-u 0.05 --nominal 0.125 --json
+	run -0 incise calibrate depth two-point --length 4.75cm --given-u length=0.01mm \
+		--pixels 380,380.2,379.8 --given-u pixels=0.05 --nominal 0.125 --json
 	echo "$output" >report.json
 	[ "$(key report.json found_mm_px)" = 0.11875 ]
 	holds "$(key report.json depth_mm_px) == 0.125"
@@ -91,7 +91,7 @@ pairs() {
 	holds "($(key report.json full_px) - 47.5 / 0.13)^2 < 0.05^2"
 	grep -q 'raw = "kept.csv"' calibration.conf
 	# what was kept gives the same
-	run -0 incise calibrate depth two-point --from kept.csv --pixels-u 0.03 --nominal 0.13 --json --dry-run
+	run -0 incise calibrate depth two-point --from kept.csv --given-u pixels=0.03 --nominal 0.13 --json --dry-run
 	echo "$output" >again.json
 	holds "($(key again.json depth_mm_px) - $(key report.json depth_mm_px))^2 < 1e-16"
 	# thresholds that fit go to rig.conf
@@ -123,13 +123,13 @@ pairs() {
 # bats test_tags=check
 @test "a line of pairs: outliers and swapped rows are named, and left out" {
 	pairs >pairs.csv
-	run -0 incise calibrate depth line --from pairs.csv --nominal 0.125 --gauge-u 0 --json
+	run -0 incise calibrate depth line --from pairs.csv --nominal 0.125 --given-u gauge=0 --json
 	echo "$output" >report.json
 	holds "($(key report.json depth_mm_px) - 0.125)^2 < $(key report.json U_mm_px)^2"
 	holds "$(key report.json U_mm_px) < 0.0001"
 	holds "($(key report.json full_px) - 380)^2 < 0.1^2"
 	pairs '(i == 7 || i == 21) ? 1 : (i == 30 || i == 33) ? 2 : 0' >wrong.csv
-	run -0 incise calibrate depth line --from wrong.csv --nominal 0.125 --gauge-u 0
+	run -0 incise calibrate depth line --from wrong.csv --nominal 0.125 --given-u gauge=0
 	[[ "$output" == *"40 (36 accepted, effective n = "* ]]
 	[[ "$output" == *"outlier        row 8: "* && "$output" == *"outlier        row 22: "* ]]
 	[[ "$output" == *"outlier        row 31: "*"; the columns may be swapped"* ]]
@@ -172,7 +172,7 @@ pairs() {
 
 @test "one that does not pass is in the history, and not in force" {
 	incise calibrate depth two-point --pixels 400 >/dev/null
-	run --separate-stderr incise calibrate depth two-point --pixels 390 --pixels-u 3
+	run --separate-stderr incise calibrate depth two-point --pixels 390 --given-u pixels=3
 	failed_with "refused, the previous calibration stays active: U is 1.5"
 	[ "$(in_force depth_mm_px)" = 0.11875 ]
 	[ "$(grep -c 'kind = "depth"' calibration.conf)" -eq 2 ]
@@ -222,7 +222,7 @@ pairs() {
 	need_board
 	truth=$BATS_FILE_TMPDIR/truth.json
 	run -0 --separate-stderr incise calibrate depth board --from "$BATS_FILE_TMPDIR"/board/view*.pgm \
-		--board 9x6 --square 5mm -o corners.csv -o report
+		--board 9x6,5mm -o corners.csv -o report
 	[ -z "$stderr" ]
 	[ "$(key report/report.json pass)" = 1 ]
 	holds "($(key report/report.json depth_mm_px) / $(key "$truth" mm_px) - 1)^2 < 0.001^2"

@@ -57,19 +57,19 @@ made_weights() {
 	failed_with "refused, the previous calibration stays active" "-16.67 % from the nominal 1500 mV/N, more than 5 %"
 	run ! grep -q '^force_mV_N' calibration.conf
 	grep -q 'pass = false;' calibration.conf
-	run -0 incise calibrate force --from w.csv --latitude 48 --altitude 300
+	run -0 incise calibrate force --from w.csv --gravity latitude=48,altitude=300
 	[[ "$output" == *"force_mV_N  1249."*" ± "*" mV/N  1240."*" (nominal)  +"*" mV/N (+0."*" %)"* ]]
 	grep -q '^force_mV_N = ' calibration.conf
 }
 
 @test "the report ends with value, U, previous value, change, limits and file" {
 	made_weights "" >w.csv
-	run -0 incise calibrate force --from w.csv --latitude 48
+	run -0 incise calibrate force --from w.csv --gravity latitude=48
 	[ "${lines[-2]%%,*}" = "pass: +0.78 % from the nominal 1240 mV/N" ] || complain "$output"
 	[[ "${lines[-2]}" == *", within 5 %; U = "* ]]
 	[ "${lines[-1]}" = "wrote calibration.conf: active from now on" ]
 	# the next one has the date of this one, whose value is the same
-	run -0 incise calibrate force --from w.csv --latitude 48 --dry-run -o r
+	run -0 incise calibrate force --from w.csv --gravity latitude=48 --dry-run -o r
 	[[ "${lines[-5]}" =~ ^result\ +value\ ±\ U\ \(k\ =\ 2\)\ +previous\ +change$ ]] || complain "$output"
 	[[ "${lines[-4]}" == "force_mV_N  12"*" ± "*" mV/N  12"*" ($(date -u +%Y)-"*")  +0.0"*" mV/N (+0.00 %)" ]] || complain "$output"
 	[ "${lines[-2]}" = "calibration.conf: not written (--dry-run)" ]
@@ -100,7 +100,7 @@ made_weights() {
 @test "a weight beyond the converter's end does not hold up those after it" {
 	# 5 V less 180 mV at 1260 mV/N are 3.83 N: 500 g are too much
 	incise calibrate force --rig sim:clock=simulated,force_mV_N=1260 \
-		--weights 0,100g,200g,300g,500g --series 3 >out 2>err
+		--weights 0,100g,200g,300g,500g --repeat 3 >out 2>err
 	grep -q 'pairs  *18 of 21 used, 4 loads, 3 series; 3 saturated, 0 outliers' out
 }
 

@@ -112,8 +112,8 @@ within() {
 
 # bats test_tags=check
 @test "uncertainties that are not measured are taken as options, and asked for on a terminal" {
-	incise calibrate tip --rig sim:clock=simulated,motion=1 --duration 20s --u-surface 0.1 </dev/null
-	incise calibrate delay --rig sim:clock=simulated,motion=2 --duration 15s --u-reference 0.01 </dev/null
+	incise calibrate tip --rig sim:clock=simulated,motion=1 --duration 20s --given-u surface=0.1 </dev/null
+	incise calibrate delay --rig sim:clock=simulated,motion=2 --duration 15s --given-u reference=0.01 </dev/null
 	grep -q '^surface_u_mm = 0.1;' calibration.conf
 	grep -q '^force_delay_sd_ms = 0.01;' calibration.conf
 	# after both, depth and time have theirs; nothing leads back to a calibration that is there

@@ -50,7 +50,7 @@ sorted() {
 # bats test_tags=check
 @test "options and values, as bash takes the words apart" {
 	complete_words incise train --m
-	[ "${COMPREPLY[*]}" = "--mf --mf-type --mpi" ]
+	[ "${COMPREPLY[*]}" = "--mf" ]
 	# letters, too
 	complete_words incise train -
 	[[ " ${COMPREPLY[*]} " == *" -o "* ]]
@@ -238,14 +238,14 @@ typed_at() { # SHELL… -- SETUP KEYS
 		typed_at zsh -f -i -- "$begin" "$keys"
 	done <<-'END'
 		incise verif\t=>verify 
-		incise train --mf-type ga\t=>gaussmf 
+		incise train --search ty\t=>type 
 		incise haptic neck --policy=fi\t=>--policy=fifo 
 		incise capture --rig sim:see\t=>sim:seed=
 		incise train two\t=>two\ words.csv 
 		incise bench stab\t=>stability 
 		incise plan ne\t=>neck 
 		incise calibrate dep\t=>depth 
-		incise train --classi\t=>--classic 
+		incise train --shar\t=>--share 
 		incise ex\t=>export 
 		incise train --in\t\t=>input columns
 	END

@@ -118,7 +118,7 @@ group() {
 
 # bats test_tags=check
 @test "doctor knows the age of each calibration" {
-	incise calibrate force --rig sim:clock=simulated --weights 0,50g,100g,200g --series 3 \
+	incise calibrate force --rig sim:clock=simulated --weights 0,50g,100g,200g --repeat 3 \
 		--duration 200ms >/dev/null
 	run --separate-stderr incise doctor --rig sim:
 	[[ "$(finding calibration force)" == "  ok "*"0 days old" ]]

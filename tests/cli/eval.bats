@@ -6,7 +6,7 @@ load cli
 setup_file() {
 	made_pairs >"$BATS_FILE_TMPDIR/pairs.csv"
 	incise train "$BATS_FILE_TMPDIR/pairs.csv" -o "$BATS_FILE_TMPDIR/m.fis" 2>/dev/null
-	incise train "$BATS_FILE_TMPDIR/pairs.csv" --mf-type gbellmf \
+	incise train "$BATS_FILE_TMPDIR/pairs.csv" --search type=gbellmf \
 		-o "$BATS_FILE_TMPDIR/bell.fis" 2>/dev/null
 }
 
@@ -160,45 +160,45 @@ refuses() {
 }
 
 # bats test_tags=check
-@test "eval --sd prints force and standard deviation" {
+@test "eval --uncertainty total prints force and standard deviation" {
 	printf '5 20\n12 3\n999 20\n20 20\n' >points
-	incise eval m.fis points --sd >got 2>/dev/null
+	incise eval m.fis points --uncertainty total >got 2>/dev/null
 	# the force is the same as without
 	diff <(cut -d' ' -f1 got) <(incise eval m.fis points 2>/dev/null)
 	[ "$(awk 'NF == 2 && $2 > 0' got | wc -l)" -eq 4 ]
 	# outside counts as its nearest end
 	[ "$(sed -n 3p got)" = "$(sed -n 4p got)" ]
-	incise eval m.fis points --sd --json >r.json 2>/dev/null
+	incise eval m.fis points --uncertainty total --json >r.json 2>/dev/null
 	holds "($(key r.json 'rows[1].sd_N') - $(sed -n '2s/.* //p' got))^2 < 1e-18"
-	[ "$(incise eval m.fis --grid 2x2 --sd | awk 'NF == 4' | wc -l)" -eq 4 ]
+	[ "$(incise eval m.fis --grid 2x2 --uncertainty total | awk 'NF == 4' | wc -l)" -eq 4 ]
 	# any arithmetic: the deviation is that of the model
-	diff <(cut -d' ' -f2 got) <(incise eval m.fis points --sd --arith fixed 2>/dev/null | cut -d' ' -f2)
+	diff <(cut -d' ' -f2 got) <(incise eval m.fis points --uncertainty total --arith fixed 2>/dev/null | cut -d' ' -f2)
 	incise eval m.fis points >without 2>/dev/null
 	run -0 awk 'NF != 1' without
 	[ -z "$output" ]
 }
 
-@test "eval --sd refuses what is missing, stale or damaged, by name" {
+@test "eval --uncertainty total refuses what is missing, stale or damaged, by name" {
 	cp m.fis alone.fis
-	run --separate-stderr incise eval alone.fis --sd <<<'5 20'
+	run --separate-stderr incise eval alone.fis --uncertainty total <<<'5 20'
 	failed_with alone.fis.sd "No such file"
 	cp m.fis.sd alone.fis.sd
-	echo '5 20' | incise eval alone.fis --sd >/dev/null
+	echo '5 20' | incise eval alone.fis --uncertainty total >/dev/null
 	cp bell.fis.sd alone.fis.sd
-	run --separate-stderr incise eval alone.fis --sd <<<'5 20'
+	run --separate-stderr incise eval alone.fis --uncertainty total <<<'5 20'
 	failed_with alone.fis.sd:2 stale
 	sed '9s/ / x/' m.fis.sd >alone.fis.sd
-	run --separate-stderr incise eval alone.fis --sd <<<'5 20'
+	run --separate-stderr incise eval alone.fis --uncertainty total <<<'5 20'
 	failed_with alone.fis.sd:9 "not a number"
-	run --separate-stderr incise eval - --sd <m.fis
-	failed_with "--sd:"
-	# without --sd nobody looks
+	run --separate-stderr incise eval - --uncertainty total <m.fis
+	failed_with "--uncertainty:"
+	# without --uncertainty nobody looks
 	echo '5 20' | incise eval alone.fis >/dev/null
 }
 
-@test "eval --sd reads the same in another language" {
+@test "eval --uncertainty total reads the same in another language" {
 	[ "$(LC_ALL=de_DE.UTF-8 locale decimal_point 2>/dev/null)" = , ] || skip "no locale with a decimal comma here"
-	[ "$(echo '5 20' | LC_ALL=de_DE.UTF-8 incise eval m.fis --sd)" = "$(echo '5 20' | incise eval m.fis --sd)" ]
+	[ "$(echo '5 20' | LC_ALL=de_DE.UTF-8 incise eval m.fis --uncertainty total)" = "$(echo '5 20' | incise eval m.fis --uncertainty total)" ]
 }
 
 @test "eval: files that are not there" {

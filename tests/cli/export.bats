@@ -66,29 +66,29 @@ well_formed() {
 # bats test_tags=check
 @test "export of a part: its rows are those of the whole, and its lineage says which" {
 	incise export --no-lineage liver.rec -o whole.csv
-	run -0 incise export --no-lineage --from 10s --to 12.5s liver.rec -o part.csv
+	run -0 incise export --no-lineage --range 10s..12.5s liver.rec -o part.csv
 	awk -F, 'NR == 1 || ($2 >= 10 && $2 < 12.5)' whole.csv | cmp - part.csv
 	incise export --cut 3 liver.rec -o cut.csv
 	grep -qx "# part: from 0 s, cut 3" cut.csv
 	cmp <(awk -F, 'NR == 1 || $1 == "liver-03"' whole.csv) <(grep -v "^#" cut.csv)
 	incise export --no-lineage --resample --rate 100 liver.rec -o whole.csv --overwrite
-	incise export --no-lineage --resample --rate 100 --from 10s --to 12.5s liver.rec -o part.csv --overwrite
+	incise export --no-lineage --resample --rate 100 --range 10s..12.5s liver.rec -o part.csv --overwrite
 	# but the noise that was read
 	cmp <(awk -F, 'NR == 1 || ($3 >= 10 && $3 < 12.5)' whole.csv | cut -d, -f1-17,19-) \
 		<(cut -d, -f1-17,19- part.csv)
-	incise export --from 10s --to 12.5s liver.rec -o part.mcap
+	incise export --range 10s..12.5s liver.rec -o part.mcap
 	[ "$(stat -c %s part.mcap)" -lt 4000000 ]
 	run --separate-stderr incise export --cut 99 liver.rec
 	failed_with "liver.rec:" "no cut 99"
-	run --separate-stderr incise export --from 12s --to 10s liver.rec
-	bad_usage "--to 10 s is not behind --from 12 s"
+	run --separate-stderr incise export --range 12s..10s liver.rec
+	bad_usage "--range: it ends at 10 s, where it begins or before"
 	run --separate-stderr incise export --cut 1 --resample liver.rec
 	bad_usage "--cut"
 	# what is not asked for is not read
 	cp -r liver.rec/ damaged.rec
 	sqlite3 damaged.rec/recording.db "UPDATE blocks SET data = x'00' WHERE stream = 'force' AND block = 30"
-	run -0 incise export --from 10s --to 12.5s damaged.rec -o /dev/null
-	run --separate-stderr incise export --from 2s --to 4s damaged.rec -o other.csv
+	run -0 incise export --range 10s..12.5s damaged.rec -o /dev/null
+	run --separate-stderr incise export --range 2s..4s damaged.rec -o other.csv
 	failed_with "damaged.rec: damaged: stream force, block 30"
 	[ ! -e other.csv ]
 }
@@ -109,21 +109,21 @@ well_formed() {
 
 # bats test_tags=check
 @test "export averaged by cut" {
-	incise export --no-lineage liver.rec -a 12x10 --by-cut -o a.csv
+	incise export --no-lineage liver.rec -a 12x10,by-cut -o a.csv
 	[ "$(head -n 1 a.csv)" = cut,depth_mm,velocity_mm_s,force_N,sd_N,count,cuts,advancing,acceleration_mm_s2,tilt_deg,time_in_tissue_s ]
 	well_formed a.csv 11 2
 	[ "$(tail -n +2 a.csv | cut -d, -f1 | uniq | wc -l)" -eq 14 ]
 }
 
 @test "export keeps to the upper ends of the bins" {
-	incise export --no-lineage liver.rec -a 5x5 --depth-max 8 --velocity-max 30 -o a.csv
+	incise export --no-lineage liver.rec -a 5x5,depth=8,velocity=30 -o a.csv
 	awk -F, 'NR > 1 && ($1 > 8 || $2 > 30) { bad = 1 } END { exit bad }' a.csv
 }
 
-@test "export --min-count leaves out what is thin" {
-	incise export --no-lineage liver.rec -a 12x10 --min-count 2000 -o a.csv
+@test "export --average N,count= leaves out what is thin" {
+	incise export --no-lineage liver.rec -a 12x10,count=2000 -o a.csv
 	awk -F, 'NR > 1 && $5 < 2000 { bad = 1 } END { exit bad }' a.csv
-	run --separate-stderr incise export liver.rec -a 12x10 --min-count 999999999 -o b.csv
+	run --separate-stderr incise export liver.rec -a 12x10,count=999999999 -o b.csv
 	failed_with "no bin has 999999999 samples"
 	[ ! -e b.csv ]
 }
@@ -245,7 +245,7 @@ well_formed() {
 	incise export --no-lineage deep.rec --rate 100 --resample -o all.csv
 	awk -F, 'NR > 1 && $14 == "nan" && $22 { bad = 1 } { n += $22 } END { exit bad || n < 200 }' all.csv
 	# the same depths again on the way out, with less force
-	incise export --no-lineage deep.rec --average 5x1 --velocity-max 100 -o bins.csv
+	incise export --no-lineage deep.rec --average 5x1,velocity=100 -o bins.csv
 	awk -F, 'NR > 1 { force[int($1 / 2.1), $7] = $3 }
 		END { for (bin = 0; bin < 4; bin++) if (!((bin, 0) in force) || !((bin, 1) in force) ||
 				force[bin, 0] >= force[bin, 1]) exit 1 }' bins.csv
@@ -508,7 +508,7 @@ calibrated() {
 
 @test "export with uncertainties: parts add up, and the rest stays as it is" {
 	calibrated
-	for how in "" "--rate 50" "--average 3x3 --by-cut" "--resample --rate 50"; do
+	for how in "" "--rate 50" "--average 3x3,by-cut" "--resample --rate 50"; do
 		incise export --no-lineage calibrated.rec $how -o none.csv --overwrite
 		incise export --no-lineage calibrated.rec $how --uncertainty none -o same.csv --overwrite
 		cmp none.csv same.csv

@@ -276,7 +276,7 @@ beside_the_model() {
 }
 
 @test "haptic: a model that fixed point cannot hold is refused before it runs" {
-	incise train "$BATS_FILE_TMPDIR/pairs.csv" --mf-type gbellmf -o bell.fis 2>/dev/null
+	incise train "$BATS_FILE_TMPDIR/pairs.csv" --search type=gbellmf -o bell.fis 2>/dev/null
 	printf 'model = "bell.fis"; device = { damping_N_s_mm = 0.02; };\n' >bad.scene
 	refuses gbellmf
 	run -0 incise haptic bad.scene --rig $quick --duration 100ms --arith double

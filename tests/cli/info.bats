@@ -7,7 +7,7 @@ setup_file() {
 	cd "$BATS_FILE_TMPDIR"
 	made_pairs >pairs.csv
 	incise train pairs.csv -o m.fis 2>/dev/null
-	incise train pairs.csv --mf-type gbellmf --mf 2,2 -o bell.fis 2>/dev/null
+	incise train pairs.csv --search type=gbellmf --mf 2,2 -o bell.fis 2>/dev/null
 	incise capture -o a.rec --rig sim:clock=simulated,depth_mm=5,times=2,cut_s=1,pause_s=0.6 \
 		>/dev/null
 }

@@ -26,7 +26,7 @@ sum() {
 # bats test_tags=check
 @test "join states offset, rate, uncertainty and overlap, and keeps the recordings to the bit" {
 	before=$(sum a.rec/recording.db b.rec/recording.db)
-	run -0 --separate-stderr incise join a.rec b.rec -o day.rec --within 1ms
+	run -0 --separate-stderr incise join a.rec b.rec -o day.rec --tolerance 1ms
 	[ -z "$stderr" ]
 	[ "${lines[0]}" = "a: force, tracker, 1.000 to 6.000 s, on $(uname -n)" ]
 	# b's 1 s is TAI 1004.00005 s, and that 4.00005 s of a
@@ -108,7 +108,7 @@ assert incise.open("other/day.rec:b").info.tracker == incise.open("b.rec").info.
 
 # bats test_tags=check
 @test "join refuses what the clocks do not support, and writes nothing" {
-	run --separate-stderr incise join a.rec b.rec -o day.rec --within 10us
+	run --separate-stderr incise join a.rec b.rec -o day.rec --tolerance 10us
 	failed_with "b.rec:"
 	run --separate-stderr incise join a.rec none.rec -o day.rec
 	failed_with "none.rec:"
@@ -171,7 +171,7 @@ assert incise.open("other/day.rec:b").info.tracker == incise.open("b.rec").info.
 		incise capture -o $name.rec --rig "sim:clock=real,seed=1" --duration 200ms --camera off \
 			--clock-source none >/dev/null
 	done
-	run -0 --separate-stderr incise join one.rec two.rec -o day.rec --within 1ns
+	run -0 --separate-stderr incise join one.rec two.rec -o day.rec --tolerance 1ns
 	[[ "${lines[2]}" == "  offset 0.000000000 s, rate +0.0000 ppm, uncertainty 0 ms, the same clock" ]]
 	[[ "${lines[3]}" == "  no overlap with those before: a gap of "* ]]
 	incise verify day.rec
@@ -277,7 +277,7 @@ without_u() {
 		! grep -aqE '/(tip|tracker|depth)' force.mcap || false
 	done
 	# the stream of each is that of the only machine that has it
-	incise join force.rec tracker.rec -o day.rec --within 0.1ms >/dev/null
+	incise join force.rec tracker.rec -o day.rec --tolerance 0.1ms >/dev/null
 	incise export --no-lineage day.rec --resample --rate 100 -o day.csv
 	incise export --no-lineage both.rec --resample --rate 100 -o both.csv
 	cmp <(without_u day.csv) <(without_u both.csv)

@@ -23,7 +23,7 @@ models() {
 	incise train <(many_pairs 8) --premises m.fis --group cut -o m.fac >/dev/null
 	report merge merge m.fac -o merged.fis
 	report eval eval m.fis points
-	report eval.sd eval m.fis points --sd
+	report eval.sd eval m.fis points --uncertainty total
 	report compile compile m.fis -o m.fx
 	report compile.scene compile liver.scene -o liver.plan
 	report info.model info m.fis
@@ -137,7 +137,7 @@ setup_file() {
 	devices
 	calibrations
 	[ ! -x "$INCISE_BUILD/bin/incise-view" ] ||
-		report view view neck.scene --procedure -o fr --fps 2 --duration 1s --size 160x120
+		report view view neck.scene --procedure -o fr --rate 2 --duration 1s --size 160x120
 	! command -v gnuplot >/dev/null || report demo demo -o demo --duration 1s
 }
 

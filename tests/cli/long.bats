@@ -40,9 +40,9 @@ PY
 
 	# The same ten seconds of the short one, at both ends and in the middle: nothing is read of what lies before
 	# the cut before, and nothing of what lies behind.
-	incise export short.rec --resample --from 40s --to 50s -o short.csv
+	incise export short.rec --resample --range 40s..50s -o short.csv
 	for k in 1 142 283; do
-		read -r bytes kB < <(cost incise export long.rec --resample --from "$((127 * k + 40))s" --to "$((127 * k + 50))s" \
+		read -r bytes kB < <(cost incise export long.rec --resample --range "$((127 * k + 40))s..$((127 * k + 50))s" \
 			-o $k.csv)
 		echo "part $k: $bytes bytes, $kB kB"
 		[ "$bytes" -lt $((size / 30)) ]
@@ -60,7 +60,7 @@ PY
 	[ "$(wc -l <22.values)" -gt 50000 ]
 	cmp 22.values 3970.values
 	# And a part is learnt from without the rest.
-	read -r bytes kB < <(cost incise train long.rec --from 5h --to 18060s -o part.fis)
+	read -r bytes kB < <(cost incise train long.rec --range 5h..18060s -o part.fis)
 	echo "train: $bytes bytes, $kB kB"
 	grep -q 'pairs to train (7 cuts)' output.txt
 	[ "$bytes" -lt $((size / 6)) ]

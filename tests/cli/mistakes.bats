@@ -48,7 +48,7 @@ table() {
 		2|train pairs.csv --epochs many -o x.fis|--epochs:|'many'
 		2|train pairs.csv --check 2 -o x.fis|--check:|'2'
 		2|train pairs.csv --mf 5 -o x.fis|--mf:|1
-		2|train pairs.csv --mf-type gauss -o x.fis|--mf-type:|'gauss'
+		2|train pairs.csv --search type=gauss -o x.fis|--search type:|'gauss'
 		2|train pairs.csv --epoch 5 --frob -o x.fis|--frob:
 		1|train pairs.cvs -o x.fis|pairs.cvs:|pairs.csv
 		1|train m.fis -o x.fis|m.fis:|.fis
@@ -60,7 +60,7 @@ table() {
 		1|train pairs.csv --target force -o x.fis|pairs.csv:1:|force
 		1|train pairs.csv -o nosuch/x.fis|nosuch/x.fis:
 		1|train pairs.csv -o m.fis|m.fis:|--overwrite
-		2|train pairs.csv -o pairs.fis.csv|--output: pairs.fis.csv:
+		2|train pairs.csv -o pairs.fis.txt|--output: pairs.fis.txt:
 		2|compile m.fis|-o FILE
 		2|compile m.fis --method tabel -o x.fx|--method:|table
 		2|compile m.fis --budget 5cm -o x.fx|--budget:|'5cm'

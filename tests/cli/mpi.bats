@@ -19,7 +19,7 @@ train_by() {
 	shift
 	# As root too, and with more processes than processors.
 	OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_btl_base_warn_component_unused=0 \
-		mpirun --oversubscribe -n "$n" incise train "$@" --mpi
+		mpirun --oversubscribe -n "$n" incise train "$@" --share mpi
 }
 
 @test "1, 2, 3 and 8 processes give the model of one program, to the bit" {
@@ -36,7 +36,7 @@ train_by() {
 	done
 	incise train s1.csv --group cut --mf 3,3 -o start.fis >/dev/null
 	for i in 1 2; do
-		incise train l?.csv --shard $i/2 --premises start.fis --group cut -o $i.fac >/dev/null
+		incise train l?.csv --share $i/2 --premises start.fis --group cut -o $i.fac >/dev/null
 	done
 	incise merge ?.fac -o merged.fis >/dev/null
 	train_by 3 l?.csv --premises start.fis --group cut -o all.fis >/dev/null

@@ -34,18 +34,17 @@ OPERANDS = {
 VALUES = """
 --against | old.json |
 --align | clocks tap sync | nosuch {}
---altitude | -1000 10000 | -1001 high {}
 --arith | double fixed | float half {}
 --at | 500ms,2s,6s | 2s,1s now {}
---average | 12x10 1x1 | 12 x 0x5 5x99999 5x5x5 {}
+--average | 12x10 1x1 12x10,by-cut 9x9,depth=0.1,velocity=1e6,count=50 | 12 x 0x5 5x99999 5x5x5 5x5,by-cut=1 5x5,depth 5x5,depth=0 5x5,count=few 5x5,nosuch {}
 --axis | 1 3 | 0 4 1.5 {}
---board | 9x6 | 9 9x 2x2x2 {}
+--board | 9x6 9x6,5mm | 9 9x 2x2x2 9x6,0 9x6,5kg {}
 --budget | 0.1mN 50uN 1e-4 | 5cm 0.1kN -1 0 {}
 --ca | file |
 --calibration | any.conf |
 --calibration export | |
 --camera | off auto frames | on pictures frmaes {}
---cells | 1 4096 | 0 4097 1.5 {}
+--camera calibrate delay | auto frames | on pictures {}
 --check | 0.01 0.99 | 0 1 half 0x1p-2 nan {}
 --clock-source | auto none kernel ptp ptp:/x,3 chrony:323 sim:1000,0,20 | sundial kernel: ptp: ptp:/x,128 ptp:,1 chrony:0 chrony:x sim:x
 --code | P07 a-b_c ABCDEFGHIJKLMNOP | A,B ABCDEFGHIJKLMNOPQ é {}
@@ -53,40 +52,30 @@ VALUES = """
 --cut | 1 1000 | 0 -1 1.5 first {}
 --data | any.csv |
 --density | 7950 | 0 -1 heavy {}
---depth-max | 0.1 1e6 | -1 0 deep {}
 --due | 7d 365d 100y | soon -1d {}
 --duration | 10 30s 0.5min | 0 -1s never 10x 5m nan inf {}
 --duration bench | 1s | 0 never {}
 --duration demo | 1s 2min | 1ms long {}
 --epochs | 1 100000 | 0 1.5 many {}
 --every | 10ms 1h | 0 never {}
---fps | 1 240 | 0 241 fast {}
 --from | any |
---from export | 0s 90s 1.5min | -1s 5kg {}
---from train | 0s 90s 1.5min | -1s 5kg {}
---gauge-u | 0 100 | -1 101 fine {}
---gravity | 9.81 | 0 -9.81 strong {}
+--gravity | 9.81 latitude=-90 latitude=48,altitude=10000 | 0 -9.81 strong altitude=5 latitude=91 latitude=0,altitude=high {}
 --grid | 2x2 20x15 | 20 3x 1x5 x 3x3x3 99999x2 -2x3 {}
 --group | cut |
 --handle | |
 --idle | 1s 10min | 0 never {}
---igtl | 0 18944 127.0.0.1:0 [::1]:0 | ::1:0 127.0.0.1:x 127.0.0.1 foo 65536 -1 :0
---igtl-version | 1 2 auto | 0 3 new {}
+--igtl | 0 18944 127.0.0.1:0 [::1]:0 18944/2 127.0.0.1:0/1 | ::1:0 127.0.0.1:x 127.0.0.1 foo 65536 -1 :0 0/3 0/new
 --images | 1 20 | 0 1.5 all {}
 --input-range | 0,5000 -5,5 | 5,1 5 a,b {}
 --inputs | a a,b | ,
 --key | key |
---latitude | -90 90 | 91 north {}
 --length | 47.5mm 4.75cm 100 | 47.5kg 0 long {}
---length-u | 0 0.01mm | -1 1kg {}
 --load | idle cpu memory disk view | disc {}
 --lsl | prefix | {}
 --max-delay | 10 1000 | 9 1001 long {}
 --max-force | 1N 500mN | 0 1kg strong {}
---method | direct table force | tabel float {}
+--method | direct table force table:64 force:4096 | tabel float direct:0 table:4097 table:x {}
 --mf | 3,2 auto | 0,3 33,2 , auto,3 a,b
---mf-type | gaussmf gbellmf | trimf gauss {}
---min-count | 1 50 | 0 few {}
 --model | any.fis |
 --nominal calibrate depth | 0.1 10 | 0 11 wide {}
 --nominal calibrate force | 1 1e5 | 0 1e6 high {}
@@ -97,60 +86,53 @@ VALUES = """
 --overruns | 0 1000000 | -1 1.5 many {}
 --pick | |
 --pixels | |
---pixels-u | 0 1000 | -1 fine {}
---plane-u | 0 0.1mm | -1 1kg {}
---policy | fifo deadline | rr {}
+--policy | fifo deadline fifo:1 fifo:84 | rr fifo:0 fifo:85 fifo:x {}
 --poses | arrival acquisition | dawn {}
 --premises | any.fis |
---priority | 1 84 | 0 85 x {}
 --profile bench | |
 --profile export | plain ros2 | ros {}
+--range | 2s..2500ms 5s.. ..1s | 5s 5s..4s {}
 --range calibrate stepper | 0mm..1.5mm | 5mm 5mm..1mm {}
---range plot | 2s..2500ms 5s.. ..1s | 5s 5s..4s {}
 --rate | 0.5 1000 | 0 -1 fast nan {}
 --rate serve | 1 1000 | 0 -1 fast {}
+--rate view | 1 240 | 0 241 fast {}
 --recording | any.rec |
 --reference | any.session |
 --reference-stream | force tracker camera | depth {}
 --region | |
 --repeat | 1 1000 | 0 1.5 {}
+--repeat calibrate force | 1 100 | 0 1.5 {}
+--repeat calibrate stepper | 2 100 | 1 101 {}
 --revoked | file |
 --ridge | 0 1e12 | -1 nan small {}
 --rig | sim: any.conf |
---sample | 0 10 | -1 1.5 {}
 --scale | 0.5g 1kg | -1 1mm {}
 --scene | any |
+--search | type=gaussmf type=gbellmf,starts=1 starts=100 sample=0,starts=3 classic,step=1e-9 | type=trimf starts=0 starts=101 sample=-1 sample=1.5 classic=1 step=11 nosuch {}
 --seed | 0 7 | -1 x 1.5 {}
 --seed bench | 1 7 | 0 x {}
---series | 1 100 | 0 1.5 {}
---shard | 1/1 2/3 | 0/2 3/2 1 a/b {}
+--share | 1/1 2/3 mpi | 0/2 3/2 1 a/b {}
 --signers | file |
 --size | 160x120 1280x720 | 10x10 big 640x480x3 {}
 --speed | 0.01 100 | 0 -1 fast {}
---square | 5mm 1cm | 0 5kg {}
---square-u | 0 100 | -1 101 {}
 --start-at | 2037-01-15T08:00:10Z 2037-01-15T08:00:10.5TAI | 2020-02-30T00:00:00Z 2027-01-15T08:00:10 2027-01-15T08:00:10.Z now 2027-01-15T08:00:10+01:00 2027-01-15
---starts | 1 100 | 0 101 x {}
 --state | none a.state |
---step | 1e-9 10 | 0 11 x {}
 --step-mm | 0.001 | 0 -1 x {}
---strokes | 2 100 | 1 101 {}
 --target | column |
 --timeout | 2s 1h | 0 never {}
 --timestamp | http://a/tsr a.tsq a.tsr | reply.der
 --tolerance | 0.1 5 | -1 x {}
---to | 1s 2min | 0s -1s far {}
+--tolerance join | 1ms 0.5s | 0 soon {}
 --tool | auto blade handle tube | spoon blad {}
 --trigger | button 0.2N 500mN sync sync:/dev/x | 0N knob -1N {}
---u-reference | 0 0.01 1000 | -1 1001 long {}
---u-surface | 0 0.1 1000 | -1 1001 far {}
+--given-u calibrate delay | reference=1 | reference=-1 reference=1001 surface=1 {}
+--given-u calibrate depth | length=0.01mm,pixels=0 gauge=100,zero=0 square=1,plane=0.1mm | length=1kg pixels=fine gauge=101 zero=-1 nosuch=1 length {}
+--given-u calibrate tip | surface=0.1 | surface=-1 surface=far {}
+--uncertainty eval | none total parts | part {}
 --uncertainty export | none total parts | part {}
 --uncertainty train | none parts | part {}
---velocity-max | 0.1 1e6 | 0 -1 fast {}
 --viewpoint | 15,45,140 | 1,2 a,b,c {}
 --weights | 0,50g,100g,0.2kg | 1,a {}
---within | 1ms 0.5s | 0 soon {}
---zero-u | 0 0.02mm | -1 1kg {}
 """
 
 
@@ -252,7 +234,8 @@ class Command:
             if values is None:
                 self.complain(f"{name}: has no row in option_tables.py")
                 continue
-            legal[name] = list(dict.fromkeys(values[0] + (self.completed(name, "") if values[1] else [])))
+            offered = [word for word in self.completed(name, "") if values[1] and not word.endswith("=")]
+            legal[name] = list(dict.fromkeys(values[0] + offered))
             if letter and values[0]:
                 self.refused(["-" + letter, values[0][0], "--nosuch"], "--nosuch: no such option")
             for value in values[1]:

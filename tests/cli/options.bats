@@ -25,7 +25,6 @@ setup() {
 	done <<-END
 		--time --duration calibrate delay
 		--range --max-delay calibrate delay
-		--camera --with-camera calibrate delay
 		--axis --handle calibrate depth
 		--pictures --images calibrate depth
 		--time --duration calibrate force
@@ -44,6 +43,9 @@ setup() {
 		--keep -o_NAME.rec calibrate delay
 		--report -o_DIR calibrate depth
 		--initial -o_FILE.initial.fis train
+		--sd --uncertainty_total eval
+		--by-cut --average_NxM,by-cut export
+		--zero-u --given-u_zero=VALUE calibrate depth
 		--for --duration stepper
 		--output-model --output train
 		--camera --viewpoint view

@@ -16,7 +16,7 @@ setup_file() {
 		'surface = { kind = "mesh"; file = "s.obj"; };' >m.scene
 	printf '%s\n' 'v -50 -50 0' 'v 50 -50 0' 'v 50 50 0' 'v -50 50 0' 'f 1 2 3' 'f 1 3 4' >s.obj
 	incise calibrate force --rig sim:clock=simulated --weights 0,50g,100g,200g \
-		--series 3 --duration 200ms -c calibration.conf -o forces.csv >/dev/null
+		--repeat 3 --duration 200ms -c calibration.conf -o forces.csv >/dev/null
 	cat >rig.conf <<-END
 		tracker = "sim"; force = "sim"; camera = "sim"; stepper = "sim";
 	END
@@ -172,7 +172,7 @@ replaces_when_told() {
 	cp "$BATS_FILE_TMPDIR/many.csv" .
 	replaces_when_told new.fac train many.csv --premises m.fis --group cut -o new.fac
 	replaces_when_told k.csv calibrate force --rig sim:clock=simulated --weights 0,50g,100g,200g \
-		--series 3 --duration 200ms -c k.conf -o k.csv
+		--repeat 3 --duration 200ms -c k.conf -o k.csv
 	replaces_when_told report/report.txt calibrate force --from forces.csv -c k.conf -o report
 	replaces_when_told report2/report.json calibrate force --from forces.csv -c k.conf -o report2
 }
@@ -212,7 +212,7 @@ replaces_when_told() {
 		skip "incise view was not built: SDL2, epoxy, cairo or EGL were absent"
 	export XDG_RUNTIME_DIR="$PWD"
 	cp "$root"/scenes/wall.scene .
-	small="--size 160x120 --no-panel --duration 0.2s --fps 10"
+	small="--size 160x120 --no-panel --duration 0.2s --rate 10"
 	incise view wall --procedure -o probe.png --at 0s --duration 0.05s $small 2>why ||
 		skip "no OpenGL here: $(cat why)"
 	replaces_when_told strip.png view wall --procedure -o strip.png --at 0s $small
@@ -268,7 +268,7 @@ writers() {
 		haptic wall --rig $quick --duration 100ms -o PLACE
 		haptic wall --rig $quick --duration 100ms -o session:PLACE
 		assess s.session -o csv:PLACE
-		calibrate force --rig sim:clock=simulated --weights 0,50g,100g,200g --series 3 --duration 200ms -c k.conf -o csv:PLACE
+		calibrate force --rig sim:clock=simulated --weights 0,50g,100g,200g --repeat 3 --duration 200ms -c k.conf -o csv:PLACE
 	END
 }
 
@@ -412,7 +412,7 @@ full() {
 	ends "wrote r.csv" replay d.rec m.scene -o r.csv
 	ends "wrote c.rec" capture -o c.rec --rig $quick --duration 1s
 	ends "wrote k.csv" calibrate force --rig sim:clock=simulated --weights 0,50g,100g,200g \
-		--series 3 --duration 200ms -c k.conf -o k.csv
+		--repeat 3 --duration 200ms -c k.conf -o k.csv
 	grep -q '^wrote k.conf: active from now on$' out
 	if command -v gnuplot >/dev/null; then
 		ends "wrote f.png" plot d.rec -o f.png

@@ -40,11 +40,11 @@ train() {
 	head -n 1 m.fis.sd | grep -qx "incise-sd 2"
 	grep -q "^% incise: options: .*, weighted by uncertainties" m.fis
 	printf '3 20\n8 30\n12 40\n' >points
-	incise eval m.fis points --sd --parts >got
+	incise eval m.fis points --uncertainty parts >got
 	awk 'NF != 5 { bad = 1 } { d = $2 ^ 2 - $3 ^ 2 - $4 ^ 2 - $5 ^ 2
 		if (d > 1e-9 || d < -1e-9 || $5 < 0.015) { print; bad = 1 } } END { exit bad || NR != 3 }' got
-	cut -d' ' -f1,2 got | diff - <(incise eval m.fis points --sd)
-	incise eval m.fis points --sd --parts --json >r.json
+	cut -d' ' -f1,2 got | diff - <(incise eval m.fis points --uncertainty total)
+	incise eval m.fis points --uncertainty parts --json >r.json
 	holds "($(key r.json 'rows[0].sd_calibration_N') - $(sed -n '1s/.* //p' got))^2 < 1e-18"
 	# none, and columns that are not there, give the same bytes
 	for rig in a b c; do cut -d, -f1-4 $rig.csv >plain_$rig.csv; done
@@ -53,7 +53,7 @@ train() {
 	grep -v '^% incise' none.fis | diff - <(grep -v '^% incise' plain.fis)
 	diff none.fis.sd plain.fis.sd
 	head -n 1 plain.fis.sd | grep -qx "incise-sd 1"
-	incise eval plain.fis points --sd --parts | awk '$5 != 0 { exit 1 }'
+	incise eval plain.fis points --uncertainty parts | awk '$5 != 0 { exit 1 }'
 }
 
 # tests/unit/learn/propagation.c has it without programs.
@@ -80,14 +80,14 @@ train() {
 	incise plan m.scene --json >r.json
 	at="$(key r.json rest.depth_mm) $(key r.json rest.velocity_mm_s)"
 	[ "${at%% *}" = "$(key r.json worst.depth_mm)" ]
-	incise eval m.fis --sd --parts <<<"$at" >want
+	incise eval m.fis --uncertainty parts <<<"$at" >want
 	holds "($(key r.json rest.force_N) - $(cut -d' ' -f1 want))^2 < 1e-12"
 	holds "($(key r.json rest.sd_N) - $(cut -d' ' -f2 want))^2 < 1e-12"
 	holds "($(key r.json rest.sd_calibration_N) - $(cut -d' ' -f5 want))^2 < 1e-12"
 	incise plan m.scene | grep -q "the model where that one rests: .* N at .* mm and .* mm/s, u = .* N (data"
 	incise haptic m.scene --rig sim:clock=simulated --duration 1s --state m.state >/dev/null 2>&1
 	incise status ./m.state --json >s.json
-	incise eval m.fis --sd <<<"$(key s.json 'loops[0].depth_mm') $(key s.json 'loops[0].velocity_mm_s')" >want 2>/dev/null
+	incise eval m.fis --uncertainty total <<<"$(key s.json 'loops[0].depth_mm') $(key s.json 'loops[0].velocity_mm_s')" >want 2>/dev/null
 	holds "($(key s.json 'loops[0].model.sd_N') - $(cut -d' ' -f2 want))^2 < 1e-12"
 	incise status ./m.state | grep -q "^model      .* N at .* mm"
 	rm m.fis.sd
@@ -115,7 +115,7 @@ train() {
 # bats test_tags=check
 @test "what cannot carry uncertainties is refused, and what lacks them is named" {
 	train a.csv -o m.fis
-	for way in "--classic -o x.fis" "--premises m.fis -o x.fac" "--mpi -o x.fis"; do
+	for way in "--search classic -o x.fis" "--premises m.fis -o x.fac" "--share mpi -o x.fis"; do
 		# shellcheck disable=SC2086 # several words
 		run --separate-stderr incise train a.csv b.csv $way
 		bad_usage "cannot take uncertainties, which a.csv has; give --uncertainty none"
@@ -153,7 +153,7 @@ train() {
 	train r.csv -o csv.fis
 	# the decimals of CSV: 5 of the force
 	for model in rec csv; do
-		echo '5 20' | incise eval $model.fis --sd --parts >$model.out 2>/dev/null
+		echo '5 20' | incise eval $model.fis --uncertainty parts >$model.out 2>/dev/null
 	done
 	paste -d' ' rec.out csv.out | awk '{ for (i = 1; i <= 5; i++) { d = $i - $(i + 5)
 		if (d > 1e-3 || d < -1e-3) { print; exit 1 } } }'
@@ -162,6 +162,6 @@ train() {
 	sed 's/u = 12.0/u = 48.0/' c.conf >worse.conf
 	incise recalibrate r.rec -c worse.conf >/dev/null
 	train r.rec --rate 25 --uncertainty parts -o worse.fis
-	worse=$(echo '5 20' | incise eval worse.fis --sd --parts 2>/dev/null | cut -d' ' -f5)
+	worse=$(echo '5 20' | incise eval worse.fis --uncertainty parts 2>/dev/null | cut -d' ' -f5)
 	holds "$worse > 1.2 * $(cut -d' ' -f5 rec.out)"
 }

@@ -6,7 +6,7 @@ load cli
 setup_file() {
 	cd "$BATS_FILE_TMPDIR"
 	"$INCISE_BUILD/bin/incise" capture -o "a b;.rec" --rig sim:clock=simulated,depth_mm=6,times=5,pause_s=0.5,cut_s=2 >/dev/null
-	"$INCISE_BUILD/bin/incise" export "a b;.rec" --average 6x6 --by-cut --min-count 5 -o p.csv >/dev/null
+	"$INCISE_BUILD/bin/incise" export "a b;.rec" --average 6x6,by-cut,count=5 -o p.csv >/dev/null
 	"$INCISE_BUILD/bin/incise" train p.csv --mf 2,2 -o m.fis >/dev/null 2>&1
 }
 
@@ -58,7 +58,7 @@ setup() {
 		incise export "a b;.rec" -o e.h5
 		files+=" e.h5"
 	fi
-	incise train "a b;.rec" --rate 1000 --mf 2,2 --starts 1 -o r.fis >/dev/null 2>&1
+	incise train "a b;.rec" --rate 1000 --mf 2,2 --search starts=1 -o r.fis >/dev/null 2>&1
 	incise train "a b;.rec" --rate 1000 --premises r.fis -o r.fac >/dev/null 2>&1
 	incise merge r.fac -o merged.fis >/dev/null
 	for file in $files r.fis merged.fis; do
@@ -93,7 +93,7 @@ setup() {
 
 	run --separate-stderr incise provenance away
 	failed_with "away:"
-	incise export "$made/a b;.rec" --average 6x6 --min-count 5 --no-lineage -o plain.csv >/dev/null
+	incise export "$made/a b;.rec" --average 6x6,count=5 --no-lineage -o plain.csv >/dev/null
 	run --separate-stderr incise provenance plain.csv
 	failed_with "plain.csv:"
 	run --separate-stderr incise provenance m.fis.sd

@@ -157,7 +157,7 @@ sys.exit(not (os.stat("log").st_ctime - 60 < min(t) and max(t) <= time.time()))'
 	holds found.json 'all(m["name"] != "TipToTracker" for m in j[-20:])'
 	stop_server
 	holds report.json 'j["igtl"]["requests"] == 7 and j["igtl"]["requests_ignored"] == 1'
-	start_server --rig sim: --igtl-version 2
+	start_server --rig sim: --igtl 0/2
 	client receive "$port" 5 >found.json
 	holds found.json 'all(m["version"] == 2 for m in j)'
 	stop_server

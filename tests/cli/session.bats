@@ -295,7 +295,7 @@ refused() {
 @test "a view's session is that of the ticks that it shows" {
 	[ -x "$INCISE_BUILD/bin/incise-view" ] ||
 		skip "incise view was not built: SDL2, epoxy, cairo or EGL were absent"
-	small="--size 160x120 --no-panel --fps 1 --duration 4s"
+	small="--size 160x120 --no-panel --rate 1 --duration 4s"
 	incise view neck --procedure -o gl $small 2>why || skip "no OpenGL here: $(cat why)"
 	incise view neck --procedure -o f -o a.session $small
 	incise view neck --procedure -o f -o b.session --overwrite --json $small >r.json

@@ -139,13 +139,13 @@ parameters() {
 	incise train pairs.csv --seed 2 -o a.fis 2>/dev/null
 	incise train - --seed 2 -o - <pairs.csv >b.fis 2>/dev/null
 	cmp <(parameters a.fis) <(parameters b.fis)
-	incise train <(cat pairs.csv) --mf 2,2 --starts 1 -o c.fis --overwrite | grep -q "^grouped by cut"
+	incise train <(cat pairs.csv) --mf 2,2 --search starts=1 -o c.fis --overwrite | grep -q "^grouped by cut"
 	run --separate-stderr incise train - -o c.fis --overwrite < <(sed '5s/^/x,/' pairs.csv)
 	failed_with "standard input:5:"
 }
 
 @test "train writes the first model and the history" {
-	incise train pairs.csv --classic --check 0.5 --epochs 7 -o m.fis -o first.initial.fis \
+	incise train pairs.csv --search classic --check 0.5 --epochs 7 -o m.fis -o first.initial.fis \
 		-o epochs.csv --json >r.json 2>/dev/null
 	[ "$(head -n 1 epochs.csv)" = epoch,train_rmse,check_rmse ]
 	[ "$(tail -n 1 epochs.csv | cut -d, -f1)" = "$(key r.json epochs)" ]
@@ -162,7 +162,7 @@ parameters() {
 
 @test "train takes other columns, shapes and kinds" {
 	sed '1s/.*/cut,a,b,torque_mNm/' pairs.csv >other.csv
-	incise train other.csv --inputs b,a --target torque_mNm --mf 2,3 --mf-type gbellmf \
+	incise train other.csv --inputs b,a --target torque_mNm --mf 2,3 --search type=gbellmf \
 		-o m.fis --json >r.json 2>/dev/null
 	[ "$(key r.json rules)" = 6 ]
 	holds "$(key r.json train.rmse_mNm) > 0"
@@ -179,7 +179,7 @@ parameters() {
 	awk -v OFS=, 'BEGIN { print "depth_mm,velocity_mm_s,force_N"
 		for (i = 0; i < 90; i++) { x = i * 37 % 90; y = i * 41 % 90
 			print x, y, x + 2 * y + 30 * ((i * 7919 % 1000) / 1000 - 0.5) } }' >flat.csv
-	run -0 --separate-stderr incise train flat.csv --check 0.3 --classic -o m.fis
+	run -0 --separate-stderr incise train flat.csv --check 0.3 --search classic -o m.fis
 	[[ "$stderr" == *"warning: linear regression predicts the check data better"* ]]
 	[[ "$stderr" == *"training pairs for 78 parameters"* ]]
 	[ -s m.fis ]
@@ -216,7 +216,7 @@ holds_on_unseen_cuts() {
 
 @test "train holds on unseen cuts of the virtual liver" {
 	incise capture --rig sim:seed=1,clock=simulated -o s.rec >/dev/null
-	incise export s.rec --average 12x10 --by-cut -o s.csv >/dev/null
+	incise export s.rec --average 12x10,by-cut -o s.csv >/dev/null
 	holds_on_unseen_cuts s.csv
 }
 
@@ -231,7 +231,7 @@ holds_on_unseen_cuts() {
 	# the file holds the noise reported; JSON has fewer digits
 	holds "($(sed -n 's/^noise //p' m.fis.sd) / $(key r.json noise_N) - 1)^2 < 1e-16"
 	# what the report says is what eval says
-	sed 1d pairs.csv | cut -d, -f2,3 | incise eval m.fis --sd >all
+	sed 1d pairs.csv | cut -d, -f2,3 | incise eval m.fis --uncertainty total >all
 	[ "$(wc -l <all)" -eq 288 ]
 	awk '$2 < '"$(sed -n 's/^noise //p' m.fis.sd)"' * 0.999 { exit 1 }' all
 }
@@ -246,7 +246,7 @@ holds_on_unseen_cuts() {
 @test "train reports R², starts and rules that never fire" {
 	awk -v OFS=, 'BEGIN { print "depth_mm,velocity_mm_s,force_N"
 		for (i = 0; i < 400; i++) print i / 20, i / 8, sin(i / 60) }' >step.csv
-	incise train step.csv --check 0.3 --starts 1 -o m.fis --json >r.json 2>/dev/null
+	incise train step.csv --check 0.3 --search starts=1 -o m.fis --json >r.json 2>/dev/null
 	[ "$(key r.json start)" = 0 ]
 	# a noiseless curve
 	holds "$(key r.json check.r2) > 0.999 && $(key r.json check.r2) <= 1"
@@ -271,14 +271,14 @@ holds_on_unseen_cuts() {
 	[ "$(sed -n 's/^NumRules=//p' m.fis)" = "$(key r.json rules)" ]
 }
 
-@test "train --sample sets how many pairs the search uses" {
+@test "train --search sample=N sets how many pairs the search uses" {
 	awk -v OFS=, 'BEGIN { print "depth_mm,velocity_mm_s,force_N"
 		for (i = 0; i < 5000; i++) { d = i * 7919 % 2011 / 100; v = i * 104729 % 5021 / 100
 			print d, v, d * 0.1 + v * d * 0.001 } }' >some.csv
 	# three pairs for each consequent of a rule at least: 3 · 4 · 3
 	for sample in :3000 10:36 4000:4000 0:5000; do
 		# shellcheck disable=SC2086 # none where there is none
-		incise train some.csv --mf 2,2 $([ -z "${sample%:*}" ] || echo "--sample ${sample%:*}") \
+		incise train some.csv --mf 2,2 $([ -z "${sample%:*}" ] || echo "--search sample=${sample%:*}") \
 			-o m.fis --overwrite --json >r.json 2>/dev/null
 		[ "$(key r.json pairs_tuned)" = "${sample#*:}" ] || complain "$sample: $(key r.json pairs_tuned)" || return
 		[ "$(key r.json pairs)" = 5000 ]

@@ -34,7 +34,7 @@ setup() {
 	bash -euo pipefail commands >out 2>err </dev/null || complain "$(tail -n 5 out err)"
 	# the liver's force at 5 mm and 20 mm/s, as its formula has it (incise/sim.h)
 	truth=$(awk 'BEGIN { d = 5; v = 20; print (0.045 * d + 0.0028 * d * d) * (1 + 0.35 * v / (v + 15)) }')
-	read -r force sd < <(echo '5 20' | incise eval liver.fis --sd)
+	read -r force sd < <(echo '5 20' | incise eval liver.fis --uncertainty total)
 	# within its own 95 % interval
 	holds "$force - $truth < 2 * $sd && $truth - $force < 2 * $sd"
 	# mV/N, mm/px and ms of the simulated rig (incise/sim.h)

@@ -47,15 +47,14 @@ table() {
 		compile m.fis -o - --json|standard output
 		compile m.fis -o a.fx -o 7.c|7
 		compile m.fis --rig sim: -o a.fx|go with a scene
-		compile neck --budget 1mN -o a.plan|--budget, --method, --cells and -o FILE.c go with a model
+		compile neck --budget 1mN -o a.plan|--budget, --method and -o FILE.c go with a model
 		demo somewhere|'somewhere'
 		eval m.fis a b|; give a model, and one file of inputs
 		eval m.fis points --grid 3x3|grid
-		eval m.fis points --parts|--parts goes with --sd
 		eval m.fis --no-clamp --arith fixed|--no-clamp
 		export a.rec --rate 10 --average 3x3|--rate
-		export a.rec --by-cut|--by-cut
-		export a.rec --min-count 3|--min-count
+		export a.rec --average 3x3,cuts|unknown key of --average
+		export a.rec --average 3x3,count|count needs a value, count=N
 		export a.rec --json|--json
 		export a.rec --json -o -|--json
 		export a.rec --resample --average 3x3|--average
@@ -109,7 +108,7 @@ table() {
 		train a.csv -o a.fis --mf 3|--mf
 		train a.csv -o a.fis --mf 3,3,3|--mf
 		train a.csv -o - --json|standard output
-		train a.csv -o a.fis --premises m.fis --sample 10|--sample
+		train a.csv -o a.fis --premises m.fis --search sample=10|--search sample
 		verify a.rec b.rec|b.rec
 		verify a.rec --ca ca.pem|--signers
 	END

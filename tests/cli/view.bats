@@ -28,8 +28,8 @@ teardown() {
 }
 
 @test "the same ticks make the same pictures, however many are drawn" {
-	incise view neck --procedure -o a --fps 4 --duration 4s $small
-	incise view neck --procedure -o b --fps 12 --duration 4s $small
+	incise view neck --procedure -o a --rate 4 --duration 4s $small
+	incise view neck --procedure -o b --rate 12 --duration 4s $small
 	[ "$(find a -name 'frame-*.png' | wc -l)" -ge 16 ]
 	for i in 0 4 8 12 15; do
 		cmp "a/frame-$(printf %06d $i).png" "b/frame-$(printf %06d $((3 * i))).png"
@@ -39,7 +39,7 @@ teardown() {
 }
 
 @test "a scene shows what it says, and counts it" {
-	incise view neck --procedure -o f --fps 2 --duration 8s --json $small >r.json
+	incise view neck --procedure -o f --rate 2 --duration 8s --json $small >r.json
 	# 30 mm, and across them 15 mm, half of which the blade goes twice
 	holds "$(key r.json cut_mm) > 50 && $(key r.json cut_mm) < 58"
 	holds "$(key r.json blood_ul) > 0"
@@ -48,18 +48,18 @@ teardown() {
 	gone=$(key r.json blood_off_ul)
 	holds "($(key r.json blood_ul) - ($seen) - $gone)^2 < 1e-12 * $(key r.json blood_ul)^2"
 	sed -i 's/bleeding = true/bleeding = false/' neck.scene
-	incise view neck --procedure -o f --overwrite --fps 2 --duration 4s --json $small >r.json
+	incise view neck --procedure -o f --overwrite --rate 2 --duration 4s --json $small >r.json
 	holds "$(key r.json cut_mm) > 25"
 	[ "$(key r.json blood_ul)" = 0.0 ]
 	sed -i 's/wound = true/wound = false/' neck.scene
-	incise view neck --procedure -o f --overwrite --fps 2 --duration 4s --json $small >r.json
+	incise view neck --procedure -o f --overwrite --rate 2 --duration 4s --json $small >r.json
 	[ "$(key r.json stamps)" = 0 ]
 	[ "$(key r.json texels_uploaded)" = 0 ]
 }
 
 @test "a film and a strip are whole files, or none" {
 	[ -e "$INCISE_BUILD/lib/incise/film_mkv.so" ] || skip "film_mkv.so is not built"
-	incise view neck --procedure -o n.mkv -o n.png --at 1s,2s --fps 10 --duration 3s $small
+	incise view neck --procedure -o n.mkv -o n.png --at 1s,2s --rate 10 --duration 3s $small
 	[ "$(head -c 4 n.mkv | od -An -tx1 | tr -d ' \n')" = 1a45dfa3 ]
 	[ "$(stat -c %s n.mkv)" -gt 2000 ]
 	[ ! -e n.mkv.part ]
@@ -70,19 +70,19 @@ teardown() {
 	failed_with /dev/full
 	run --separate-stderr incise view neck --procedure -o wall.scene --duration 1s $small
 	failed_with wall.scene
-	run --separate-stderr incise view neck --procedure -o n.png --overwrite --at 1s,9s --fps 10 --duration 2s $small
+	run --separate-stderr incise view neck --procedure -o n.png --overwrite --at 1s,9s --rate 10 --duration 2s $small
 	[ "$status" -eq 0 ]
 	[[ "$stderr" == *"the run ends before frame 2, at 9 s"* ]]
 }
 
 @test "a strip alone draws no frame but its own, and they are those of a film" {
-	incise view neck --procedure -o all.png -o f --at 0s,1.25s,3s --fps 4 --duration 4s --json $small >all.json
+	incise view neck --procedure -o all.png -o f --at 0s,1.25s,3s --rate 4 --duration 4s --json $small >all.json
 	[ "$(key all.json frames)" = 16 ]
 	# with a session the run goes on to its end, else it ends with the last frame
-	incise view neck --procedure -o alone.png --at 0s,1.25s,3s --fps 4 --duration 4s --json $small >alone.json
+	incise view neck --procedure -o alone.png --at 0s,1.25s,3s --rate 4 --duration 4s --json $small >alone.json
 	[ "$(key alone.json frames)" = 3 ]
 	cmp all.png alone.png
-	incise view neck --procedure -o session.png -o s.session --at 0s,1.25s,3s --fps 4 --duration 4s --json $small >session.json
+	incise view neck --procedure -o session.png -o s.session --at 0s,1.25s,3s --rate 4 --duration 4s --json $small >session.json
 	[ "$(key session.json frames)" = 3 ]
 	cmp all.png session.png
 	holds "$(key session.json stamps) == $(key all.json stamps) && $(key alone.json stamps) < $(key all.json stamps)"
@@ -92,29 +92,29 @@ teardown() {
 # bats test_tags=check
 @test "view prints the files that it wrote" {
 	run -0 --separate-stderr incise view neck --procedure -o f -o n.png --at 0s,0.75s -o s.session \
-		--fps 4 --duration 1s $small
+		--rate 4 --duration 1s $small
 	[ "$output" = "wrote n.png: 2 frames
 wrote f/frame-000000.png to frame-000003.png
 wrote s.session" ]
 	[ -z "$stderr" ]
 	[ -s f/frame-000003.png ]
 	[ ! -e f/frame-000004.png ]
-	incise view neck --procedure -o f --overwrite --fps 4 --duration 0.5s --json $small >r.json
+	incise view neck --procedure -o f --overwrite --rate 4 --duration 0.5s --json $small >r.json
 	[ "$(key r.json files)" = '["f/frame-000000.png","f/frame-000001.png"]' ]
 	[ -e "$INCISE_BUILD/lib/incise/film_mkv.so" ] || return 0
-	run -0 --separate-stderr incise view wall --procedure -o w.mkv --fps 10 --duration 2s $small
+	run -0 --separate-stderr incise view wall --procedure -o w.mkv --rate 10 --duration 2s $small
 	[ "$output" = "wrote w.mkv: 20 frames, 2.0 s" ]
 }
 
 @test "on a terminal view shows the frame of so many, and the percentage" {
 	export TERM=xterm
-	run -0 --separate-stderr python3 "$root/tests/cli/terminal.py" 2 incise view wall --procedure -o f --fps 4 --duration 1s $small
+	run -0 --separate-stderr python3 "$root/tests/cli/terminal.py" 2 incise view wall --procedure -o f --rate 4 --duration 1s $small
 	[[ "$output" == *"frame 1 of 4 ["*"] 25 %"*"frame 2 of 4 ["*"] 50 %"*"frame 4 of 4 ["*"] 100 %"* ]]
-	run -0 --separate-stderr python3 "$root/tests/cli/terminal.py" 2 incise view wall --procedure -o n.png --at 0.25s,0.5s --fps 4 $small
+	run -0 --separate-stderr python3 "$root/tests/cli/terminal.py" 2 incise view wall --procedure -o n.png --at 0.25s,0.5s --rate 4 $small
 	[[ "$output" == *"frame 0 of 2 ["*"] 0 %"*"frame 1 of 2 ["*"] 50 %"*"frame 2 of 2 ["*"] 100 %"* ]]
 	# of a recording: by its length
 	incise capture -o a.rec --rig sim:clock=simulated --duration 1s >/dev/null
-	run -0 --separate-stderr python3 "$root/tests/cli/terminal.py" 2 incise view wall --from a.rec -o g --fps 4 $small
+	run -0 --separate-stderr python3 "$root/tests/cli/terminal.py" 2 incise view wall --from a.rec -o g --rate 4 $small
 	[[ "$output" == *"frame 4 of 4 ["*"] 100 %"* ]]
 }
 
@@ -141,7 +141,7 @@ ticks_of() {
 	pid=$!
 	has_ticked() { [ "$(ticks_of neck)" -gt "${1:-500}" ]; }
 	await has_ticked
-	incise view neck -o f --overwrite --fps 10 --duration 2s --json $small >r.json
+	incise view neck -o f --overwrite --rate 10 --duration 2s --json $small >r.json
 	holds "$(key r.json frames) > 0"
 	await has_ticked "$(ticks_of neck)"
 	kill -TERM $pid
@@ -169,7 +169,7 @@ begin_loop() {
 # Look at it with a session, until it has drawn: $seen.
 begin_view() {
 	rm -rf f
-	incise view neck -o f --fps 10 -o v.session --overwrite --duration 1h $small \
+	incise view neck -o f --rate 10 -o v.session --overwrite --duration 1h $small \
 		>v.txt 2>why 3>&- &
 	seen=$!
 	await test -e f/frame-000003.png
@@ -180,7 +180,7 @@ begin_view() {
 	# less than the look itself took; the page holds the 3 s before
 	for _ in {1..20}; do
 		begin=$(uptime_ms)
-		incise view neck -o f --fps 10 -o v.session --overwrite --duration 1s $small
+		incise view neck -o f --rate 10 -o v.session --overwrite --duration 1s $small
 		[ "$(key v.session ticks_lost)" != 0 ] || [ "$(key v.session duration_s)" = 0.0 ] || break
 	done
 	holds "$(key v.session duration_s) > 0 && $(key v.session duration_s) < ($(uptime_ms) - $begin + 20) / 1000"
@@ -205,7 +205,7 @@ begin_view() {
 @test "a recording is seen through its loop" {
 	incise capture -o r.rec --rig sim:seed=1,clock=simulated,depth_mm=5,times=1 2>/dev/null
 	sed -i 's/skin = "liver"/& ; texture_px = 512/' liver.scene
-	incise view liver.scene --from r.rec -o f --fps 2 --json $small >r.json
+	incise view liver.scene --from r.rec -o f --rate 2 --json $small >r.json
 	# the skin of a plane is 120 mm wide, and the cut begins at its middle
 	holds "$(key r.json cut_mm) > 20 && $(key r.json cut_mm) < 60"
 	run --separate-stderr incise view liver.scene --from none.rec -o f --overwrite $small

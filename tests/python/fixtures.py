@@ -86,8 +86,7 @@ def _shared():
         "-o",
         os.path.join(folder, "pairs.csv"),
         "--average",
-        "12x10",
-        "--by-cut",
+        "12x10,by-cut",
     )
     return folder
 

@@ -18,7 +18,7 @@ from fixtures import SANITIZED, SOURCE, Case, has, run
 
 OPTIONS = {"group": "cut", "check": 0.3}
 QUICK = {"mf": (2, 2), "starts": 1, "epochs": 5}
-QUICK_TOOL = ("--mf", "2,2", "--starts", "1", "--epochs", "5")
+QUICK_TOOL = ("--mf", "2,2", "--search", "starts=1", "--epochs", "5")
 
 
 class Models(Case):
@@ -35,7 +35,7 @@ class Models(Case):
         points = [(0, 0), (5, 20), (12.5, 3), (30, 100), (-1, 5)]
         text = "".join(f"{x} {y}\n" for x, y in points)
         for line, force, sd in zip(
-            run("incise", "eval", self.fis, "--sd", input=text).splitlines(),
+            run("incise", "eval", self.fis, "--uncertainty", "total", input=text).splitlines(),
             *self.model(points, sd=True),
         ):
             told = [float(word) for word in line.split()]

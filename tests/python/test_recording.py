@@ -367,7 +367,7 @@ class Recordings(Case):
             ([], self.rec.pairs()),
             (["--rate", "200"], self.rec.pairs(rate_hz=200)),
             (["--average", "12x10"], self.rec.pairs(12, 10)),
-            (["--average", "12x10", "--by-cut"], self.rec.pairs(12, 10, by_cut=True)),
+            (["--average", "12x10,by-cut"], self.rec.pairs(12, 10, by_cut=True)),
             (
                 ["--rate", "200", "--uncertainty", "parts"],
                 self.rec.pairs(rate_hz=200, uncertainty="parts"),

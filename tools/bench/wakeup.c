@@ -82,7 +82,8 @@ static const char *begin_view(const char *scene, double seconds, struct load_run
 	const char *argv[] = {cli_text("%s/incise-view", cli_folder()),
 			      scene,
 			      "--procedure",
-			      "--no-output",
+			      "-o",
+			      "none",
 			      "--duration",
 			      cli_text("%.0f", seconds + LONGER_S),
 			      NULL};

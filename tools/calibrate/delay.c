@@ -29,6 +29,7 @@
 
 enum { FORCE, TRACKER, CAMERA, STREAMS };
 static const char *const names[] = {"force", "tracker", "camera", NULL};
+static const char *const cameras[] = {"auto", "frames", NULL};
 
 struct delay_stream {
 	struct incise_delay_point *points; /* force N, others depth mm */
@@ -47,9 +48,20 @@ struct delay {
 	double time_s, max_delay_ms; /* time_s 0: not given */
 	double u_reference_ms;	     /* NAN: not given */
 	int reference;
-	bool camera;
+	enum { CAMERA_AUTO, CAMERA_FRAMES } camera;
 	struct delay_stream streams[STREAMS];
 };
+
+static void parse_u(void *run, char *text)
+{
+	static const struct cli_option keys[] = {
+		{0, "given-u reference", "MS", NULL,
+		 CLI_NUMBER(struct delay, u_reference_ms, 0, 1000)},
+		{0},
+	};
+
+	cli_keys(text, keys, run);
+}
 
 static const struct cli_option option_table[] = {
 	CALIBRATE_RIG_OPTIONS(struct delay),
@@ -58,14 +70,15 @@ static const struct cli_option option_table[] = {
 	{0, "reference-stream", "STREAM",
 	 "stream whose delay is taken as known: force (default), tracker or camera",
 	 CLI_CHOICE(struct delay, reference, names)},
-	{0, "u-reference", "MS",
-	 "standard uncertainty of that stream's own delay, which is not measured: "
+	{0, "given-u", "reference=MS",
+	 "standard uncertainty of the reference stream's own delay, which is not measured: "
 	 "the others' is relative to it",
-	 CLI_NUMBER(struct delay, u_reference_ms, 0, 1000)},
+	 CLI_PARSED_BY(parse_u)},
 	{0, "max-delay", "MS", "largest delay to look for, in ms (default: 150)",
 	 CLI_NUMBER(struct delay, max_delay_ms, 10, 1000)},
-	{0, "with-camera", NULL, "on the simulated rig, record its camera too",
-	 CLI_FLAG(struct delay, camera)},
+	{0, "camera", "WHAT",
+	 "frames: record the camera of the simulated rig too; auto (default)",
+	 CLI_CHOICE(struct delay, camera, cameras)},
 	{0, "from", "NAME.rec", "use this recording instead of a rig",
 	 CLI_INPUT(struct delay, common.from)},
 	{'o', "output", "NAME.rec", "keep the recording here, for --from",
@@ -167,13 +180,13 @@ static int poll_for(struct incise_recorder *recorder, struct incise_clock *clock
 
 /*
  * Record the rig for @time_s into @path, which ends in .rec, with its camera if rig.conf names
- * one or --with-camera is given. 0, or -1 with *err: then a part of it may be left there.
+ * one or --camera=frames is given. 0, or -1 with *err: then a part of it may be left there.
  */
 static int record(const struct delay *delay, double time_s, const char *path,
 		  struct incise_error *err)
 {
 	unsigned int devices = INCISE_RIG_TRACKER | INCISE_RIG_FORCE | INCISE_RIG_CAMERA |
-			       (delay->camera ? 0 : INCISE_RIG_IF_NAMED);
+			       (delay->camera == CAMERA_FRAMES ? 0 : INCISE_RIG_IF_NAMED);
 	struct incise_recorder_setup setup = {.calibration = &delay->common.found,
 					      .planned_s = time_s};
 	struct incise_rig *rig =

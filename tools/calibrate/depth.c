@@ -23,9 +23,12 @@ static void parse_tolerance(void *tolerance, char *text)
 static void parse_board(void *run, char *text)
 {
 	struct depth *depth = run;
+	char *items[2] = {0};
 	char rest;
 
-	if (sscanf(text, "%dx%d%c", &depth->corners.columns, &depth->corners.rows,
+	if (cli_list("board", text, items, 2) == 2)
+		depth->square_mm = cli_quantity("--board", items[1], lengths, 0.01, 1000);
+	if (sscanf(items[0], "%dx%d%c", &depth->corners.columns, &depth->corners.rows,
 		   &rest) != 2 ||
 	    depth->corners.columns < 3 || depth->corners.rows < 3 ||
 	    depth->corners.columns > 100 || depth->corners.rows > 100 ||
@@ -33,7 +36,28 @@ static void parse_board(void *run, char *text)
 		cli_usage(
 			"--board: expected inner corners such as 9x6, 3 or more each way "
 			"and at most %d together, found '%s'",
-			INCISE_BOARD_CORNERS, text);
+			INCISE_BOARD_CORNERS, items[0]);
+}
+
+static void parse_u(void *run, char *text)
+{
+	static const struct cli_option keys[] = {
+		{0, "given-u length", "LENGTH", NULL,
+		 CLI_QUANTITY(struct depth, u_length_mm, lengths, 0, 100)},
+		{0, "given-u pixels", "PX", NULL,
+		 CLI_NUMBER(struct depth, u_px, 0, 1000)},
+		{0, "given-u gauge", "PERCENT", NULL,
+		 CLI_NUMBER(struct depth, u_gauge, 0, 100)},
+		{0, "given-u zero", "LENGTH", NULL,
+		 CLI_QUANTITY(struct depth, u_zero_mm, lengths, 0, 100)},
+		{0, "given-u square", "PERCENT", NULL,
+		 CLI_NUMBER(struct depth, u_square, 0, 100)},
+		{0, "given-u plane", "LENGTH", NULL,
+		 CLI_QUANTITY(struct depth, u_plane_mm, lengths, 0, 100)},
+		{0},
+	};
+
+	cli_keys(text, keys, run);
 }
 
 static const struct cli_option option_table[] = {
@@ -51,15 +75,8 @@ static const struct cli_option option_table[] = {
 	 CLI_PARSED(struct depth, tolerance, parse_tolerance)},
 	{0, "length", "LENGTH", "two-point: known length (default: 47.5mm)",
 	 CLI_QUANTITY(struct depth, length_mm, lengths, 0.1, 1000)},
-	{0, "length-u", "LENGTH",
-	 "two-point: its standard uncertainty (default: 0.012mm)",
-	 CLI_QUANTITY(struct depth, u_length_mm, lengths, 0, 100)},
 	{0, "pixels", "PX,...", "two-point: the length in pixels, one value or more",
 	 CLI_TEXT(struct depth, pixels)},
-	{0, "pixels-u", "PX",
-	 "two-point: standard uncertainty common to all lengths (default: 0.7 for "
-	 "--pixels, 0.03 from images)",
-	 CLI_NUMBER(struct depth, u_px, 0, 1000)},
 	{0, "images", "N",
 	 "number of frames to take from the camera (default: 50 on a terminal, 8 "
 	 "of a board)",
@@ -68,24 +85,9 @@ static const struct cli_option option_table[] = {
 	 CLI_DURATION(struct depth, every_s, 0.01, 3600)},
 	{0, "pick", "X,Y", "learn the colour of the handle from this pixel",
 	 CLI_TEXT(struct depth, pick)},
-	{0, "gauge-u", "PERCENT",
-	 "line: standard uncertainty of the scale of the depth gauge (default: "
-	 "0.05)",
-	 CLI_NUMBER(struct depth, u_gauge, 0, 100)},
-	{0, "zero-u", "LENGTH",
-	 "line: standard uncertainty of its zero (default: 0.02mm)",
-	 CLI_QUANTITY(struct depth, u_zero_mm, lengths, 0, 100)},
-	{0, "board", "COLSxROWS", "board: inner corners (default: 9x6)",
+	{0, "board", "COLSxROWS[,LENGTH]",
+	 "board: inner corners and side of a square (default: 9x6,5mm)",
 	 CLI_PARSED_BY(parse_board)},
-	{0, "square", "LENGTH", "board: side of a square (default: 5mm)",
-	 CLI_QUANTITY(struct depth, square_mm, lengths, 0.01, 1000)},
-	{0, "square-u", "PERCENT",
-	 "board: standard uncertainty of the squares (default: 0.02)",
-	 CLI_NUMBER(struct depth, u_square, 0, 100)},
-	{0, "plane-u", "LENGTH",
-	 "board: standard uncertainty of its distance from the cutting plane "
-	 "(default: 0.1mm)",
-	 CLI_QUANTITY(struct depth, u_plane_mm, lengths, 0, 100)},
 	{0, "handle", "X,Y,X,Y",
 	 "board: ends of the handle in the image (default: upright in its middle)",
 	 CLI_TEXT(struct depth, axis)},
@@ -93,6 +95,13 @@ static const struct cli_option option_table[] = {
 	 "board: corners of the region of interest (default: 100 px around the "
 	 "axis)",
 	 CLI_TEXT(struct depth, region)},
+	{0, "given-u", "KEY=VALUE,...",
+	 "standard uncertainties: two-point: length (default: 0.012mm) and pixels, "
+	 "common to all (default: 0.7 for --pixels, 0.03 from images); line: gauge, "
+	 "of its scale in percent (default: 0.05), and zero (default: 0.02mm); "
+	 "board: square, in percent (default: 0.02), and plane, of its distance "
+	 "from the cutting plane (default: 0.1mm)",
+	 CLI_PARSED_BY(parse_u)},
 	{0},
 };
 

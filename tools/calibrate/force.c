@@ -80,7 +80,7 @@ static void parse_weights(void *to, char *list)
 	for (int i = 1; i < weights->n; i++)
 		if (weights->mass_g[i] == weights->mass_g[i - 1])
 			cli_usage("--weights: %g g is listed twice; repeat all loads "
-				  "with --series",
+				  "with --repeat",
 				  weights->mass_g[i]);
 	if (weights->n < 3)
 		cli_usage("--weights: expected the empty pan and 2 weights or more, for "
@@ -89,8 +89,21 @@ static void parse_weights(void *to, char *list)
 
 static void parse_gravity(void *run, char *text)
 {
+	static const struct cli_option keys[] = {
+		{0, "gravity latitude", "DEG", NULL,
+		 CLI_NUMBER(struct force, latitude_deg, -90, 90)},
+		{0, "gravity altitude", "M", NULL,
+		 CLI_NUMBER(struct force, altitude_m, -1000, 10000)},
+		{0},
+	};
 	struct incise_calibrate_force_setup *setup = &((struct force *)run)->setup;
 
+	if (strchr(text, '=')) {
+		cli_keys(text, keys, run);
+		if (isnan(((struct force *)run)->latitude_deg))
+			cli_usage("--gravity: altitude needs latitude=DEG, too");
+		return;
+	}
 	setup->gravity_m_s2 = cli_number("gravity", text, 9.7, 9.9);
 	setup->gravity_u_m_s2 = 1e-4; /* 10 mGal */
 	((struct force *)run)->gravity = "given, to 10 mGal";
@@ -139,7 +152,7 @@ static const struct cli_option option_table[] = {
 	{0, "weights", "LIST",
 	 "loads, for example 0,50g,100g,0.2kg (default: ask for them)",
 	 CLI_PARSED(struct force, weights, parse_weights)},
-	{0, "series", "N",
+	{0, "repeat", "N",
 	 "series of all loads upwards; the last one also downwards (default: 3)",
 	 CLI_INTEGER(struct force, weights.series, 1, 100)},
 	{0, "duration", "TIME", "averaging time of each reading (default: 2s)",
@@ -147,15 +160,10 @@ static const struct cli_option option_table[] = {
 	{0, "timeout", "TIME",
 	 "longest wait for a load to be put on and be steady (default: 1min)",
 	 CLI_DURATION(struct force, weights.timeout_s, 2, 3600)},
-	{0, "gravity", "M_S2",
-	 "local gravity (default: 9.80665, with the uncertainty of an unknown "
-	 "place)",
+	{0, "gravity", "M_S2|KEY=VALUE,...",
+	 "local gravity, or where it is computed: latitude=DEG and altitude=M above "
+	 "the sea (default: 9.80665, with the uncertainty of an unknown place)",
 	 CLI_PARSED_BY(parse_gravity)},
-	{0, "latitude", "DEG", "latitude, to compute gravity from",
-	 CLI_NUMBER(struct force, latitude_deg, -90, 90)},
-	{0, "altitude", "M",
-	 "altitude above the sea, to compute gravity from (default: 0)",
-	 CLI_NUMBER(struct force, altitude_m, -1000, 10000)},
 	{0, "scale", "MASS",
 	 "resolution of the scale that weighed the loads (default: 0.5g)",
 	 CLI_QUANTITY(struct force, setup.scale_g, grams, 0, 1e4)},
@@ -198,7 +206,8 @@ static void find_gravity(struct force *force)
 			 force->latitude_deg, force->altitude_m);
 		force->gravity = words;
 	} else if (!force->gravity) {
-		force->gravity = "for anywhere on Earth (--latitude says where)";
+		force->gravity =
+			"for anywhere on Earth (--gravity latitude=DEG says where)";
 	}
 }
 
@@ -211,9 +220,6 @@ static void check_force_options(void *run, int argc, char **argv)
 	if (common->from && (common->rig || force->weights.n || common->keep))
 		cli_usage("--from does not go with --rig, --weights or -o FILE.csv: it "
 			  "takes the place of a rig");
-	if (!isnan(force->latitude_deg) && force->gravity)
-		cli_usage("--gravity and --latitude exclude each other; give one of "
-			  "them");
 	find_gravity(force);
 	cli_catch_signals();
 }

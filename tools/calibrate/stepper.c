@@ -59,7 +59,7 @@ static const struct cli_option option_table[] = {
 	 "range of the strokes, for example 0mm..1.5mm (default: from 0 to 70 % of "
 	 "the force channel's range)",
 	 CLI_PARSED_BY(parse_range)},
-	{0, "strokes", "N", "number of strokes up and down, 2 to 100 (default: 3)",
+	{0, "repeat", "N", "number of strokes up and down, 2 to 100 (default: 3)",
 	 CLI_INTEGER(struct stepper, live.strokes, 2, 100)},
 	{0, "max-force", "N",
 	 "stop and go back beyond this force (default: 80 % of the force channel's "
@@ -99,7 +99,7 @@ static void check_stepper_options(void *run, int argc, char **argv)
 	if (common->from && (common->rig || common->keep || !isnan(live->low_mm) ||
 			     !isnan(live->max_N) || live->strokes || stepper->no_rate))
 		cli_usage(
-			"--from does not go with --rig, -o FILE.csv, --range, --strokes, "
+			"--from does not go with --rig, -o FILE.csv, --range, --repeat, "
 			"--max-force or --no-rate: it drives nothing");
 	if (!live->strokes)
 		live->strokes = 3;

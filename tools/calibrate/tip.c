@@ -38,16 +38,27 @@ struct tip {
 	bool *inlier; /* n */
 };
 
+static void parse_u(void *run, char *text)
+{
+	static const struct cli_option keys[] = {
+		{0, "given-u surface", "MM", NULL,
+		 CLI_NUMBER(struct tip, u_surface_mm, 0, 1000)},
+		{0},
+	};
+
+	cli_keys(text, keys, run);
+}
+
 static const struct cli_option option_table[] = {
 	CALIBRATE_RIG_OPTIONS(struct tip),
 	{0, "duration", "TIME",
 	 "longest recording (default: 20s); ends earlier when the tip is known "
 	 "well enough",
 	 CLI_DURATION(struct tip, time_s, 1, 600)},
-	{0, "u-surface", "MM",
+	{0, "given-u", "surface=MM",
 	 "standard uncertainty of the tissue surface of rig.conf along its normal, "
 	 "which is not measured: for the uncertainty of depths",
-	 CLI_NUMBER(struct tip, u_surface_mm, 0, 1000)},
+	 CLI_PARSED_BY(parse_u)},
 	{0, "from", "FILE",
 	 "take the poses from a CSV file or a recording instead of a rig",
 	 CLI_INPUT(struct tip, common.from)},

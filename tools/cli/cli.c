@@ -27,11 +27,13 @@
 #include "help.h"
 
 #define OPTIONS_MAX 40
+#define KEYS_MAX 16
 #define LONG 256 /* first of the numbers of long options */
 
 static const struct cli_command *current;
 static bool status_line, verbose;
 static int status_above; /* lines above its last one */
+static void *completed;	 /* the command's struct, while a command line is completed */
 
 volatile sig_atomic_t cli_stop;
 
@@ -58,43 +60,79 @@ static const struct {
 	{"bench", "--plot", "-o NAME"},
 	{"bench all", "--report", "-o DIR"},
 	{"bench view", "--plot", "-o NAME"},
-	{"calibrate delay", "--camera", "--with-camera"},
 	{"calibrate delay", "--keep", "-o NAME.rec"},
 	{"calibrate delay", "--range", "--max-delay"},
 	{"calibrate delay", "--report", "-o DIR"},
 	{"calibrate delay", "--time", "--duration"},
+	{"calibrate delay", "--u-reference", "--given-u reference=MS"},
+	{"calibrate delay", "--with-camera", "--camera frames"},
 	{"calibrate depth", "--axis", "--handle"},
+	{"calibrate depth", "--gauge-u", "--given-u gauge=VALUE"},
 	{"calibrate depth", "--keep", "-o FILE.csv"},
+	{"calibrate depth", "--length-u", "--given-u length=VALUE"},
 	{"calibrate depth", "--pictures", "--images"},
+	{"calibrate depth", "--pixels-u", "--given-u pixels=VALUE"},
+	{"calibrate depth", "--plane-u", "--given-u plane=VALUE"},
 	{"calibrate depth", "--report", "-o DIR"},
+	{"calibrate depth", "--square", "--board COLSxROWS,LENGTH"},
+	{"calibrate depth", "--square-u", "--given-u square=VALUE"},
+	{"calibrate depth", "--zero-u", "--given-u zero=VALUE"},
+	{"calibrate force", "--altitude", "--gravity latitude=DEG,altitude=M"},
 	{"calibrate force", "--keep", "-o FILE.csv"},
+	{"calibrate force", "--latitude", "--gravity latitude=DEG"},
 	{"calibrate force", "--range", "--input-range"},
 	{"calibrate force", "--report", "-o DIR"},
+	{"calibrate force", "--series", "--repeat"},
 	{"calibrate force", "--time", "--duration"},
 	{"calibrate stepper", "--keep", "-o FILE.csv"},
 	{"calibrate stepper", "--report", "-o DIR"},
+	{"calibrate stepper", "--strokes", "--repeat"},
 	{"calibrate tip", "--keep", "-o FILE.csv"},
 	{"calibrate tip", "--report", "-o DIR"},
 	{"calibrate tip", "--time", "--duration"},
+	{"calibrate tip", "--u-surface", "--given-u surface=MM"},
 	{"compile", "--arith", "--method"},
 	{"compile", "--c-source", "-o FILE.c"},
+	{"compile", "--cells", "--method KIND:CELLS"},
 	{"demo", "--loop", "--duration"},
 	{"demo", "--report", "-o"},
+	{"eval", "--parts", "--uncertainty parts"},
+	{"eval", "--sd", "--uncertainty total"},
+	{"export", "--by-cut", "--average NxM,by-cut"},
+	{"export", "--depth-max", "--average NxM,depth=MM"},
+	{"export", "--from", "--range TIME..TIME"},
+	{"export", "--min-count", "--average NxM,count=N"},
+	{"export", "--to", "--range TIME..TIME"},
+	{"export", "--velocity-max", "--average NxM,velocity=MM_S"},
 	{"export", "-r", "--rate"},
 	{"haptic", "--log", "-o FILE.csv"},
+	{"haptic", "--priority", "--policy fifo:N"},
 	{"haptic", "--session", "-o FILE.session"},
 	{"info", "--plot", "incise plot MODEL.fis -o NAME.png"},
+	{"join", "--within", "--tolerance"},
 	{"replay", "--at", "--poses"},
 	{"replay", "--csv", "-o FILE.csv"},
 	{"replay", "--log", "-o FILE.csv"},
 	{"replay", "--plot", "-o NAME.png"},
+	{"serve", "--igtl-version", "--igtl PORT/VERSION"},
 	{"stepper", "--for", "--duration"},
+	{"train", "--classic", "--search classic"},
 	{"train", "--factor", "-o FILE.fac"},
+	{"train", "--from", "--range TIME..TIME"},
 	{"train", "--history", "-o FILE.csv"},
 	{"train", "--initial", "-o FILE.initial.fis"},
+	{"train", "--mf-type", "--search type=KIND"},
+	{"train", "--mpi", "--share mpi"},
 	{"train", "--output-model", "--output"},
+	{"train", "--sample", "--search sample=N"},
+	{"train", "--shard", "--share I/N"},
+	{"train", "--starts", "--search starts=N"},
+	{"train", "--step", "--search classic,step=K"},
+	{"train", "--to", "--range TIME..TIME"},
 	{"view", "--camera", "--viewpoint"},
+	{"view", "--fps", "--rate"},
 	{"view", "--frames", "-o DIR"},
+	{"view", "--no-output", "-o none"},
 	{"view", "--session", "-o FILE.session"},
 	{"view", "--strip", "-o FILE.png"},
 	{"view", "--video", "-o FILE.mkv"},
@@ -264,6 +302,43 @@ static void store(const struct cli_option *opt, void *member)
 	}
 }
 
+void cli_keys(char *text, const struct cli_option *keys, void *options)
+{
+	size_t prefix = strcspn(keys->name, " ");
+	char *option = cli_text("%.*s", (int)prefix, keys->name), *items[KEYS_MAX];
+	const char *names[KEYS_MAX + 1] = {0};
+	int n = cli_list(option, text, items, KEYS_MAX);
+
+	for (int k = 0; keys[k].name; k++) {
+		names[k] = keys[k].name + prefix + 1;
+		if (completed)
+			complete_word(keys[k].arg ? cli_text("%s=", names[k]) : names[k],
+				      NULL);
+	}
+	if (completed) {
+		puts(":nospace");
+		exit(0);
+	}
+	for (int i = 0, k; i < n; i++) {
+		char *value = strchr(items[i], '=');
+
+		if (value)
+			*value++ = '\0';
+		for (k = 0; names[k] && strcmp(names[k], items[i]) != 0; k++)
+			;
+		if (!names[k])
+			cli_unknown(cli_text("key of --%s", option), items[i], names);
+		if (!value != (keys[k].kind == CLI_KIND_FLAG))
+			cli_usage("--%s: %s", option,
+				  value ? cli_text("%s takes no value", names[k])
+					: cli_text("%s needs a value, %s=%s", names[k],
+						   names[k], keys[k].arg));
+		optarg = value;
+		store(&keys[k], (char *)options + keys[k].offset);
+	}
+	free(option);
+}
+
 static void note_paths(const struct cli_command *command, enum cli_kind kind,
 		       const void *options, void (*note)(const char *path))
 {
@@ -317,8 +392,6 @@ static void expect(const struct cli_command *command, const void *options)
 }
 
 /* The choices of an option: what cli_choice() expects in the function that parses it. */
-static void *completed; /* the command's struct, while a command line is completed */
-
 static void list_choices(const struct cli_option *opt)
 {
 	char nothing[] = "\001";
@@ -620,6 +693,21 @@ double cli_duration(const char *option, const char *text, double min, double max
 		cli_usage("--%s: expected %g s to %g s, found '%s'", option, min, max,
 			  text);
 	return value;
+}
+
+void cli_time_range(const char *option, char *text, double *from_s, double *to_s)
+{
+	char *dots = strstr(text, "..");
+
+	if (!dots || (dots == text && !dots[2]))
+		cli_usage("--%s: expected two times such as 2s..4.5s, got '%.40s'",
+			  option, text);
+	*dots = '\0';
+	*from_s = *text ? cli_duration(option, text, 0, 1e9) : 0;
+	*to_s = dots[2] ? cli_duration(option, dots + 2, 0, 1e9) : INFINITY;
+	if (!(*from_s < *to_s))
+		cli_usage("--%s: it ends at %g s, where it begins or before", option,
+			  *to_s);
 }
 
 double cli_quantity(const char *what, const char *text, const struct cli_unit *units,

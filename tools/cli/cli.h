@@ -242,6 +242,15 @@ void cli_negative_numbers(int argc, char **argv);
 /* Index of @text in @names, which end with NULL. */
 int cli_choice(const char *option, const char *text, const char *const *names);
 
+/* "2s..4.5s", "90s.." (to: INFINITY), "..1min" (from: 0), in seconds. */
+void cli_time_range(const char *option, char *text, double *from_s, double *to_s);
+
+/*
+ * "key=value,flag": the rows @keys, which end with {0}, are options without an own name, stored in
+ * *options; .name is "OPTION key". Another key is bad usage.
+ */
+void cli_keys(char *text, const struct cli_option *keys, void *options);
+
 /* "a,b,c" to at most max strings; the text is cut in place. Returns how many. */
 int cli_list(const char *option, char *text, char **items, int max);
 

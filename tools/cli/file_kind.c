@@ -43,7 +43,7 @@ static const struct {
 	 "'incise bench compare OLD.json NEW.json' compares reports of benchmarks"},
 	{"the status file of a loop", ".state", "'incise status %1$s' shows it"},
 	{"the standard deviation of a model (.sd)", ".sd",
-	 "give its model; 'incise eval MODEL.fis --sd' reads both"},
+	 "give its model; 'incise eval MODEL.fis --uncertainty total' reads both"},
 	{"an image", NULL,
 	 "'incise calibrate depth two-point --from %1$s' measures in images"},
 	{"a video", NULL, "give the recording that it belongs to"},

@@ -9,7 +9,7 @@
 #include <incise/session.h>
 #include "cli.h"
 
-/* Units of --within: s, ms, us, ns. */
+/* Units of --tolerance: s, ms, us, ns. */
 extern const struct cli_unit joined_times[];
 
 void joined_print(const struct incise_session_info *members, int n);

@@ -281,7 +281,8 @@ static bool is_row_of(const struct cli_option *row, const struct cli_option *fir
 }
 
 /* The row whose extension ends this path; NULL: none. */
-static const struct cli_option *row_of(const struct cli_option *first, const char *path)
+static const struct cli_option *find_output_row(const struct cli_option *first,
+						const char *path)
 {
 	const struct cli_option *found = NULL;
 	size_t longest = 0;
@@ -315,7 +316,7 @@ const struct cli_option *cli_output_row(const struct cli_option *first, char **p
 {
 	size_t form = strcspn(*path, ":/");
 	char *named = cli_text("x.%.*s", (int)form, *path);
-	const struct cli_option *row = first, *found = row_of(first, named);
+	const struct cli_option *row = first, *found = find_output_row(first, named);
 	struct stat st;
 	bool there = !stat(*path, &st), folder = there && S_ISDIR(st.st_mode);
 
@@ -329,7 +330,7 @@ const struct cli_option *cli_output_row(const struct cli_option *first, char **p
 			row++;
 		return row;
 	}
-	found = row_of(first, *path);
+	found = find_output_row(first, *path);
 	if (found)
 		return found;
 	/* An extension that none has is refused later: that the file is an input counts more. */

@@ -301,7 +301,7 @@ static void figure_membership(const struct demo *demo)
 	model_plot_write_functions(model, demo->folder, "membership-after.dat");
 	script = plot_begin(demo->folder, "fig3a-membership", 1000, 680);
 	fputs("set multiplot layout 2,2 title 'Membership functions of depth and velocity, "
-	      "train --classic (compare figure 3a of Song et al., 2006)'\nset key outside right center\n",
+	      "train --search classic (compare figure 3a of Song et al., 2006)'\nset key outside right center\n",
 	      script);
 	for (int i = 0; i < 2; i++)
 		model_plot_functions(script, before, i, "membership-before.dat",

@@ -528,7 +528,7 @@ static int map_clock(struct join *join, int at)
 	if (!rc && within_ns > 0 && member->bound_ns > within_ns)
 		rc = incise_error_set(
 			join->err, ERANGE,
-			"%s: its times are uncertain by %.3g ms, and --within asks for "
+			"%s: its times are uncertain by %.3g ms, and --tolerance asks for "
 			"%.3g ms; allow more, or align by another signal",
 			member->recording->path, member->bound_ns * 1e-6,
 			within_ns * 1e-6);

@@ -172,7 +172,7 @@ TEST(test_clocks, IN_FOLDER)
 	assert_true(worst > 0.5 * BOUND_NS);
 }
 
-/* A bound that --within asks for and that is not reached is refused. */
+/* A bound that --tolerance asks for and that is not reached is refused. */
 TEST(test_refusals, IN_FOLDER)
 {
 	const char *const twice[] = {"a.rec", "a.rec"}, *const nested[] = {"s.rec",
