@@ -111,7 +111,7 @@ check "each goes back to where it rests" rests
 carriages "$(carriage 0 position)" "$(carriage 1 position)"
 # Cuts follow each other in one place: it meets a whole one whenever the motors are ready, and no nut
 # has a way to go to it. Time skips while the guest waits for a file, by seconds on a busy host.
-two() { scene=/tmp/side.scene haptic --duration 9s --log /tmp/log.csv; }
+two() { scene=/tmp/side.scene haptic --duration 9s -o /tmp/log.csv; }
 check "they run through a cut" two
 sed 's/^/# /' /tmp/out
 both() { said "^felt .*along (0, 0, 1), along (0, 1, 0); not felt: 0\.[0-9]*[1-9]" </tmp/out; }
