@@ -10,7 +10,6 @@ import ctypes
 import errno
 import math
 import os
-import re
 from typing import Any, List, Optional, Sequence
 
 from . import _library
@@ -21,11 +20,7 @@ from .model import BaselinesStruct, INPUTS_MAX, Model, Stop, TrainOptionsStruct
 from .model import TrainReportStruct, has_cuts, is_path, is_recording, name_array, report_of
 from .recording import Recording
 
-TEXT_MAX = 1000  # INCISE_FACTOR_TEXT_MAX
-ORIGINS = 480  # bytes of a recording's origins in its text, as in tools/train/sources.c
-_ORIGIN = re.compile(
-    rb"incise:([1-9]):([a-z]{1,15}:[0-9a-f]{64}:[0-9]+:[-0-9A-Za-z]+:[-0-9A-Za-z._~%]+;)"
-)
+TEXT_MAX = 1000  # INCISE_SOURCE_TEXT
 
 _Stream = ctypes.CFUNCTYPE(c_int, c_void_p, ctypes.POINTER(ArrowArrayStream), c_void_p)
 
@@ -113,6 +108,10 @@ class TrainedStruct(ctypes.Structure):
 
 
 _library.declare(
+    "libincise-record",
+    {"incise_source_text": (c_int, c_char_p, c_void_p, c_char_p, c_void_p)},
+)
+_library.declare(
     "libincise-learn",
     {
         "incise_train_sources": (
@@ -136,23 +135,11 @@ def _without_choice(path: bytes) -> bytes:
     return os.path.join(folder, name.rpartition(b":")[0])
 
 
-def _file_text(path: bytes) -> bytes:
-    """The name of a CSV file, with the origins in the comments at its start, one deeper; see
-    incise/origin.h."""
-    text, found = os.path.basename(path)[:300], []
-    with open(path, "rb") as file:
-        for line in file:
-            if not line.startswith(b"#"):
-                break
-            for depth, rest in _ORIGIN.findall(line):
-                origin = b"incise:%d:%s" % (int(depth) + 1, rest)
-                if depth < b"9" and origin not in found:
-                    found.append(origin)
-    for place, origin in enumerate(found):
-        if len(text) + len(origin) + 2 >= TEXT_MAX:
-            break
-        text += (b" " if place else b", ") + origin
-    return text
+def _text(path: bytes, recording: Optional[int]) -> bytes:
+    """What factors and models keep of a source."""
+    text, failure = ctypes.create_string_buffer(TEXT_MAX), Failure()
+    failure.check(function("incise_source_text")(path, recording, text, failure.ref))
+    return text.value
 
 
 class Source:
@@ -194,31 +181,18 @@ class Source:
         elif path is not None:
             self.struct.path = path
             if os.path.exists(path):
-                self.struct.text = _file_text(path)
+                self.struct.text = _text(path, None)
         else:
             self.struct.text = self.name.encode()[:300]
         if self.struct.path is None:
             self.struct.stream = _Stream(self._stream)
 
     def _describe(self, recording: Recording, path: bytes) -> None:
-        """The text is that of incise train."""
-        info, origins = recording.info, recording._origins(ORIGINS)
         self.table = recording.pairs()
         self.struct.hashed = os.path.join(_without_choice(path), b"recording.db")
-        self.struct.rig = info.rig.encode()
-        self.struct.text = (
-            b"%.100s, %s%srecorded %s, rig %.120s, force %.9g mV/N, zero %.9g mV, camera %.9g mm/px"
-            % (
-                os.path.basename(path.rstrip(b"/")),
-                origins,
-                b", " if origins else b"",
-                info.started.encode(),
-                self.struct.rig,
-                info.force_mV_N,
-                info.zero_mV,
-                info.depth_mm_px,
-            )
-        )
+        self.struct.rig = recording.info.rig.encode()
+        with recording._lock:
+            self.struct.text = _text(path, recording._open())
         if recording._calibration is not None:
             self.struct.text += b", read with another calibration"
 

@@ -47,12 +47,6 @@ _library.declare(
             ctypes.POINTER(ArrowArrayStream),
             ctypes.c_void_p,
         ),
-        "incise_recording_origins": (
-            ctypes.c_size_t,
-            ctypes.c_void_p,
-            ctypes.c_char_p,
-            ctypes.c_size_t,
-        ),
         "incise_export_options_init": (None, ctypes.POINTER(ExportOptions)),
         "incise_frame_reader_new": (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p),
         "incise_frame_reader_free": (None, ctypes.c_void_p),
@@ -266,13 +260,6 @@ class Recording:
         if not self._pointer:
             raise Invalid(errno.EINVAL, f"{self.path}: is closed; open it again")
         return self._pointer
-
-    def _origins(self, size: int) -> bytes:
-        """The heads of its seal as tokens of incise/origin.h, as many as fit."""
-        text = ctypes.create_string_buffer(size)
-        with self._lock:
-            function("incise_recording_origins")(self._open(), text, size)
-        return text.value
 
     @property
     def info(self) -> Info:

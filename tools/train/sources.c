@@ -20,12 +20,10 @@
 #include "../cli/recording.h"
 #include "sources.h"
 
-#define ORIGINS_TEXT 480 /* bytes of a recording's origins in its text */
-
 /* The part of a source that is its own, user of incise_train_source. */
 struct own {
 	const struct recording_rows *rows;
-	char text[INCISE_FACTOR_TEXT_MAX], rig[256], calibration[512];
+	char text[INCISE_SOURCE_TEXT], rig[256], calibration[512];
 	char *database;		 /* of a recording */
 	struct memory_file pipe; /* of a source that can be read once only */
 };
@@ -111,24 +109,13 @@ static bool is_part(const struct recording_rows *rows)
 	return rows->from_s > 0 || rows->to_s > 0 || rows->cut;
 }
 
-static const char *name_of(const char *path)
-{
-	size_t n = strlen(path);
-
-	while (n > 1 && path[n - 1] == '/')
-		n--;
-	while (n && path[n - 1] != '/')
-		n--;
-	return path + n;
-}
-
 static int open_recording(struct incise_train_source *source, struct incise_error *err)
 {
 	struct own *own = source->user;
 	struct incise_recalibration active;
 	struct incise_recording_info info;
 	struct incise_recording *recording;
-	char *text, origins[ORIGINS_TEXT];
+	char *text;
 	int rc;
 
 	/* It prints a warning where damaged recordings are used. */
@@ -139,22 +126,14 @@ static int open_recording(struct incise_train_source *source, struct incise_erro
 	recording = incise_recording_open(source->name, err);
 	if (!recording)
 		return -errno;
-	rc = incise_recording_info(recording, &info, err);
+	rc = incise_source_text(source->name, recording, own->text, err);
+	if (!rc)
+		rc = incise_recording_info(recording, &info, err);
 	incise_recording_recalibration(recording, &active);
-	incise_recording_origins(recording, origins, sizeof(origins));
 	incise_recording_close(recording);
 	if (rc)
 		return rc;
 	snprintf(own->rig, sizeof(own->rig), "%s", info.rig);
-	text = cli_text(
-		"%.100s, %s%srecorded %s, rig %.*s, force %.9g mV/N, zero %.9g mV, camera "
-		"%.9g mm/px%s%s%s%s",
-		name_of(source->name), origins, *origins ? ", " : "", info.started,
-		*active.file ? 40 : 120, info.rig, info.force_mV_N, info.zero_mV,
-		info.depth_mm_px, *active.file ? ", by " : "", active.file,
-		*active.file ? ", SHA-256 " : "", active.sha256);
-	snprintf(own->text, sizeof(own->text), "%s", text);
-	free(text);
 	text = cli_text("%s; %.17g mV/N; tip %.17g %.17g %.17g; %s", info.rig,
 			info.force_mV_N, info.tip_mm[0], info.tip_mm[1], info.tip_mm[2],
 			active.sha256);
@@ -165,28 +144,14 @@ static int open_recording(struct incise_train_source *source, struct incise_erro
 	return 0;
 }
 
-/* Its name, and the origins that the file carries, as many as fit. */
 static int open_sources_file(struct incise_train_source *source, struct incise_error *err)
 {
 	struct own *own = source->user;
-	size_t at = (size_t)snprintf(own->text, sizeof(own->text), "%.300s",
-				     source_is_pipe(source) ? "a pipe"
-							    : name_of(source->path));
-	struct incise_origins origins = {0};
-	char text[INCISE_ORIGIN_TEXT];
-	int rc = incise_origins_read(&origins, source->path,
-				     file_kind_of(source->path) == FILE_MODEL, err);
 
-	for (int i = 0; i < origins.n; i++) {
-		origins.all[i].depth++;
-		if (incise_origin_text(&origins.all[i], text) <= 0)
-			continue;
-		if (at + strlen(text) + 2 >= sizeof(own->text))
-			break;
-		at += (size_t)sprintf(own->text + at, "%s%s", i ? " " : ", ", text);
-	}
-	incise_origins_free(&origins);
-	return rc;
+	if (!source_is_pipe(source))
+		return incise_source_text(source->path, NULL, own->text, err);
+	strcpy(own->text, "a pipe");
+	return 0;
 }
 
 /* A pipe can be read once only: as a file in memory it is read like any other. */

@@ -109,6 +109,21 @@ INCISE_API int incise_origins_read(struct incise_origins *origins, const char *p
 INCISE_API int incise_origins_add(struct incise_origins *origins, const char *path,
 				  const char *kind, struct incise_error *err);
 
+/** Bytes for incise_source_text(). */
+#define INCISE_SOURCE_TEXT 1000
+
+/**
+ * Describe a source of training in one line, which factors and models keep: of a recording its name,
+ * origins, start, rig and calibration; of another file its name and the origins that it carries, one
+ * deeper, as many as fit. Thread safe.
+ *
+ * @param recording open, of this path; NULL: a file
+ * @param text      INCISE_SOURCE_TEXT bytes
+ * @return as incise_origins_read() and incise_recording_info()
+ */
+INCISE_API int incise_source_text(const char *path, struct incise_recording *recording,
+				  char *text, struct incise_error *err);
+
 /** Free what origins hold. */
 INCISE_API void incise_origins_free(struct incise_origins *origins);
 

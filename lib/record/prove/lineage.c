@@ -11,6 +11,8 @@
 #include <unistd.h>
 #include <incise/model.h>
 #include <incise/origin.h>
+#include <incise/recalibration.h>
+#include <incise/recording.h>
 #include <incise/seal.h>
 #include <incise/session.h>
 #include "../read/recalibration.h"
@@ -244,5 +246,70 @@ int incise_origins_add(struct incise_origins *origins, const char *path, const c
 			add_origin(origins, &below.all[i]);
 	origins->cut |= below.cut;
 	incise_origins_free(&below);
+	return rc;
+}
+
+/* --- describing ------------------------------------------------------------------------- */
+
+#define ORIGINS_MOST 480 /* bytes of a recording's origins in its text */
+
+static int name_length(const char *path, const char **name)
+{
+	size_t end = strlen(path), begin;
+
+	while (end > 1 && path[end - 1] == '/')
+		end--;
+	for (begin = end; begin && path[begin - 1] != '/';)
+		begin--;
+	*name = path + begin;
+	return (int)(end - begin);
+}
+
+static int describe_recording(const char *name, int length,
+			      struct incise_recording *recording, char *text,
+			      struct incise_error *err)
+{
+	struct incise_recalibration active;
+	struct incise_recording_info info;
+	char origins[ORIGINS_MOST];
+	int rc = incise_recording_info(recording, &info, err);
+
+	if (rc)
+		return rc;
+	incise_recording_recalibration(recording, &active);
+	incise_recording_origins(recording, origins, sizeof(origins));
+	snprintf(text, INCISE_SOURCE_TEXT,
+		 "%.*s, %s%srecorded %s, rig %.*s, force %.9g mV/N, zero %.9g mV, camera "
+		 "%.9g mm/px%s%s%s%s",
+		 length < 100 ? length : 100, name, origins, *origins ? ", " : "",
+		 info.started, *active.file ? 40 : 120, info.rig, info.force_mV_N,
+		 info.zero_mV, info.depth_mm_px, *active.file ? ", by " : "", active.file,
+		 *active.file ? ", SHA-256 " : "", active.sha256);
+	return 0;
+}
+
+int incise_source_text(const char *path, struct incise_recording *recording, char *text,
+		       struct incise_error *err)
+{
+	struct incise_origins origins = {0};
+	char token[INCISE_ORIGIN_TEXT];
+	const char *name;
+	int length = name_length(path, &name), rc;
+	size_t at;
+
+	if (recording)
+		return describe_recording(name, length, recording, text, err);
+	at = (size_t)snprintf(text, INCISE_SOURCE_TEXT, "%.*s",
+			      length < 300 ? length : 300, name);
+	rc = incise_origins_read(&origins, path, false, err);
+	for (int i = 0; i < origins.n; i++) {
+		origins.all[i].depth++;
+		if (incise_origin_text(&origins.all[i], token) <= 0)
+			continue;
+		if (at + strlen(token) + 2 >= INCISE_SOURCE_TEXT)
+			break;
+		at += (size_t)sprintf(text + at, "%s%s", i ? " " : ", ", token);
+	}
+	incise_origins_free(&origins);
 	return rc;
 }
