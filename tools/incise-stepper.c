@@ -314,9 +314,14 @@ static void run_move(const struct stepper_job *job, struct stepper_drive *drive)
 	if (!arrived(drive, to_mm))
 		stepper_drive_fail(
 			drive,
-			"%s is at %.4f mm after %.1f s and did not come to rest at "
+			"%s is at %.4f mm after %.1f s%s and did not come to rest at "
 			"%.4f mm; see incise stepper status",
-			drive->info.name, drive->status.position_mm, seconds, to_mm);
+			drive->info.name, drive->status.position_mm, seconds,
+			drive->status.state == INCISE_STEPPER_STATE_MOVING &&
+					drive->status.velocity_mm_s == 0
+				? " by its last position, from before it came to rest,"
+				: "",
+			to_mm);
 	put_moved(job, drive, from_mm, seconds);
 	maybe_hold(job, drive);
 }

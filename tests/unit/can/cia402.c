@@ -298,8 +298,8 @@ TEST(test_units, setup)
 		{"608F=4096/1 6091=1/1 60A8=00B50000 60A9=00B44700 60AA=00C00300",
 		 {4096, 60, 60}},
 		/* Increments/s behind a gear. */
-		{"6092=1000/1 608F=4000/1 6091=3/1 60A9=00B50300 60AA=00B55700",
-		 {1000, 12000, 12000}},
+		{"6092=12000/1 608F=4000/1 6091=3/1 60A9=00B50300 60AA=00B55700",
+		 {12000, 12000, 12000}},
 		/* Degrees/s, ten of them/s²; radians; gon/min; minutes and seconds of arc. */
 		{"6092=51200/1 60A9=00410300 60AA=01415700", {51200, 360, 36}},
 		{"6092=51200/1 60A9=00100300 60AA=00105700",
@@ -340,6 +340,9 @@ TEST(test_refused_units, setup)
 		{"608F=4000/1 6091=1/0", "counts_per_turn"},
 		/* More than a position can hold. */
 		{"608F=4294967294/1 6091=4294967294/1", "counts_per_turn"},
+		/* Which of the two it counts by, nobody knows. */
+		{"6092=1/1 608F=51200/1", "counts_per_turn"},
+		{"6092=12000/1 608F=4000/1 6091=2/1", "counts_per_turn"},
 		{"6092=1000/1 608F=4000/1 6091=1/1 60A8=00AA0000", "counts_per_turn"},
 		{"6092=1000/1 608F=4000/1 6091=1/1 60A8=80410000", "counts_per_turn"},
 		{"6092=1000/1 608F=4000/1 6091=1/1 60A8=7F410000", "counts_per_turn"},

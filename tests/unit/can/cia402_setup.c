@@ -325,18 +325,30 @@ TEST(test_unmapped_inputs, setup)
 /* Old limits do not stay: without homing there is no range. */
 TEST(test_unlimited, setup)
 {
+	bool has;
+
 	drive_set(&led->drive, 0x607d, 1, 5);
 	drive_set(&led->drive, 0x607d, 2, 9);
-	led->setup.limited = false;
+	led->setup.position_min = INT32_MIN;
+	led->setup.position_max = INT32_MAX;
 	assert_int_equal(led_configure(led), 0);
-	assert_false(led->supported.position_limit);
 	assert_int_equal((int32_t)led_value(led, 0x607d, 1), INT32_MIN);
 	assert_int_equal((int32_t)led_value(led, 0x607d, 2), INT32_MAX);
-	assert_int_equal(cia402_set_range(&led->client, 10, 20), 0);
-	assert_int_equal(cia402_set_range(&led->client, 30, 40), 0);
+	assert_int_equal(cia402_set_range(&led->client, 10, 20, &has), 0);
+	assert_int_equal(cia402_set_range(&led->client, 30, 40, &has), 0);
+	assert_true(has);
 	assert_int_equal(led_value(led, 0x607d, 1), 30);
 	assert_int_equal(led_value(led, 0x607d, 2), 40);
-	assert_int_equal(cia402_set_range(&led->client, 40, 40), -EINVAL);
+	assert_int_equal(cia402_set_range(&led->client, 40, 40, &has), -EINVAL);
+	assert_int_equal(cia402_has_range(&led->client, 30, 40, &has), 0);
+	assert_true(has);
+	assert_int_equal(cia402_has_range(&led->client, 30, 41, &has), 0);
+	assert_false(has);
+	drive_lacks(&led->drive, 0x607d, -1);
+	assert_int_equal(cia402_has_range(&led->client, 30, 40, &has), 0);
+	assert_false(has);
+	assert_int_equal(cia402_set_range(&led->client, 30, 40, &has), 0);
+	assert_false(has);
 }
 
 /* Limits that are not set here stay the drive's. */

@@ -174,15 +174,16 @@ struct drive {
 	bool homing_fails;
 	int64_t homing_late_ns; /* homing begins so late; until then its old bits stay … */
 	bool homing_keeps;	/* … and never fall: it does not begin */
-	bool homing_no_count; /* the count is not set at the switch … */
-	double homing_own;    /* … or to a position of its own, counts */
-	double gives_way;     /* counts that its shaft jumps when its brake opens */
-	bool no_tpdo;	      /* TPDO1 is not sent */
-	bool twice;	      /* each frame of it comes twice */
-	int send_error;	      /* of bus->ops->send, such as -ENOBUFS … */
-	uint32_t send_first;  /* so many frames are sent well before it starts */
-	uint32_t send_errors; /* … for so many frames; 0: until it is taken back */
-	int sync_error;	      /* likewise, of SYNCs alone */
+	bool homing_no_reached; /* bit 10 is never set in homing mode */
+	bool homing_no_count;	/* the count is not set at the switch … */
+	double homing_own;	/* … or to a position of its own, counts */
+	double gives_way;	/* counts that its shaft jumps when its brake opens */
+	bool no_tpdo;		/* TPDO1 is not sent */
+	bool twice;		/* each frame of it comes twice */
+	int send_error;		/* of bus->ops->send, such as -ENOBUFS … */
+	uint32_t send_first;	/* so many frames are sent well before it starts */
+	uint32_t send_errors;	/* … for so many frames; 0: until it is taken back */
+	int sync_error;		/* likewise, of SYNCs alone */
 	int receive_error, wait_error; /* of the bus */
 	int can_state;		       /* of bus->ops->state */
 	uint32_t inputs;	       /* 60FD */
@@ -402,7 +403,7 @@ static inline uint16_t drive_statusword(const struct drive *d)
 	unsigned int word = bits[d->state] | 0x10 | CIA402_REMOTE;
 
 	if (d->od[OD_MODE_NOW].value == CIA402_HOMING) {
-		word |= d->homing ? 0 : CIA402_TARGET_REACHED;
+		word |= d->homing || d->homing_no_reached ? 0 : CIA402_TARGET_REACHED;
 		word |= d->homed ? CIA402_HOMED : 0;
 		word |= d->homing_error ? CIA402_FOLLOWING_ERROR : 0;
 	} else if (d->state == CIA402_ENABLED) {

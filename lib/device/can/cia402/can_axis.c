@@ -16,6 +16,8 @@
 #define OBEY_NS (20 * MS)    /* from the command to the start of a quick stop */
 #define OLD_BITS_NS \
 	(5000 * MS) /* from the command to homing: the bits of the last one fall */
+#define STAND_NS (1000 * MS) /* homed at rest: bit 10 of the statusword comes */
+#define REST_ANSWERS 2	     /* of which the second was sampled at rest */
 #define INPUTS_NS (3 * CIA402_INPUTS_MS * MS)
 #define OPEN_CYCLES 10	  /* without an answer, in csv and cst … */
 #define OPEN_NS (20 * MS) /* … and at least that */
@@ -91,8 +93,7 @@ static int32_t next_target(struct can_axis *axis)
 	return mode_target(axis, &slot);
 }
 
-/* Returns whether the drive is within the limits, so that its first target is no jump. */
-static bool is_within(const struct can_axis *axis)
+bool can_axis_is_within(const struct can_axis *axis)
 {
 	const struct incise_stepper_config *config = &axis->motion.config;
 	int64_t slack = 1 + (int64_t)config->velocity * config->tick_ns / 1000000000;
@@ -423,7 +424,7 @@ static void run_starting(struct can_axis *axis)
 	if (axis->phase != CAN_AXIS_STARTING)
 		return;
 
-	if (fresh && state == CIA402_ENABLED && !homes && !is_within(axis)) {
+	if (fresh && state == CIA402_ENABLED && !homes && !can_axis_is_within(axis)) {
 		/* It gave way so far that its first target would be a jump. */
 		set_cause(axis, CAN_AXIS_OUTSIDE, axis->motion.status.position, 0);
 		abandon(axis, -ERANGE);
@@ -434,6 +435,8 @@ static void run_starting(struct can_axis *axis)
 		for (int i = 0; i < 4; i++)
 			axis->commanded[i] =
 				incise_profile_position(&axis->motion.profile);
+		axis->rested = REST_ANSWERS;
+		axis->stood_ns = 0;
 		axis->motion.status.state =
 			homes ? INCISE_STEPPER_STATE_MOVING : INCISE_STEPPER_STATE_READY;
 		axis->old_bits =
@@ -452,6 +455,16 @@ static void run_starting(struct can_axis *axis)
 		send_setpoint(axis, cia402_next_controlword(state), hold_target(axis));
 }
 
+/* It is at rest where its position is not one from before that. */
+static void check_rest(struct can_axis *axis)
+{
+	struct incise_motion *m = &axis->motion;
+
+	axis->rested = m->resting ? axis->rested + axis->status_received : 0;
+	if (axis->rested < REST_ANSWERS && m->status.state == INCISE_STEPPER_STATE_READY)
+		m->status.state = INCISE_STEPPER_STATE_MOVING;
+}
+
 static void run_running(struct can_axis *axis)
 {
 	struct incise_motion *m = &axis->motion;
@@ -462,8 +475,20 @@ static void run_running(struct can_axis *axis)
 	check_inputs(axis);
 	if (m->ending && m->resting && axis->phase == CAN_AXIS_RUNNING)
 		enter_phase(axis, CAN_AXIS_ENDING);
-	if (axis->phase == CAN_AXIS_RUNNING)
+	if (axis->phase == CAN_AXIS_RUNNING) {
 		send_setpoint(axis, CIA402_ENABLE, next_target(axis));
+		check_rest(axis);
+	}
+}
+
+/* Returns whether it has stood for a while, homed by its bit 12, and not there by its bit 10. */
+static bool stands_open(struct can_axis *axis, uint16_t word)
+{
+	if (!(word & CIA402_HOMED) || fabs(axis->speed) >= 1)
+		axis->stood_ns = 0;
+	else if (!axis->stood_ns)
+		axis->stood_ns = axis->now_ns;
+	return axis->stood_ns && axis->now_ns - axis->stood_ns > STAND_NS;
 }
 
 static void run_homing(struct can_axis *axis)
@@ -497,6 +522,8 @@ static void run_homing(struct can_axis *axis)
 		axis->outcome = 0;
 		axis->motion.ending = true;
 		enter_phase(axis, CAN_AXIS_ENDING);
+	} else if (stands_open(axis, word)) {
+		set_fault(axis, INCISE_STEPPER_FAULT_ALARM, CAN_AXIS_HOME_OPEN, 0, 0);
 	} else {
 		send_setpoint(axis, CIA402_HOME_START, 0);
 	}
@@ -650,7 +677,7 @@ int can_axis_power(struct can_axis *axis, int64_t now_ns, int64_t homing_ns)
 	const struct canopen *master = axis->master;
 	int rc;
 
-	if (!homing_ns && !is_within(axis))
+	if (!homing_ns && !can_axis_is_within(axis))
 		return -ERANGE;
 	rc = incise_motion_power_on(m, now_ns);
 	if (rc <= 0)
@@ -807,6 +834,13 @@ int can_axis_cause_text(const struct can_axis *axis, char *text, size_t size)
 			text, size,
 			"it still reports that its last homing failed, and not "
 			"whether it homed now: switch it off and on, and home again");
+	case CAN_AXIS_HOME_OPEN:
+		return snprintf(
+			text, size,
+			"it stands after its homing with bit 12 of its statusword set "
+			"(homed) and bit 10 not (target reached), so it is not known to "
+			"be there: see its manual for bit 10 in homing mode and its "
+			"position window (6067, 6068), then clear");
 	case CAN_AXIS_OUTSIDE:
 		return snprintf(
 			text, size,

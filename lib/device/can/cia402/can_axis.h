@@ -52,6 +52,7 @@ enum can_axis_cause {
 	CAN_AXIS_NO_HOME,    /* the drive reports that homing failed */
 	CAN_AXIS_HOME_TIME,
 	CAN_AXIS_HOME_OLD,    /* the error bit of the last homing stays set */
+	CAN_AXIS_HOME_OPEN,   /* it stands, with bit 12 and without bit 10 */
 	CAN_AXIS_OUTSIDE,     /* a: steps; it gave way while getting power */
 	CAN_AXIS_STOOD_STILL, /* a: ms; this program, not the drive */
 	CAN_AXIS_NO_STOP, /* a: enum cia402_state; it did not report to have no power */
@@ -112,6 +113,8 @@ struct can_axis {
 	bool setpoint_sent;   /* with its SYNC, in this cycle */
 	bool status_received; /* in this cycle */
 	uint16_t old_bits;    /* of the statusword, left by an earlier homing */
+	int64_t stood_ns;     /* homed, but "not there": since when it stands; 0: not */
+	uint32_t rested;      /* cycles with an answer since the profile rests */
 	int64_t inputs_ns;  /* duration of cycles with an answer since the last inputs */
 	bool command_sent;  /* the command of this phase */
 	bool heartbeat_off; /* it did not obey a stop: leave it to its deadman */
@@ -146,6 +149,9 @@ void can_axis_disable(struct can_axis *axis);
 
 /* Update by 60FD. */
 void can_axis_inputs(struct can_axis *axis, uint32_t inputs);
+
+/* Returns whether the drive is within the limits, so that its first target is no jump. */
+bool can_axis_is_within(const struct can_axis *axis);
 
 /* Convert counts, rounded. */
 int64_t can_axis_steps(const struct can_axis *axis, int32_t counts);

@@ -136,8 +136,6 @@ static int check_alone(struct can_session *s)
 /* Read the position, and place 0. @keep: the drive's count continues. */
 static int read_position(struct can_session *s, bool keep)
 {
-	const struct incise_actuator *a = &s->actuator;
-	double per_mm = s->axis.setup.counts_per_step / incise_actuator_step_mm(a);
 	struct incise_stepper_motor_status *status = &s->axis.motion.status;
 	const struct cia402_object position = {0x6064, 0, 4, "position"};
 	uint32_t counts;
@@ -147,7 +145,7 @@ static int read_position(struct can_session *s, bool keep)
 		return rc;
 	s->axis.position = (int32_t)counts;
 	if (s->is_homed)
-		s->axis.zero_counts = -a->home_mm * per_mm;
+		s->axis.zero_counts = -s->actuator.home_mm * can_units_per_mm(s);
 	else if (!keep)
 		s->axis.zero_counts = (int32_t)counts;
 	status->position = can_axis_steps(&s->axis, s->axis.position);
@@ -157,12 +155,35 @@ static int read_position(struct can_session *s, bool keep)
 	return 0;
 }
 
+/*
+ * A drive that reports to be homed may have been homed by another program, to another place, or
+ * without its count being set. It is trusted where its 607D is the range of this rig.conf, which
+ * is written only after a homing that can_session_homed() found right, and taken back before the
+ * next one.
+ */
 static int read_homed(struct can_session *s)
 {
+	double zero = s->axis.zero_counts;
+	int rc;
+
 	s->is_homed = s->actuator.can.absolute;
 	if (s->is_homed || !s->actuator.can.homing_method)
 		return 0;
-	return cia402_read_homed(&s->client, s->setup.mode, &s->is_homed);
+	rc = cia402_read_homed(&s->client, s->setup.mode, &s->is_homed);
+	if (rc || !s->is_homed)
+		return rc;
+	s->axis.zero_counts = -s->actuator.home_mm * can_units_per_mm(s);
+	can_units_range(s);
+	s->axis.zero_counts = zero;
+	return cia402_has_range(&s->client, s->setup.position_min, s->setup.position_max,
+				&s->is_homed);
+}
+
+static int write_range(struct can_session *s)
+{
+	can_units_range(s);
+	return cia402_set_range(&s->client, s->setup.position_min, s->setup.position_max,
+				&s->supported.position_limit);
 }
 
 /* The drive does not report which inputs are wired: all that 60FD has a bit for. */
@@ -253,9 +274,9 @@ static int prepare(struct can_session *s)
 		rc = cia402_read_units(client, &s->units);
 	if (rc)
 		return rc;
-	can_units_steps(s);
+	rc = can_units_steps(s);
 	can_units_setup(s);
-	return can_units_axis(s);
+	return rc ? rc : can_units_axis(s);
 }
 
 int can_session_open(struct can_session *s, const struct can_transport *transport,
@@ -383,6 +404,8 @@ int can_session_ready(struct can_session *s, bool homing, struct incise_error *e
 	/* Unhomed until homing succeeds. */
 	s->is_homed = s->is_homed && (!homing || a->can.absolute);
 	if (!rc && homing)
+		rc = write_range(s);
+	if (!rc && homing)
 		rc = cia402_set_homing(
 			&s->client, a->can.homing_method,
 			can_units_whole(a->home_mm_s * per_turn_s),
@@ -434,11 +457,11 @@ int can_session_clear(struct can_session *s, struct incise_error *err)
 static int check_homed(struct can_session *s, struct incise_error *err)
 {
 	const struct incise_actuator *a = &s->actuator;
-	double per_mm = s->axis.setup.counts_per_step / incise_actuator_step_mm(a);
-	double off_mm = s->axis.position / per_mm;
+	double off_mm = s->axis.position / can_units_per_mm(s);
 	double brake_mm = a->home_mm_s * a->home_mm_s / (2 * a->acceleration_mm_s2);
 
-	if (fabs(off_mm) <= brake_mm + a->can.following_mm)
+	if (fabs(off_mm) <= brake_mm + a->can.following_mm &&
+	    can_axis_is_within(&s->axis))
 		return 0;
 	s->is_homed = false;
 	s->axis.motion.status.flags &= ~INCISE_STEPPER_FLAG_HOMED;
@@ -459,10 +482,7 @@ int can_session_homed(struct can_session *s, struct incise_error *err)
 	rc = read_position(s, false);
 	if (!rc)
 		rc = check_homed(s, err);
-	if (rc)
-		return rc;
-	can_units_range(s);
-	return cia402_set_range(&s->client, s->setup.position_min, s->setup.position_max);
+	return rc ? rc : write_range(s);
 }
 
 void can_session_close(struct can_session *s)

@@ -155,7 +155,7 @@ struct cia402_units {
  * Read the drive's factors: for positions 6092 (feed constant), else 608F and 6091 (encoder
  * resolution, gear ratio), or 60A8 (SI unit) if it is an angle or increments; for velocity and
  * acceleration 60A9 and 60AA (SI units), else counts/s and counts/s². Fields other than 0, from
- * rig.conf, stay. -EPROTO: missing or impossible factors, which rig.conf must have.
+ * rig.conf, stay. -EPROTO: missing, impossible or contradicting factors, which rig.conf must have.
  */
 int cia402_read_units(const struct cia402_client *client, struct cia402_units *units);
 
@@ -166,7 +166,6 @@ struct cia402_setup {
 	uint32_t deadman_ms;   /* silence of this side before the drive quick-stops */
 	uint8_t master;	       /* node id of this side's heartbeat */
 	uint32_t heartbeat_ms; /* 1017: period of the drive's heartbeat */
-	bool limited;	       /* positions are the machine's */
 	int32_t position_min, position_max; /* 607D */
 	uint32_t velocity;		    /* 607F: largest */
 	uint32_t acceleration;	  /* 60C5, 60C6: largest; 6085: of a quick stop */
@@ -201,9 +200,11 @@ int cia402_configure(const struct cia402_client *client, const struct cia402_set
 /* Write 6060, and wait until 6061 agrees. */
 int cia402_set_mode(const struct cia402_client *client, enum cia402_mode mode);
 
-/* Write 607D alone, after homing. */
+/* Write 607D alone, or read whether it is that range; *has false: the drive has none. */
 int cia402_set_range(const struct cia402_client *client, int32_t position_min,
-		     int32_t position_max);
+		     int32_t position_max, bool *has);
+int cia402_has_range(const struct cia402_client *client, int32_t position_min,
+		     int32_t position_max, bool *has);
 
 /* Set how the drive homes: method 6098, speeds 6099, acceleration 609A, offset 607C = 0. */
 int cia402_set_homing(const struct cia402_client *client, int method, uint32_t speed,

@@ -249,44 +249,39 @@ static const struct cia402_object window_ms = {0x6066, 0, 2, "following error ti
 static const struct cia402_object torque = {0x6072, 0, 2, "largest torque"};
 static const struct cia402_object stop_ramp = {0x6085, 0, 4, "quick-stop deceleration"};
 
-/* Write the range so that the least is never above the largest, which some drives refuse. */
-static int write_range(const struct cia402_client *client, int32_t min, int32_t max)
+int cia402_set_range(const struct cia402_client *client, int32_t position_min,
+		     int32_t position_max, bool *has)
 {
 	uint32_t end;
-	int rc = cia402_read(client, &ranges[1], &end);
+	int rc;
 
-	if (!rc && min >= (int32_t)end)
-		rc = cia402_write(client, &ranges[1], (uint32_t)max);
-	if (!rc)
-		rc = cia402_write_verified(client, &ranges[0], (uint32_t)min);
-	return rc ? rc : cia402_write_verified(client, &ranges[1], (uint32_t)max);
-}
-
-int cia402_set_range(const struct cia402_client *client, int32_t position_min,
-		     int32_t position_max)
-{
 	if (position_min >= position_max)
 		return cia402_error(client, EINVAL,
 				    "an empty range from %d to %d; check travel_mm and "
 				    "counts_per_turn in rig.conf",
 				    position_min, position_max);
-	return write_range(client, position_min, position_max);
+	rc = cia402_read_optional(client, &ranges[1], &end, has);
+	if (rc || !*has)
+		return rc;
+	/* The least is never above the largest, which some drives refuse. */
+	if (position_min >= (int32_t)end)
+		rc = cia402_write(client, &ranges[1], (uint32_t)position_max);
+	if (!rc)
+		rc = cia402_write_verified(client, &ranges[0], (uint32_t)position_min);
+	return rc ? rc
+		  : cia402_write_verified(client, &ranges[1], (uint32_t)position_max);
 }
 
-/* Before homing the range is unknown: then the drive must not keep an old one. */
-static int set_range(const struct cia402_client *client, const struct cia402_setup *setup,
-		     bool *limited)
+int cia402_has_range(const struct cia402_client *client, int32_t position_min,
+		     int32_t position_max, bool *has)
 {
-	uint32_t end;
-	bool has;
-	int rc = cia402_read_optional(client, &ranges[1], &end, &has);
+	uint32_t low = 0, high = 0;
+	int rc = cia402_read_optional(client, &ranges[0], &low, has);
 
-	*limited = has && setup->limited;
-	if (rc || !has)
-		return rc;
-	if (!setup->limited)
-		return write_range(client, INT32_MIN, INT32_MAX);
-	return cia402_set_range(client, setup->position_min, setup->position_max);
+	if (!rc && *has)
+		rc = cia402_read(client, &ranges[1], &high);
+	*has = *has && (int32_t)low == position_min && (int32_t)high == position_max;
+	return rc;
 }
 
 static int set_limits(const struct cia402_client *client,
@@ -311,7 +306,8 @@ static int set_limits(const struct cia402_client *client,
 		{setup->following, &window_ms, setup->following_ms, &has},
 		{setup->torque_permille, &torque, setup->torque_permille, &has},
 	};
-	int rc = set_range(client, setup, &supported->position_limit);
+	int rc = cia402_set_range(client, setup->position_min, setup->position_max,
+				  &supported->position_limit);
 
 	for (size_t i = 0; i < sizeof(limits) / sizeof(*limits) && !rc; i++)
 		if (limits[i].wanted)

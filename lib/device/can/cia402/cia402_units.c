@@ -105,6 +105,26 @@ static int read_increments(const struct cia402_client *client, double *value, bo
 	return rc;
 }
 
+/*
+ * A drive whose factor group was never set up may have 6092 = 1/1 and count increments. Which of
+ * the two it counts by cannot be read.
+ */
+static int check_feed(const struct cia402_client *client, double units)
+{
+	double increments = units;
+	bool has;
+	int rc = read_increments(client, &increments, &has);
+
+	if (rc || fabs(increments - units) <= 1e-9 * units)
+		return rc;
+	return cia402_error(
+		client, EPROTO,
+		"a turn of the screw is %g units by the drive's 6092, and %g "
+		"increments by its 608F and 6091; give counts_per_turn in "
+		"rig.conf: how many it counts (6064) when the screw turns once",
+		units, increments);
+}
+
 /* Returns units per turn; 0: the unit is no angle. */
 static double angle_per_turn(uint8_t unit)
 {
@@ -160,6 +180,8 @@ static int read_positions(const struct cia402_client *client, double *per_turn)
 		rc = read_ratio(client, feed, per_turn, &has);
 		if (!rc && !has)
 			rc = read_increments(client, per_turn, &has);
+		else if (!rc && code != UNIT_METRE)
+			rc = check_feed(client, *per_turn);
 	} else {
 		return refuse_unit(client, &position_unit, unit, "counts_per_turn");
 	}
