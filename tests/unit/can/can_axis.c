@@ -318,6 +318,7 @@ TEST(each_reason_has_its_own_line)
 		{CAN_AXIS_OUTSIDE, -100, 0, "to -0.750 mm"},
 		{CAN_AXIS_STOOD_STILL, 3000, 0, "was stopped for 3000 ms"},
 		{CAN_AXIS_HOME_OLD, 0, 0, "off and on"},
+		{CAN_AXIS_HOME_SPEED, 400, 0, "moved at 3 mm/s by"},
 		{CAN_AXIS_HOME_OPEN, 0, 0, "bit 12 of its statusword set"},
 		{CAN_AXIS_NO_STOP, CIA402_ENABLED, 0, "operation enabled: switch"},
 	};

@@ -545,15 +545,21 @@ TEST(homed_only_where_the_shaft_is)
 	for (int i = 0; i < n; i++) {
 		bool late = (incise_random_bits(key, drawn++) % (2)),
 		     before = (incise_random_bits(key, drawn++) % (2));
-		int fault = (int)(incise_random_bits(key, drawn++) % (6));
+		/* Units that do not fit: from a hundredth of the speed to hundred times. */
+		double factor = pow(
+			10, (double)(incise_random_bits(key, drawn++) % 401) / 100 - 2);
+		int fault = (int)(incise_random_bits(key, drawn++) % (7));
 		double tolerance =
 			1.1 * COUNTS_PER_MM; /* following_mm, and its braking */
 		int rc;
 
 		can_rig_init(&rig);
+		/* Far enough for its speed to be seen, up to its 607F. */
+		rig.drive.origin = fault == 6 && factor > 1 ? 80000 : 20000;
+		rig.drive.speed_factor = fault == 6 ? factor : 1;
 		can_rig_open_or_fail(&rig);
 		can_rig_enable_or_fail(&rig);
-		if (before) {
+		if (before && fault != 6) {
 			rig.drive.homing_fails = (incise_random_bits(key, drawn++) % (2));
 			rc = incise_stepper_home(rig.stepper, NULL, NULL, &err);
 			assert_int_equal(!rc, !rig.drive.homing_fails);
@@ -589,6 +595,11 @@ TEST(homed_only_where_the_shaft_is)
 			assert_true(rc);
 		if (fault == 5)
 			assert_non_null(strstr(err.text, "bit 10"));
+		/* The slow ones also end by their time; between the bounds nothing is seen. */
+		if (fault == 6 && (factor > 2.2 || factor < 0.045))
+			assert_true(rc);
+		if (fault == 6 && factor < 1.8 && factor > 0.055)
+			assert_int_equal(rc, 0);
 		can_rig_close(&rig);
 		/* The drive says the same to the next program, but not to one of another rig.conf. */
 		can_rig_open_or_fail(&rig);

@@ -177,6 +177,7 @@ struct drive {
 	bool homing_no_reached; /* bit 10 is never set in homing mode */
 	bool homing_no_count;	/* the count is not set at the switch … */
 	double homing_own;	/* … or to a position of its own, counts */
+	double speed_factor;	/* its unit of velocity is so many of what it reports */
 	double gives_way;	/* counts that its shaft jumps when its brake opens */
 	bool no_tpdo;		/* TPDO1 is not sent */
 	bool twice;		/* each frame of it comes twice */
@@ -453,7 +454,7 @@ static inline void drive_latch(struct drive *d)
 static inline double drive_homing(struct drive *d, double dt)
 {
 	double off = -5000 - (d->position + d->origin);
-	double step = d->od[OD_HOMING_SPEED].value * dt;
+	double step = d->od[OD_HOMING_SPEED].value * d->speed_factor * dt;
 
 	if (!d->homing)
 		return 0;
@@ -1023,6 +1024,7 @@ static inline void drive_init(struct drive *d)
 	d->latency_ns = DRIVE_LATENCY_NS;
 	d->enable_ns = 5 * DRIVE_MS;
 	d->torque_counts_s2 = 100;
+	d->speed_factor = 1;
 	memcpy(d->od, objects, sizeof(objects));
 	for (int i = 0; i < OD_N; i++)
 		if (d->od[i].access & OF_NODE)

@@ -17,7 +17,12 @@
 #define OLD_BITS_NS \
 	(5000 * MS) /* from the command to homing: the bits of the last one fall */
 #define STAND_NS (1000 * MS) /* homed at rest: bit 10 of the statusword comes */
-#define REST_ANSWERS 2	     /* of which the second was sampled at rest */
+/* Homing: its speed by its position, against that which it was given. */
+#define GAUGE_NS (100 * MS)
+#define GAUGE_COUNTS 8	   /* less in that time is noise */
+#define TOO_FAST 2	   /* times home_mm_s */
+#define TOO_SLOW (0.1 / 2) /* half of the speed to zero, 6099:2 */
+#define REST_ANSWERS 2	   /* of which the second was sampled at rest */
 #define INPUTS_NS (3 * CIA402_INPUTS_MS * MS)
 #define OPEN_CYCLES 10	  /* without an answer, in csv and cst … */
 #define OPEN_NS (20 * MS) /* … and at least that */
@@ -437,6 +442,9 @@ static void run_starting(struct can_axis *axis)
 				incise_profile_position(&axis->motion.profile);
 		axis->rested = REST_ANSWERS;
 		axis->stood_ns = 0;
+		axis->gauge_ns = axis->tpdo_ns;
+		axis->gauge_counts = axis->position;
+		axis->gauge_steps_s = axis->sustained = 0;
 		axis->motion.status.state =
 			homes ? INCISE_STEPPER_STATE_MOVING : INCISE_STEPPER_STATE_READY;
 		axis->old_bits =
@@ -491,8 +499,37 @@ static bool stands_open(struct can_axis *axis, uint16_t word)
 	return axis->stood_ns && axis->now_ns - axis->stood_ns > STAND_NS;
 }
 
+/*
+ * Returns whether its position (6064) moves at the speed that it was given (6099), so far or at its
+ * end. That shows a drive whose counts are others than it reports, or than rig.conf has. It does
+ * not show a factor between the two bounds, one that its unit of velocity has too, or a wrong
+ * lead_mm: then all that a drive reports fits, and only a ruler differs.
+ */
+static bool fits_home_speed(struct can_axis *axis, bool ended)
+{
+	double asked = axis->setup.home_steps_s,
+	       per_step = fabs(axis->setup.counts_per_step);
+	int64_t t_ns = axis->tpdo_ns - axis->gauge_ns;
+	double noise = GAUGE_COUNTS * 1e9 / GAUGE_NS / per_step, is;
+
+	if (t_ns >= GAUGE_NS) {
+		is = fabs((double)axis->position - axis->gauge_counts) * 1e9 /
+		     (double)t_ns / per_step;
+		/* Where its count is set at the switch, one of two is wrong. */
+		axis->sustained = fmax(axis->sustained, fmin(is, axis->gauge_steps_s));
+		axis->gauge_steps_s = is;
+		axis->gauge_ns = axis->tpdo_ns;
+		axis->gauge_counts = axis->position;
+	}
+	if (!asked || axis->sustained < noise)
+		return true;
+	return axis->sustained <= TOO_FAST * asked &&
+	       (!ended || axis->sustained >= TOO_SLOW * asked);
+}
+
 static void run_homing(struct can_axis *axis)
 {
+	bool ended;
 	uint16_t word = axis->statusword;
 	bool waited = axis->now_ns - axis->since_ns > OLD_BITS_NS;
 
@@ -507,18 +544,22 @@ static void run_homing(struct can_axis *axis)
 	 */
 	if (!waited || axis->old_bits & CIA402_FOLLOWING_ERROR)
 		word &= ~axis->old_bits;
+	ended = word & CIA402_HOMED && word & CIA402_TARGET_REACHED;
 	if (axis->stop_homing) {
 		axis->motion.status.state = INCISE_STEPPER_STATE_STOPPING;
 		abandon(axis, -EINTR);
 	} else if (word & CIA402_FOLLOWING_ERROR) {
 		set_fault(axis, INCISE_STEPPER_FAULT_ALARM, CAN_AXIS_NO_HOME, 0, 0);
+	} else if (!fits_home_speed(axis, ended)) {
+		set_fault(axis, INCISE_STEPPER_FAULT_ALARM, CAN_AXIS_HOME_SPEED,
+			  llround(axis->sustained), 0);
 	} else if (axis->now_ns > axis->limit_ns) {
 		axis->outcome = -ETIMEDOUT;
 		set_fault(axis, INCISE_STEPPER_FAULT_ALARM, CAN_AXIS_HOME_TIME, 0, 0);
 	} else if (waited && axis->old_bits & CIA402_FOLLOWING_ERROR) {
 		axis->outcome = -ETIMEDOUT;
 		set_fault(axis, INCISE_STEPPER_FAULT_ALARM, CAN_AXIS_HOME_OLD, 0, 0);
-	} else if (word & CIA402_HOMED && word & CIA402_TARGET_REACHED) {
+	} else if (ended) {
 		axis->outcome = 0;
 		axis->motion.ending = true;
 		enter_phase(axis, CAN_AXIS_ENDING);
@@ -841,6 +882,15 @@ int can_axis_cause_text(const struct can_axis *axis, char *text, size_t size)
 			"(homed) and bit 10 not (target reached), so it is not known to "
 			"be there: see its manual for bit 10 in homing mode and its "
 			"position window (6067, 6068), then clear");
+	case CAN_AXIS_HOME_SPEED:
+		return snprintf(
+			text, size,
+			"it moved at %.3g mm/s by its position (6064) and "
+			"was given %.3g (6099): its units of position and velocity "
+			"do not fit; give counts_per_turn and velocity_per_turn_s "
+			"in rig.conf, then clear",
+			(double)a * axis->setup.step_mm,
+			axis->setup.home_steps_s * axis->setup.step_mm);
 	case CAN_AXIS_OUTSIDE:
 		return snprintf(
 			text, size,

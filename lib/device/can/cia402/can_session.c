@@ -60,6 +60,7 @@ static int set_filter(struct can_session *s)
 		CANOPEN_TPDO2 + node,
 		CANOPEN_RPDO1 + node,
 		CANOPEN_SDO_ANSWER + node,
+		CANOPEN_SDO_REQUEST + node, /* an echo */
 		CANOPEN_HEARTBEAT + node,
 		CANOPEN_HEARTBEAT + s->master.own,
 	};
@@ -105,8 +106,11 @@ static int open_bus(struct can_session *s, const struct can_transport *transport
 	rc = transport->open(&s->bus, &bus, err);
 	if (rc)
 		return rc;
-	s->master = (struct canopen){
-		.bus = s->bus, .node = (uint8_t)node, .state = CANOPEN_UNKNOWN};
+	s->master =
+		(struct canopen){.bus = s->bus,
+				 .node = (uint8_t)node,
+				 .answer_ns = (int64_t)(can->answer_s * INCISE_NS_PER_S),
+				 .state = CANOPEN_UNKNOWN};
 	snprintf(s->name, sizeof(s->name), "drive 0x%02x at %.36s", node, s->bus->name);
 	return 0;
 }
@@ -182,8 +186,7 @@ static int read_homed(struct can_session *s)
 static int write_range(struct can_session *s)
 {
 	can_units_range(s);
-	return cia402_set_range(&s->client, s->setup.position_min, s->setup.position_max,
-				&s->supported.position_limit);
+	return cia402_set_range(&s->client, s->setup.position_min, s->setup.position_max);
 }
 
 /* The drive does not report which inputs are wired: all that 60FD has a bit for. */
@@ -272,6 +275,12 @@ static int prepare(struct can_session *s)
 	rc = cia402_identify(client);
 	if (!rc)
 		rc = cia402_read_units(client, &s->units);
+	if (!rc && s->master.echoes > s->master.requests / 2)
+		rc = cia402_error(
+			client, EPROTO,
+			"%s sends back what this program sends (echo), which looks "
+			"like another master; switch its echo off",
+			s->bus->name);
 	if (rc)
 		return rc;
 	rc = can_units_steps(s);

@@ -110,6 +110,10 @@ int can_units_axis(struct can_session *s)
 		.mode = s->setup.mode,
 		.counts_per_step = turns * s->units.counts_per_turn,
 		.units_per_step_s = turns * s->units.velocity_per_turn_s,
+		/* Methods 35 and 37 take the present position. */
+		.home_steps_s = a->can.homing_method == 35 || a->can.homing_method == 37
+					? 0
+					: a->home_mm_s / step_mm,
 		.gain_1_s = a->can.position_gain_1_s,
 		.torque_per_step = sign * a->can.stiffness_permille_mm * step_mm,
 		.torque_s_per_step = sign * a->can.damping_permille_s_mm * step_mm,

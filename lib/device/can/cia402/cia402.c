@@ -206,6 +206,13 @@ int cia402_fail(const struct cia402_client *client, const struct cia402_object *
 				    canopen_abort_text(client->master->abort, why,
 						       sizeof(why)));
 	case -ETIMEDOUT:
+		if (client->master->late_ns)
+			return cia402_error(
+				client, ETIMEDOUT,
+				"an answer came late, after %d ms, when %s was "
+				"to be %s; give a larger actuator.can.answer_ms "
+				"in rig.conf",
+				(int)(client->master->late_ns / 1000000), what, action);
 		return cia402_error(client, ETIMEDOUT,
 				    "no answer when %s was to be %s; check the drive's "
 				    "power, its wiring, node id and bit rate",

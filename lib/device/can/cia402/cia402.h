@@ -180,7 +180,6 @@ struct cia402_setup {
 struct cia402_supported {
 	bool inputs;	   /* 60FD comes in TPDO2 … */
 	bool inputs_timed; /* … each CIA402_INPUTS_MS also without a change */
-	bool position_limit, velocity_limit, acceleration_limit, following_limit;
 };
 
 /*
@@ -200,9 +199,9 @@ int cia402_configure(const struct cia402_client *client, const struct cia402_set
 /* Write 6060, and wait until 6061 agrees. */
 int cia402_set_mode(const struct cia402_client *client, enum cia402_mode mode);
 
-/* Write 607D alone, or read whether it is that range; *has false: the drive has none. */
+/* Write 607D alone, if the drive has it; read whether it has it with that range. */
 int cia402_set_range(const struct cia402_client *client, int32_t position_min,
-		     int32_t position_max, bool *has);
+		     int32_t position_max);
 int cia402_has_range(const struct cia402_client *client, int32_t position_min,
 		     int32_t position_max, bool *has);
 

@@ -250,9 +250,10 @@ static const struct cia402_object torque = {0x6072, 0, 2, "largest torque"};
 static const struct cia402_object stop_ramp = {0x6085, 0, 4, "quick-stop deceleration"};
 
 int cia402_set_range(const struct cia402_client *client, int32_t position_min,
-		     int32_t position_max, bool *has)
+		     int32_t position_max)
 {
 	uint32_t end;
+	bool has;
 	int rc;
 
 	if (position_min >= position_max)
@@ -260,8 +261,8 @@ int cia402_set_range(const struct cia402_client *client, int32_t position_min,
 				    "an empty range from %d to %d; check travel_mm and "
 				    "counts_per_turn in rig.conf",
 				    position_min, position_max);
-	rc = cia402_read_optional(client, &ranges[1], &end, has);
-	if (rc || !*has)
+	rc = cia402_read_optional(client, &ranges[1], &end, &has);
+	if (rc || !has)
 		return rc;
 	/* The least is never above the largest, which some drives refuse. */
 	if (position_min >= (int32_t)end)
@@ -285,34 +286,29 @@ int cia402_has_range(const struct cia402_client *client, int32_t position_min,
 }
 
 static int set_limits(const struct cia402_client *client,
-		      const struct cia402_setup *setup,
-		      struct cia402_supported *supported)
+		      const struct cia402_setup *setup)
 {
 	bool has;
 	const struct {
 		uint32_t wanted; /* 0: leave it to the drive */
 		const struct cia402_object *object;
 		uint32_t value;
-		bool *has;
 	} limits[] = {
-		{setup->velocity, &speed, setup->velocity, &supported->velocity_limit},
-		{setup->acceleration, &acceleration, setup->acceleration,
-		 &supported->acceleration_limit},
+		{setup->velocity, &speed, setup->velocity},
+		{setup->acceleration, &acceleration, setup->acceleration},
 		/* A drive without this limit brakes by the limit of accelerations. */
-		{setup->acceleration, &deceleration, setup->acceleration, &has},
-		{setup->acceleration, &stop_ramp, setup->acceleration, &has},
-		{setup->following, &window, setup->following,
-		 &supported->following_limit},
-		{setup->following, &window_ms, setup->following_ms, &has},
-		{setup->torque_permille, &torque, setup->torque_permille, &has},
+		{setup->acceleration, &deceleration, setup->acceleration},
+		{setup->acceleration, &stop_ramp, setup->acceleration},
+		{setup->following, &window, setup->following},
+		{setup->following, &window_ms, setup->following_ms},
+		{setup->torque_permille, &torque, setup->torque_permille},
 	};
-	int rc = cia402_set_range(client, setup->position_min, setup->position_max,
-				  &supported->position_limit);
+	int rc = cia402_set_range(client, setup->position_min, setup->position_max);
 
 	for (size_t i = 0; i < sizeof(limits) / sizeof(*limits) && !rc; i++)
 		if (limits[i].wanted)
 			rc = cia402_write_optional(client, limits[i].object,
-						   limits[i].value, limits[i].has);
+						   limits[i].value, &has);
 	return rc;
 }
 
@@ -489,7 +485,7 @@ int cia402_configure(const struct cia402_client *client, const struct cia402_set
 	if (!rc)
 		rc = set_pdos(client, setup, &found);
 	if (!rc)
-		rc = set_limits(client, setup, &found);
+		rc = set_limits(client, setup);
 	if (!rc)
 		rc = set_cycle(client, setup);
 	if (!rc)

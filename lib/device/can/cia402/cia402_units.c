@@ -48,7 +48,7 @@ int cia402_identify(const struct cia402_client *client)
 	int rc = canopen_read(client->master, device_type.index, device_type.sub,
 			      device_type.size, &type);
 
-	if (rc == -ETIMEDOUT)
+	if (rc == -ETIMEDOUT && !client->master->late_ns)
 		return cia402_error(client, ENODEV,
 				    "no answer from node 0x%02x on %s; check the "
 				    "drive's power, its wiring, node id and bit rate, "
