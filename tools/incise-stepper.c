@@ -263,14 +263,6 @@ static double destination(const struct stepper_job *job, struct stepper_drive *d
 	return fmax(0, fmin(drive->info.travel_mm, mm));
 }
 
-/* Whether it rests at the target, or at the nearest microstep. */
-static bool arrived(const struct stepper_drive *drive, double to_mm)
-{
-	return stepper_drive_rests(drive) &&
-	       fabs(drive->status.position_mm - to_mm) <=
-		       fmax(0.6 * drive->info.step_mm, drive->info.within_mm);
-}
-
 /* Longest time of a motion from rest to rest within the limits. */
 static double motion_s(const struct incise_stepper_info *info, double mm)
 {
@@ -305,13 +297,14 @@ static void run_move(const struct stepper_job *job, struct stepper_drive *drive)
 		stepper_drive_to(drive, to_mm);
 		seconds = (double)(incise_clock_now(drive->clock) - begin) /
 			  INCISE_NS_PER_S;
-		arrived_s = arrived(drive, to_mm) ? fmin(arrived_s, seconds) : INFINITY;
+		arrived_s = stepper_drive_arrived(drive, to_mm) ? fmin(arrived_s, seconds)
+								: INFINITY;
 		/* A drive that follows its targets needs time to settle. */
 	} while (!cli_stop && seconds < within_s &&
 		 !(seconds >= arrived_s + drive->info.settle_s));
-	if (!arrived(drive, to_mm) && cli_stop)
+	if (!stepper_drive_arrived(drive, to_mm) && cli_stop)
 		fail_stopped(drive);
-	if (!arrived(drive, to_mm))
+	if (!stepper_drive_arrived(drive, to_mm))
 		stepper_drive_fail(
 			drive,
 			"%s is at %.4f mm after %.1f s%s and did not come to rest at "

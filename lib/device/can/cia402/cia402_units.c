@@ -14,11 +14,6 @@
 #define MOST_PER_TURN 4294967296.0
 
 /* Numerators that belong to an angle. */
-#define UNIT_RADIAN 0x10
-#define UNIT_GON 0x40
-#define UNIT_DEGREE 0x41
-#define UNIT_MINUTE_OF_ARC 0x42
-#define UNIT_SECOND_OF_ARC 0x43
 #define UNIT_TURN 0xb4
 #define UNIT_INCREMENT 0xb5
 #define UNIT_TURN_PER_MINUTE 0xc0 /* of an acceleration: maxon's rpm/s */
@@ -128,22 +123,22 @@ static int check_feed(const struct cia402_client *client, double units)
 /* Returns units per turn; 0: the unit is no angle. */
 static double angle_per_turn(uint8_t unit)
 {
-	switch (unit) {
-	case UNIT_TURN:
-		return 1;
-	case UNIT_DEGREE:
-		return 360;
-	case UNIT_RADIAN:
-		return TWO_PI;
-	case UNIT_GON:
-		return 400;
-	case UNIT_MINUTE_OF_ARC:
-		return 360 * 60;
-	case UNIT_SECOND_OF_ARC:
-		return 360 * 3600;
-	default:
-		return 0;
-	}
+	static const struct {
+		uint8_t unit;
+		double per_turn;
+	} angles[] = {
+		{UNIT_TURN, 1},
+		{0x41 /* degree */, 360},
+		{0x10 /* radian */, TWO_PI},
+		{0x40 /* gon */, 400},
+		{0x42 /* minute of arc */, 360 * 60},
+		{0x43 /* second of arc */, 360 * 3600},
+	};
+
+	for (size_t i = 0; i < sizeof(angles) / sizeof(*angles); i++)
+		if (angles[i].unit == unit)
+			return angles[i].per_turn;
+	return 0;
 }
 
 static double power_of_ten(uint32_t unit)
