@@ -879,16 +879,14 @@ int can_axis_cause_text(const struct can_axis *axis, char *text, size_t size)
 		return snprintf(
 			text, size,
 			"it stands after its homing with bit 12 of its statusword set "
-			"(homed) and bit 10 not (target reached), so it is not known to "
-			"be there: see its manual for bit 10 in homing mode and its "
-			"position window (6067, 6068), then clear");
+			"(homed) and bit 10 not (target reached): see its manual for "
+			"bit 10 in homing mode and its position window (6067), then clear");
 	case CAN_AXIS_HOME_SPEED:
 		return snprintf(
 			text, size,
-			"it moved at %.3g mm/s by its position (6064) and "
-			"was given %.3g (6099): its units of position and velocity "
-			"do not fit; give counts_per_turn and velocity_per_turn_s "
-			"in rig.conf, then clear",
+			"it moved at %.3g mm/s by its position (6064), and was given %.3g "
+			"(6099): its units do not fit each other; give counts_per_turn "
+			"and velocity_per_turn_s in rig.conf, then clear",
 			(double)a * axis->setup.step_mm,
 			axis->setup.home_steps_s * axis->setup.step_mm);
 	case CAN_AXIS_OUTSIDE:

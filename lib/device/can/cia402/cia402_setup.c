@@ -473,17 +473,15 @@ static int start_cia402_setup(const struct cia402_client *client,
 int cia402_configure(const struct cia402_client *client, const struct cia402_setup *setup,
 		     struct cia402_supported *supported)
 {
-	struct cia402_supported found = {0};
-	int rc;
+	int rc = check_cia402_setup(client, setup);
 
-	*supported = found;
-	rc = check_cia402_setup(client, setup);
+	*supported = (struct cia402_supported){0};
 	if (!rc)
 		rc = check_power(client);
 	if (!rc)
 		rc = send_nmt(client, CANOPEN_PREPARE);
 	if (!rc)
-		rc = set_pdos(client, setup, &found);
+		rc = set_pdos(client, setup, supported);
 	if (!rc)
 		rc = set_limits(client, setup);
 	if (!rc)
@@ -492,7 +490,5 @@ int cia402_configure(const struct cia402_client *client, const struct cia402_set
 		rc = set_watch(client, setup);
 	if (!rc)
 		rc = start_cia402_setup(client, setup);
-	if (!rc)
-		*supported = found;
 	return rc;
 }
