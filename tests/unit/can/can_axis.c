@@ -313,6 +313,7 @@ TEST(each_reason_has_its_own_line)
 		{CAN_AXIS_FOREIGN, 0, 0, "another program"},
 		{CAN_AXIS_OFF_TARGET, 200, 0, "by 1.5 mm"},
 		{CAN_AXIS_NO_START, CIA402_READY, 0, "remains in ready to switch on"},
+		{CAN_AXIS_NO_MODE, 0, 0, "in the mode none (0)"},
 		{CAN_AXIS_NO_HOME, 0, 0, "its homing failed"},
 		{CAN_AXIS_HOME_TIME, 0, 0, "not done in time"},
 		{CAN_AXIS_OUTSIDE, -100, 0, "to -0.750 mm"},

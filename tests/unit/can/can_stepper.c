@@ -557,6 +557,8 @@ TEST(homed_only_where_the_shaft_is)
 		/* Far enough for its speed to be seen, up to its 607F. */
 		rig.drive.origin = fault == 6 && factor > 1 ? 80000 : 20000;
 		rig.drive.speed_factor = fault == 6 ? factor : 1;
+		/* Its bits are not seen without power: it is homed in each session. */
+		rig.drive.mode_late = !(incise_random_bits(key, drawn++) % 8);
 		can_rig_open_or_fail(&rig);
 		can_rig_enable_or_fail(&rig);
 		if (before && fault != 6) {
@@ -603,7 +605,7 @@ TEST(homed_only_where_the_shaft_is)
 		can_rig_close(&rig);
 		/* The drive says the same to the next program, but not to one of another rig.conf. */
 		can_rig_open_or_fail(&rig);
-		if (can_rig_look(&rig).homed != !rc)
+		if (can_rig_look(&rig).homed != (!rc && !rig.drive.mode_late))
 			fail_msg(
 				"case %d: fault %d, late %d, before %d: %d, then homed %d",
 				i, fault, late, before, rc, !!rc);
@@ -644,6 +646,23 @@ TEST(at_rest_only_with_a_position_from_there)
 		}
 		assert_int_equal(can_rig_look(&rig).state, INCISE_STEPPER_STATE_READY);
 	}
+	can_rig_close(&rig);
+}
+
+/* Its mode is what it is in when it is enabled, or it does not move. */
+TEST(a_mode_that_is_not_taken_is_not_used)
+{
+	can_rig_init(&rig);
+	rig.drive.mode_late = true;
+	can_rig_open_or_fail(&rig);
+	can_rig_enable_or_fail(&rig);
+	can_rig_hold(&rig, 5, 2000 * MS);
+	assert_true(fabs(at_mm() - 5) < 1e-3);
+	assert_int_equal(incise_stepper_disable(rig.stepper, NULL), 0);
+	rig.drive.mode_never = true;
+	assert_int_equal(incise_stepper_enable(rig.stepper, &err), -ETIMEDOUT);
+	assert_non_null(strstr(err.text, "none (0)"));
+	assert_false(drive_powered(&rig.drive));
 	can_rig_close(&rig);
 }
 

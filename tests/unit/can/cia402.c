@@ -119,9 +119,14 @@ TEST(test_parse_tpdos)
 	uint32_t inputs = 7;
 	uint16_t word = 7;
 	int32_t position = 7;
+	int mode = 7;
 
-	memcpy(frame.data, "\x37\x12\xfe\xff\xff\xff", 6);
-	assert_true(cia402_parse_status(&frame, &word, &position));
+	memcpy(frame.data, "\x37\x12\xfe\xff\xff\xff\xfd", 7);
+	assert_true(cia402_parse_status(&frame, &word, &position, &mode));
+	assert_int_equal(mode, 7);
+	frame.len = 7;
+	assert_true(cia402_parse_status(&frame, &word, &position, &mode));
+	assert_int_equal(mode, -3);
 	assert_int_equal(word, 0x1237);
 	assert_int_equal(position, -2);
 	assert_false(cia402_parse_inputs(&frame, &inputs));
@@ -144,7 +149,7 @@ TEST(test_parse_tpdos)
 	for (size_t i = 0; i < COUNT(wrong); i++) {
 		frame.can_id = wrong[i].id;
 		frame.len = wrong[i].len;
-		assert_false(cia402_parse_status(&frame, &word, &position));
+		assert_false(cia402_parse_status(&frame, &word, &position, &mode));
 	}
 	assert_int_equal(word, 7);
 	assert_int_equal(position, 7);
@@ -512,6 +517,10 @@ TEST(test_set_mode, setup)
 	assert_int_equal(cia402_set_mode(&led->client, CIA402_CSP), -ETIMEDOUT);
 	assert_non_null(strstr(led->err.text, "CSP (8)"));
 	assert_non_null(strstr(led->err.text, "homing (6)"));
+	/* It keeps the mode, and shows it with power. */
+	d->od[OD_MODE].deaf = false;
+	d->mode_late = true;
+	assert_int_equal(cia402_set_mode(&led->client, CIA402_CSP), 1);
 }
 
 static bool homed(struct led *led, int rc)

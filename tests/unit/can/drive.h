@@ -177,6 +177,8 @@ struct drive {
 	bool homing_no_reached; /* bit 10 is never set in homing mode */
 	bool homing_no_count;	/* the count is not set at the switch … */
 	double homing_own;	/* … or to a position of its own, counts */
+	bool mode_late;		/* 6061 is 0 until operation is enabled … */
+	bool mode_never;	/* … and then, too */
 	double speed_factor;	/* its unit of velocity is so many of what it reports */
 	double gives_way;	/* counts that its shaft jumps when its brake opens */
 	bool no_tpdo;		/* TPDO1 is not sent */
@@ -422,6 +424,14 @@ static inline void drive_refresh(struct drive *d)
 	d->od[OD_INPUTS].value = d->inputs;
 }
 
+/* What it reports of an object. */
+static inline uint32_t drive_shown(const struct drive *d, const struct drive_object *o)
+{
+	bool hidden = d->mode_never || (d->mode_late && d->state != CIA402_ENABLED);
+
+	return o == &d->od[OD_MODE_NOW] && hidden ? 0 : o->value;
+}
+
 /* --- motion --- */
 
 static inline double drive_in_range(const struct drive *d, double position)
@@ -634,12 +644,14 @@ static inline void drive_send_tpdo(struct drive *d, const struct drive_object *p
 {
 	unsigned int at = 0;
 	uint8_t bytes[8] = {0};
+	uint32_t value;
 
 	drive_refresh(d);
 	for (uint32_t i = 0; i < pdo[PDO_COUNT].value; i++) {
 		const struct drive_object *o = drive_mapped(d, pdo[PDO_MAP + i].value);
 
-		memcpy(bytes + at, &o->value, o->size);
+		value = drive_shown(d, o);
+		memcpy(bytes + at, &value, o->size);
 		at += o->size;
 	}
 	drive_say_bytes(d, pdo[PDO_COB].value, bytes, at);
@@ -727,10 +739,12 @@ static inline void drive_upload(struct drive *d, const struct drive_object *o,
 				const uint8_t request[8])
 {
 	uint8_t bytes[8] = {0, request[1], request[2], request[3]};
+	uint32_t value;
 
 	drive_refresh(d);
+	value = drive_shown(d, o);
 	bytes[0] = (uint8_t)(0x43 | (4 - o->size) << 2);
-	memcpy(bytes + 4, &o->value, o->size); /* little-endian, as here */
+	memcpy(bytes + 4, &value, o->size); /* little-endian, as here */
 	drive_answer(d, bytes);
 }
 

@@ -193,7 +193,7 @@ static void handle_status(struct can_axis *axis, const struct can_frame *frame)
 {
 	int32_t before = axis->position;
 
-	if (!cia402_parse_status(frame, &axis->statusword, &axis->position))
+	if (!cia402_parse_status(frame, &axis->statusword, &axis->position, &axis->mode))
 		return;
 	if (axis->has_status)
 		axis->speed += SMOOTH * ((double)axis->position - before - axis->speed);
@@ -424,16 +424,18 @@ static void run_starting(struct can_axis *axis)
 {
 	enum cia402_state state = cia402_state(axis->statusword);
 	bool homes = axis->limit_ns, fresh = axis->tpdo_ns != axis->since_ns;
+	bool enabled = fresh && state == CIA402_ENABLED;
+	bool started = enabled && axis->mode == axis->mode_set;
 
 	check_inputs(axis);
 	if (axis->phase != CAN_AXIS_STARTING)
 		return;
 
-	if (fresh && state == CIA402_ENABLED && !homes && !can_axis_is_within(axis)) {
+	if (started && !homes && !can_axis_is_within(axis)) {
 		/* It gave way so far that its first target would be a jump. */
 		set_cause(axis, CAN_AXIS_OUTSIDE, axis->motion.status.position, 0);
 		abandon(axis, -ERANGE);
-	} else if (fresh && state == CIA402_ENABLED) {
+	} else if (started) {
 		axis->motion.seen_ns = axis->now_ns;
 		/* It may have given way a little while it got power. */
 		incise_motion_halt(&axis->motion, false);
@@ -453,6 +455,8 @@ static void run_starting(struct can_axis *axis)
 			axis->result = 0;
 		enter_phase(axis, homes ? CAN_AXIS_HOMING : CAN_AXIS_RUNNING);
 	} else if (axis->now_ns - axis->since_ns > axis->setup.start_ns) {
+		if (enabled)
+			set_cause(axis, CAN_AXIS_NO_MODE, axis->mode, 0);
 		set_cause(axis, CAN_AXIS_NO_START, state, 0);
 		abandon(axis, -ETIMEDOUT);
 	}
@@ -741,6 +745,7 @@ int can_axis_power(struct can_axis *axis, int64_t now_ns, int64_t homing_ns)
 	axis->tpdo_ns = now_ns;
 	axis->inputs_ns = 0;
 	axis->limit_ns = homing_ns ? now_ns + homing_ns : 0;
+	axis->mode = axis->mode_set = homing_ns ? CIA402_HOMING : axis->setup.mode;
 	axis->result = 1;
 	axis->outcome = -EIO;
 	enter_phase(axis, CAN_AXIS_STARTING);
@@ -861,6 +866,12 @@ int can_axis_cause_text(const struct can_axis *axis, char *text, size_t size)
 				"it did not reach operation enabled and remains in %s: "
 				"check its supply, enable and safe-torque-off inputs",
 				cia402_state_name((enum cia402_state)a));
+	case CAN_AXIS_NO_MODE:
+		return snprintf(
+			text, size,
+			"it is enabled in the mode %s (6061) and not in that which "
+			"was set (6060): see its manual",
+			cia402_mode_name((int)a));
 	case CAN_AXIS_NO_HOME:
 		return snprintf(
 			text, size,

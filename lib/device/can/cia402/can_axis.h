@@ -49,6 +49,7 @@ enum can_axis_cause {
 	CAN_AXIS_FOREIGN,    /* another master */
 	CAN_AXIS_OFF_TARGET, /* a: steps */
 	CAN_AXIS_NO_START,   /* a: enum cia402_state */
+	CAN_AXIS_NO_MODE,    /* a: the mode that it is in */
 	CAN_AXIS_NO_HOME,    /* the drive reports that homing failed */
 	CAN_AXIS_HOME_TIME,
 	CAN_AXIS_HOME_OLD,    /* the error bit of the last homing stays set */
@@ -89,8 +90,9 @@ struct can_axis {
 	struct can_axis_setup setup;
 	double zero_counts; /* of the drive, at position 0 */
 	uint16_t statusword;
-	int32_t position; /* the drive's, counts */
-	bool has_status;  /* a TPDO1 came */
+	int32_t position;   /* the drive's, counts */
+	int mode, mode_set; /* by 6061, if TPDO1 has it; by 6060 */
+	bool has_status;    /* a TPDO1 came */
 	enum can_axis_phase phase;
 	struct can_axis_counts counts;
 	/* Read by another thread once a fault is seen. */

@@ -400,6 +400,20 @@ static int read_inputs(struct can_session *s)
 	return 0;
 }
 
+/* A drive that shows its mode with power only shows it in TPDO1: the axis waits for it. */
+static int set_mode(struct can_session *s, enum cia402_mode mode)
+{
+	int rc = cia402_set_mode(&s->client, mode);
+
+	if (rc > 0 && !s->setup.mode_mapped) {
+		s->setup.mode_mapped = true;
+		rc = cia402_configure(&s->client, &s->setup, &s->supported);
+		if (!rc)
+			rc = cia402_set_mode(&s->client, mode);
+	}
+	return rc < 0 ? rc : 0;
+}
+
 int can_session_ready(struct can_session *s, bool homing, struct incise_error *err)
 {
 	const struct incise_actuator *a = &s->actuator;
@@ -422,7 +436,7 @@ int can_session_ready(struct can_session *s, bool homing, struct incise_error *e
 			can_units_whole(a->acceleration_mm_s2 / a->lead_mm *
 					s->units.acceleration_per_turn_s2));
 	if (!rc)
-		rc = cia402_set_mode(&s->client, homing ? CIA402_HOMING : s->setup.mode);
+		rc = set_mode(s, homing ? CIA402_HOMING : s->setup.mode);
 	if (!rc)
 		rc = read_inputs(s);
 	if (rc)
@@ -525,7 +539,8 @@ static void receive_can_session(struct can_session *s, int64_t now)
 		uint32_t function = canopen_handle(&s->master, &frame, t_ns);
 
 		if (function == CANOPEN_TPDO1 &&
-		    cia402_parse_status(&frame, &axis->statusword, &axis->position))
+		    cia402_parse_status(&frame, &axis->statusword, &axis->position,
+					&axis->mode))
 			s->watch.tpdo_ns = now;
 		else if (function == CANOPEN_TPDO2 &&
 			 cia402_parse_inputs(&frame, &inputs))

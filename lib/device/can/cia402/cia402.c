@@ -153,12 +153,14 @@ static bool is_pdo(const struct can_frame *frame, uint32_t function, unsigned in
 }
 
 bool cia402_parse_status(const struct can_frame *frame, uint16_t *statusword,
-			 int32_t *position)
+			 int32_t *position, int *mode)
 {
 	if (!is_pdo(frame, CANOPEN_TPDO1, TPDO1_LENGTH))
 		return false;
 	*statusword = (uint16_t)canopen_unpack(frame->data, 2);
 	*position = (int32_t)canopen_unpack(frame->data + 2, 4);
+	if (frame->len > TPDO1_LENGTH)
+		*mode = (int8_t)frame->data[TPDO1_LENGTH];
 	return true;
 }
 

@@ -9,7 +9,7 @@
  *                 fault ◀─ fault reaction ◀─ (any)
  *
  *   RPDO1, with SYNC:  6040 controlword (16)  target (32; 16 for torque)
- *   TPDO1, at SYNC:    6041 statusword (16)   6064 position (32)
+ *   TPDO1, at SYNC:    6041 statusword (16)   6064 position (32)   [6061 mode (8)]
  *   TPDO2, at change:  60FD digital inputs (32), if it has them
  */
 #ifndef INCISE_CIA402_H
@@ -78,9 +78,9 @@ uint16_t cia402_next_controlword(enum cia402_state state);
 void cia402_pack_rpdo(struct can_frame *frame, uint8_t node, enum cia402_mode mode,
 		      uint16_t controlword, int32_t target);
 
-/* TPDO1 and TPDO2. Return false for another frame or a short one. */
+/* TPDO1 and TPDO2. Return false for another frame or a short one. *mode stays without 6061. */
 bool cia402_parse_status(const struct can_frame *frame, uint16_t *statusword,
-			 int32_t *position);
+			 int32_t *position, int *mode);
 bool cia402_parse_inputs(const struct can_frame *frame, uint32_t *inputs);
 
 /* --- by SDO: functions that return 0, or a negative errno with a message --- */
@@ -162,6 +162,7 @@ int cia402_read_units(const struct cia402_client *client, struct cia402_units *u
 /* The setup of a drive before it may move, in its units. */
 struct cia402_setup {
 	enum cia402_mode mode;
+	bool mode_mapped;  /* 6061 in TPDO1, for drives that show it with power only */
 	uint32_t cycle_ns; /* 60C2; a digit times a power of ten, as the drive keeps it */
 	uint32_t deadman_ms;   /* silence of this side before the drive quick-stops */
 	uint8_t master;	       /* node id of this side's heartbeat */
@@ -196,7 +197,7 @@ struct cia402_supported {
 int cia402_configure(const struct cia402_client *client, const struct cia402_setup *setup,
 		     struct cia402_supported *supported);
 
-/* Write 6060, and wait until 6061 agrees. */
+/* Write 6060, and wait until 6061 agrees. 1: it keeps 6060, and 6061 may follow with power. */
 int cia402_set_mode(const struct cia402_client *client, enum cia402_mode mode);
 
 /* Write 607D alone, if the drive has it; read whether it has it with that range. */
@@ -211,7 +212,7 @@ int cia402_set_homing(const struct cia402_client *client, int method, uint32_t s
 
 /*
  * Read whether the drive's position is the machine's: enter homing mode without power,
- * read the statusword (bits 10, 12), and enter @mode again.
+ * read the statusword (bits 10, 12), and enter @mode again. Where 6061 needs power it is not.
  */
 int cia402_read_homed(const struct cia402_client *client, enum cia402_mode mode,
 		      bool *homed);

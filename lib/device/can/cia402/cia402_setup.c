@@ -57,6 +57,7 @@ static const struct cia402_object modes = {0x6502, 0, 4, "supported drive modes"
 #define MAP_CONTROLWORD 0x60400010
 #define MAP_STATUSWORD 0x60410010
 #define MAP_POSITION 0x60640020
+#define MAP_MODE 0x60610008
 #define MAP_INPUTS 0x60fd0020
 #define MAP_TARGET_POSITION 0x607a0020
 #define MAP_TARGET_VELOCITY 0x60ff0020
@@ -67,7 +68,7 @@ struct pdo {
 	uint32_t id;
 	uint8_t type;
 	uint8_t n; /* objects */
-	uint32_t map[2];
+	uint32_t map[3];
 };
 
 static struct cia402_object id_of(uint16_t index)
@@ -215,7 +216,11 @@ static int set_pdos(const struct cia402_client *client, const struct cia402_setu
 		{MAP_CONTROLWORD, target(setup->mode)},
 	};
 	const struct pdo actual = {
-		TPDO, CANOPEN_TPDO1 + node, AT_SYNC, 2, {MAP_STATUSWORD, MAP_POSITION},
+		TPDO,
+		CANOPEN_TPDO1 + node,
+		AT_SYNC,
+		2 + setup->mode_mapped,
+		{MAP_STATUSWORD, MAP_POSITION, MAP_MODE},
 	};
 	bool has, kept;
 	int rc = switch_others_off(client, RPDO, 1);
@@ -398,7 +403,7 @@ static int set_cycle(const struct cia402_client *client, const struct cia402_set
 				    "firmware",
 				    cia402_mode_name(setup->mode), available);
 	rc = cia402_set_mode(client, setup->mode);
-	if (!rc)
+	if (rc >= 0)
 		rc = cia402_ensure(client, &sync_id, SYNC_ID);
 	if (rc)
 		return rc;
