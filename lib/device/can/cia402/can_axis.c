@@ -286,6 +286,7 @@ static void check_drive(struct can_axis *axis)
 {
 	const struct canopen *master = axis->master;
 	enum cia402_state state = cia402_state(axis->statusword);
+	int64_t most_ns = axis->setup.silence_ns;
 
 	if (master->bus_offs != axis->bus_offs)
 		set_fault(axis, INCISE_STEPPER_FAULT_BUS, CAN_AXIS_BUS_OFF, 0, 0);
@@ -313,13 +314,11 @@ static void check_drive(struct can_axis *axis)
 		set_fault(axis, INCISE_STEPPER_FAULT_LOST, CAN_AXIS_NO_INPUTS,
 			  INPUTS_NS / MS, 0);
 	/* A loop that is closed here must not stay open for long. */
-	if (axis->setup.mode != CIA402_CSP && axis->missed >= OPEN_CYCLES &&
-	    axis->now_ns - axis->tpdo_ns > OPEN_NS)
-		set_fault(axis, INCISE_STEPPER_FAULT_LOST, CAN_AXIS_NO_TPDO, OPEN_NS / MS,
+	if (axis->setup.mode != CIA402_CSP && axis->missed >= OPEN_CYCLES)
+		most_ns = OPEN_NS;
+	if (axis->now_ns - axis->tpdo_ns > most_ns)
+		set_fault(axis, INCISE_STEPPER_FAULT_LOST, CAN_AXIS_NO_TPDO, most_ns / MS,
 			  0);
-	if (axis->now_ns - axis->tpdo_ns > axis->setup.silence_ns)
-		set_fault(axis, INCISE_STEPPER_FAULT_LOST, CAN_AXIS_NO_TPDO,
-			  axis->setup.silence_ns / MS, 0);
 }
 
 /* E-stop, and the limit ahead. */
@@ -811,15 +810,12 @@ int can_axis_cause_text(const struct can_axis *axis, char *text, size_t size)
 				"clear",
 				cia402_state_name((enum cia402_state)a));
 	case CAN_AXIS_NO_HEARTBEAT:
-		return snprintf(
-			text, size,
-			"no heartbeat from it for %lld ms: check its power and cable, "
-			"then clear",
-			a);
 	case CAN_AXIS_NO_TPDO:
 		return snprintf(text, size,
-				"no status (TPDO1) from it for %lld ms: check its "
-				"power and cable, then clear",
+				"no %s from it for %lld ms: check its power and cable, "
+				"then clear",
+				axis->cause == CAN_AXIS_NO_TPDO ? "status (TPDO1)"
+								: "heartbeat",
 				a);
 	case CAN_AXIS_NO_INPUTS:
 		return snprintf(

@@ -78,6 +78,8 @@ static int open_bus(struct can_session *s, const struct can_transport *transport
 {
 	struct incise_error *err = s->client.err;
 	const struct incise_actuator_can *can = &request->actuator->can;
+	const char *example =
+		strcmp(transport->name, "can") ? "slcan:/dev/ttyACM0" : "can:can0";
 	char device[DEVICE_MAX];
 	struct can_bus_request bus = {
 		.where = request->where, .device = device, .bitrate = can->bitrate};
@@ -87,15 +89,10 @@ static int open_bus(struct can_session *s, const struct can_transport *transport
 	if (rc)
 		return incise_error_set(
 			err, EINVAL,
-			"%s: expected %s:DEVICE:NODE such as %s with a "
-			"node id of 1 to 127, found %s:%.60s; `incise "
-			"info %s` lists drives",
-			request->where, transport->name,
-			strcmp(transport->name, "can") ? "slcan:/dev/ttyACM0:0x10"
-						       : "can:can0:0x10",
-			transport->name, request->arguments,
-			strcmp(transport->name, "can") ? "slcan:/dev/ttyACM0"
-						       : "can:can0");
+			"%s: expected %s:DEVICE:NODE such as %s:0x10 with a node id of "
+			"1 to 127, found %s:%.60s; `incise info %s` lists drives",
+			request->where, transport->name, example, transport->name,
+			request->arguments, example);
 	if (node == (unsigned int)can->master)
 		return incise_error_set(err, EINVAL,
 					"%s: node %u is also actuator.can.master, the "

@@ -8,10 +8,7 @@
 
 #include "can_session.h"
 
-/*
- * Set the actuator's steps: as fine as the drive's counts, or as the profile allows. Returns 0;
- * -ERANGE: a count is too coarse to feel.
- */
+/* Set the actuator's steps: as fine as counts and profile allow. -ERANGE: counts are too coarse. */
 int can_units_steps(struct can_session *session);
 
 /* Returns the drive's counts per mm; negative if inverted. */
@@ -20,8 +17,7 @@ double can_units_per_mm(const struct can_session *session);
 /* Compute session->setup, and the period of both heartbeats. */
 void can_units_setup(struct can_session *session);
 
-/* Compute the range of positions in the setup from the place of 0, without limits before
- * homing; sets in_range. */
+/* Compute the range in the setup from the place of 0; unlimited before homing. Sets in_range. */
 void can_units_range(struct can_session *session);
 
 /* Initialize session->axis. Returns 0, -EINVAL, -ERANGE. */

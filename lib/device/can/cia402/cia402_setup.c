@@ -295,23 +295,22 @@ static int set_limits(const struct cia402_client *client,
 {
 	bool has;
 	const struct {
-		uint32_t wanted; /* 0: leave it to the drive */
 		const struct cia402_object *object;
-		uint32_t value;
+		uint32_t value; /* 0: leave it to the drive */
 	} limits[] = {
-		{setup->velocity, &speed, setup->velocity},
-		{setup->acceleration, &acceleration, setup->acceleration},
+		{&speed, setup->velocity},
+		{&acceleration, setup->acceleration},
 		/* A drive without this limit brakes by the limit of accelerations. */
-		{setup->acceleration, &deceleration, setup->acceleration},
-		{setup->acceleration, &stop_ramp, setup->acceleration},
-		{setup->following, &window, setup->following},
-		{setup->following, &window_ms, setup->following_ms},
-		{setup->torque_permille, &torque, setup->torque_permille},
+		{&deceleration, setup->acceleration},
+		{&stop_ramp, setup->acceleration},
+		{&window, setup->following},
+		{&window_ms, setup->following ? setup->following_ms : 0},
+		{&torque, setup->torque_permille},
 	};
 	int rc = cia402_set_range(client, setup->position_min, setup->position_max);
 
 	for (size_t i = 0; i < sizeof(limits) / sizeof(*limits) && !rc; i++)
-		if (limits[i].wanted)
+		if (limits[i].value)
 			rc = cia402_write_optional(client, limits[i].object,
 						   limits[i].value, &has);
 	return rc;
