@@ -151,7 +151,6 @@ static void run(struct canopen *master, uint8_t request)
 		.deadman_ms = 100,
 		.master = OWN,
 		.heartbeat_ms = 20,
-		.limited = true,
 		.position_max = 1000,
 		.velocity = 1,
 		.acceleration = 1,

@@ -177,6 +177,7 @@ struct drive {
 	bool homing_no_reached; /* bit 10 is never set in homing mode */
 	bool homing_no_count;	/* the count is not set at the switch … */
 	double homing_own;	/* … or to a position of its own, counts */
+	bool echoes;		/* its adapter sends back what it is sent */
 	bool mode_late;		/* 6061 is 0 until operation is enabled … */
 	bool mode_never;	/* … and then, too */
 	double speed_factor;	/* its unit of velocity is so many of what it reports */
@@ -962,6 +963,8 @@ static inline int drive_send(struct can_bus *bus, const struct can_frame *frame)
 		d->send_error = 0;
 	bus->counts.full += rc == -ENOBUFS;
 	bus->counts.sent += !rc;
+	if (!rc && d->echoes)
+		drive_say(d, frame);
 	if (!rc)
 		drive_process(d, frame);
 	return rc;
