@@ -666,6 +666,26 @@ TEST(a_mode_that_is_not_taken_is_not_used)
 	can_rig_close(&rig);
 }
 
+/* Without 607D nothing tells the next program; this one need not be told. */
+TEST(a_drive_without_a_range_is_homed_in_each_session)
+{
+	can_rig_init(&rig);
+	drive_lacks(&rig.drive, 0x607d, -1);
+	can_rig_open_or_fail(&rig);
+	can_rig_enable_or_fail(&rig);
+	succeeds(!incise_stepper_home(rig.stepper, NULL, NULL, &err));
+	assert_true(can_rig_look(&rig).homed);
+	emcy(&rig.drive, true);
+	can_rig_hold(&rig, 0, 500 * MS);
+	assert_false(can_rig_look(&rig).homed);
+	succeeds(!incise_stepper_clear(rig.stepper, &err));
+	assert_true(can_rig_look(&rig).homed);
+	can_rig_close(&rig);
+	can_rig_open_or_fail(&rig);
+	assert_false(can_rig_look(&rig).homed);
+	can_rig_close(&rig);
+}
+
 TEST(homing_can_fail_and_be_stopped)
 {
 	volatile int stop = 0;

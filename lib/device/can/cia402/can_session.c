@@ -164,6 +164,7 @@ static int read_position(struct can_session *s, bool keep)
  */
 static int read_homed(struct can_session *s)
 {
+	bool known = s->is_homed && s->is_setup && s->boots == s->master.boots;
 	double zero = s->axis.zero_counts;
 	int rc;
 
@@ -171,7 +172,7 @@ static int read_homed(struct can_session *s)
 	if (s->is_homed || !s->actuator.can.homing_method)
 		return 0;
 	rc = cia402_read_homed(&s->client, s->setup.mode, &s->is_homed);
-	if (rc || !s->is_homed)
+	if (rc || !s->is_homed || known)
 		return rc;
 	s->axis.zero_counts = -s->actuator.home_mm * can_units_per_mm(s);
 	can_units_range(s);
