@@ -263,14 +263,6 @@ static double destination(const struct stepper_job *job, struct stepper_drive *d
 	return fmax(0, fmin(drive->info.travel_mm, mm));
 }
 
-/* Whether it rests at the target, or at the nearest microstep. */
-static bool arrived(const struct stepper_drive *drive, double to_mm)
-{
-	return stepper_drive_rests(drive) &&
-	       fabs(drive->status.position_mm - to_mm) <=
-		       fmax(0.6 * drive->info.step_mm, drive->info.within_mm);
-}
-
 /* Longest time of a motion from rest to rest within the limits. */
 static double motion_s(const struct incise_stepper_info *info, double mm)
 {
@@ -305,18 +297,24 @@ static void run_move(const struct stepper_job *job, struct stepper_drive *drive)
 		stepper_drive_to(drive, to_mm);
 		seconds = (double)(incise_clock_now(drive->clock) - begin) /
 			  INCISE_NS_PER_S;
-		arrived_s = arrived(drive, to_mm) ? fmin(arrived_s, seconds) : INFINITY;
+		arrived_s = stepper_drive_arrived(drive, to_mm) ? fmin(arrived_s, seconds)
+								: INFINITY;
 		/* A drive that follows its targets needs time to settle. */
 	} while (!cli_stop && seconds < within_s &&
 		 !(seconds >= arrived_s + drive->info.settle_s));
-	if (!arrived(drive, to_mm) && cli_stop)
+	if (!stepper_drive_arrived(drive, to_mm) && cli_stop)
 		fail_stopped(drive);
-	if (!arrived(drive, to_mm))
+	if (!stepper_drive_arrived(drive, to_mm))
 		stepper_drive_fail(
 			drive,
-			"%s is at %.4f mm after %.1f s and did not come to rest at "
+			"%s is at %.4f mm after %.1f s%s and did not come to rest at "
 			"%.4f mm; see incise stepper status",
-			drive->info.name, drive->status.position_mm, seconds, to_mm);
+			drive->info.name, drive->status.position_mm, seconds,
+			drive->status.state == INCISE_STEPPER_STATE_MOVING &&
+					drive->status.velocity_mm_s == 0
+				? " by its last position, from before it came to rest,"
+				: "",
+			to_mm);
 	put_moved(job, drive, from_mm, seconds);
 	maybe_hold(job, drive);
 }

@@ -4,6 +4,7 @@
  */
 #include <errno.h>
 #include <fcntl.h>
+#include <string.h>
 #include <sys/file.h>
 #include <sys/ioctl.h>
 #include <sys/stat.h>
@@ -67,4 +68,45 @@ int incise_tty_open(const char *path, speed_t speed)
 	}
 	tcflush(fd, TCIOFLUSH);
 	return fd;
+}
+
+int incise_tty_refuse(const char *path, int code, const char *where, const char *expected,
+		      struct incise_error *err)
+{
+	switch (code) {
+	case ENOENT:
+	case ENOTDIR:
+	case ELOOP:
+	case ENXIO:
+	case ENODEV:
+		return incise_error_set(err, ENODEV,
+					"%s: no such device %s; plug in the adapter; "
+					"/dev/serial/by-id lists the serial ports",
+					where, path);
+	case EACCES:
+	case EPERM:
+		return incise_error_set(
+			err, EACCES,
+			"%s: no permission to open %s; join its group, usually dialout",
+			where, path);
+	case EBUSY:
+	case EWOULDBLOCK:
+		return incise_error_set(err, EBUSY,
+					"%s: another program has %s open; end it first",
+					where, path);
+	case ENOTTY:
+		return incise_error_set(err, EINVAL,
+					"%s: %s is not a serial port; expected %s, for "
+					"example /dev/ttyUSB0",
+					where, path, expected);
+	case EINVAL:
+		return incise_error_set(err, EIO,
+					"%s: %s does not support this baud rate; choose "
+					"another, here and at the device's switches",
+					where, path);
+	default:
+		return incise_error_set(err, EIO,
+					"%s: %s: %s; unplug the adapter and plug it in",
+					where, path, strerror(code));
+	}
 }

@@ -6,6 +6,7 @@
 #define INCISE_TTY_H
 
 #include <termios.h>
+#include <incise/error.h>
 
 /*
  * @speed  B115200 …; B0 keeps the speed set by stty, as over USB it mostly has no meaning; but
@@ -16,5 +17,12 @@
  * speed).
  */
 int incise_tty_open(const char *path, speed_t speed);
+
+/*
+ * Make the message for an error of incise_tty_open(), a positive @code. @expected: the line that
+ * is asked for. Returns the error: -ENODEV, -EACCES, -EBUSY, -EINVAL, -EIO.
+ */
+int incise_tty_refuse(const char *path, int code, const char *where, const char *expected,
+		      struct incise_error *err);
 
 #endif

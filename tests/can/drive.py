@@ -568,7 +568,13 @@ def arguments():
                         help="limit switches, counts")
     parser.add_argument("--shaft", type=int, default=0, help="where it stands at first, counts")
     parser.add_argument("--homed", action="store_true", help="its position is the machine's")
-    return parser.parse_args()
+    parser.add_argument("--range", type=span, default=(-12800, 396800), metavar="LOW:HIGH",
+                        help="its 607D where it is homed: as incise leaves it, with 30 mm of "
+                             "travel, 12800 counts per mm and 1 mm to follow")
+    args = parser.parse_args()
+    if args.homed:
+        args.set = [((0x607D, 1), args.range[0]), ((0x607D, 2), args.range[1])] + args.set
+    return args
 
 
 def main():

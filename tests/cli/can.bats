@@ -377,15 +377,15 @@ moves() {
 	local counts=$1
 	shift
 	drive_end
-	rig --homed "$@" || return
+	rig --homed --range=$((-counts / 4)):$((31 * counts / 4)) "$@" || return
 	incise stepper move 4 --rig rig.conf >out 2>err 3>&- 7>&- || complain "$* : $(cat err)" || return
 	drive_is "switch-on disabled" || return
 	[ "$(drive_value position)" -eq "$counts" ] || complain "$*: $drive_line"
 }
 
 @test "drives of other units go as far" {
-	moves 10000 --set 0x6092:1=10000
-	moves 2500 --set 0x6092:1=10000 --set 0x6092:2=4
+	moves 10000 --set 0x6092:1=10000 --set 0x608F:1=10000
+	moves 2500 --set 0x6092:1=10000 --set 0x6092:2=4 --set 0x608F:1=2500
 	moves 8192 --without 0x6092 --set 0x608F:1=4096 --set 0x6091:1=2
 	moves 3000 --without 0x6092 --without 0x6091 --set 0x608F:1=6000 --set 0x608F:2=2
 	moves 51200 --set 0x60A9:0=0xFDB44700 --set 0x60AA:0=0x00B45700 # mrpm, turns/s^2

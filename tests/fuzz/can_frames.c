@@ -131,13 +131,14 @@ static void handle_all(struct canopen *master)
 	uint16_t word;
 	int32_t position;
 	int64_t t_ns;
+	int mode = 0;
 
 	while (of(master->bus)->size) {
 		if (bus_receive(master->bus, &frame, &t_ns) <= 0)
 			continue;
 		canopen_handle(master, &frame, t_ns);
-		if (cia402_parse_status(&frame, &word, &position))
-			cia402_mode_name((int8_t)word);
+		if (cia402_parse_status(&frame, &word, &position, &mode))
+			cia402_mode_name(mode);
 		cia402_parse_inputs(&frame, &inputs);
 	}
 }
@@ -150,7 +151,6 @@ static void run(struct canopen *master, uint8_t request)
 		.deadman_ms = 100,
 		.master = OWN,
 		.heartbeat_ms = 20,
-		.limited = true,
 		.position_max = 1000,
 		.velocity = 1,
 		.acceleration = 1,

@@ -123,9 +123,7 @@ void stepper_creep(struct stepper_live *live, double to_mm)
 		watch_force(live);
 		if (at_mm != to_mm)
 			continue;
-		if (stepper_drive_rests(drive) &&
-		    fabs(drive->status.position_mm - to_mm) <=
-			    fmax(0.6 * step_mm, drive->info.within_mm))
+		if (stepper_drive_arrived(drive, to_mm))
 			return;
 		waited_s += pass_s;
 	}

@@ -91,6 +91,13 @@ bool stepper_drive_rests(const struct stepper_drive *drive)
 	       drive->status.velocity_mm_s == 0;
 }
 
+bool stepper_drive_arrived(const struct stepper_drive *drive, double to_mm)
+{
+	return stepper_drive_rests(drive) &&
+	       fabs(drive->status.position_mm - to_mm) <=
+		       fmax(0.6 * drive->info.step_mm, drive->info.within_mm);
+}
+
 static void pass(struct stepper_drive *drive, int64_t ns)
 {
 	/* A signal ends the wait; callers check cli_stop. */

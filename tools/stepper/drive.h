@@ -53,6 +53,9 @@ void stepper_drive_hold(struct stepper_drive *drive, double seconds);
 
 bool stepper_drive_rests(const struct stepper_drive *drive);
 
+/* Whether it rests at the target, or at the nearest microstep. */
+bool stepper_drive_arrived(const struct stepper_drive *drive, double to_mm);
+
 /* Bring it to rest without power, and read the status. */
 void stepper_drive_rest(struct stepper_drive *drive);
 

@@ -72,6 +72,9 @@ const struct incise_setting incise_actuator_can_settings[] = {
 		       "longest time from power on to operation enabled; a drive that "
 		       "searches its commutation or opens a brake needs more",
 		       .scale = 1e-3),
+	SETTING_NUMBER(answer_ms, can.answer_s, "ms", 10, 2000, "200",
+		       "longest time for the drive's answer to a request (SDO)",
+		       .scale = 1e-3),
 	SETTING_WHOLE(homing_method, can.homing_method, "", -128, 127, "0",
 		      "number of the homing method in the drive's manual"),
 	SETTING_TRUTH(absolute, can.absolute, "false",

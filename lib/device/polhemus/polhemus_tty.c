@@ -135,53 +135,6 @@ static const struct polhemus_line_ops ops = {
 	.close = tty_close,
 };
 
-static void refuse_polhemus_tty(const char *path, int code, const char *where,
-				struct incise_error *err)
-{
-	switch (code) {
-	case ENOENT:
-	case ENOTDIR:
-	case ELOOP:
-	case ENXIO:
-	case ENODEV:
-		incise_error_set(err, ENODEV,
-				 "%s: no such device %s; plug in the adapter; "
-				 "/dev/serial/by-id lists the serial ports",
-				 where, path);
-		break;
-	case EACCES:
-	case EPERM:
-		incise_error_set(err, EACCES,
-				 "%s: no permission to open %s; join its group, "
-				 "usually dialout",
-				 where, path);
-		break;
-	case EBUSY:
-	case EWOULDBLOCK:
-		incise_error_set(err, EBUSY,
-				 "%s: another program has %s open; end it first", where,
-				 path);
-		break;
-	case ENOTTY:
-		incise_error_set(err, EINVAL,
-				 "%s: %s is not a serial port; expected one, for "
-				 "example /dev/ttyUSB0",
-				 where, path);
-		break;
-	case EINVAL:
-		incise_error_set(err, EIO,
-				 "%s: %s does not support this baud rate; choose "
-				 "another, here and at the tracker's switches",
-				 where, path);
-		break;
-	default:
-		incise_error_set(err, EIO,
-				 "%s: %s: %s; unplug the adapter and plug it "
-				 "in",
-				 where, path, strerror(code));
-	}
-}
-
 /* "PATH:RATE" or "PATH"; a path may have colons of its own. 0 or -EINVAL. */
 static int parse_polhemus_tty(struct polhemus_tty *tty, const char *arguments)
 {
@@ -239,11 +192,11 @@ struct polhemus_line *polhemus_tty_open(const char *arguments, const char *where
 	strcpy(tty->line.name, tail);
 	tty->fd = incise_tty_open(tty->path, tty->speed);
 	if (tty->fd < 0) {
-		struct incise_error none;
+		int rc = incise_tty_refuse(tty->path, -tty->fd, where,
+					   "that of a tracker", err);
 
-		refuse_polhemus_tty(tty->path, -tty->fd, where, err ? err : &none);
 		free(tty);
-		errno = err ? err->code : none.code;
+		errno = -rc;
 		return NULL;
 	}
 	return &tty->line;

@@ -165,11 +165,7 @@ static int connect_2209(struct tmc_driver *d,
 	d->fd = incise_tty_open(path, B115200);
 	if (d->fd >= 0)
 		return 0;
-	return incise_error_set(
-		err, -d->fd,
-		"%s: %s: %s; name the serial line of the chip, which this user may open "
-		"and no other program uses",
-		request->where, path, strerror(-d->fd));
+	return incise_tty_refuse(path, -d->fd, request->where, "that of the chip", err);
 }
 
 static int fill_2209(const struct tmc_driver *d, struct tmc_row *rows, double *most_A)

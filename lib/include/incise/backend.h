@@ -251,6 +251,7 @@ struct incise_actuator_can {
 	double acceleration_per_turn_s2;  /**< acceleration units per turn/s² */
 	double following_mm, following_s; /**< largest following error, longest time */
 	double start_s;			  /**< longest time to operation enabled */
+	double answer_s;		  /**< longest time for the answer of an SDO */
 	int homing_method;		  /**< number in CiA 402; 0: it cannot home */
 	bool absolute;		      /**< the encoder keeps its count without power */
 	double position_gain_1_s;     /**< csv: mm/s per mm */

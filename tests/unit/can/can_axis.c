@@ -313,11 +313,14 @@ TEST(each_reason_has_its_own_line)
 		{CAN_AXIS_FOREIGN, 0, 0, "another program"},
 		{CAN_AXIS_OFF_TARGET, 200, 0, "by 1.5 mm"},
 		{CAN_AXIS_NO_START, CIA402_READY, 0, "remains in ready to switch on"},
+		{CAN_AXIS_NO_MODE, 0, 0, "in the mode none (0)"},
 		{CAN_AXIS_NO_HOME, 0, 0, "its homing failed"},
 		{CAN_AXIS_HOME_TIME, 0, 0, "not done in time"},
 		{CAN_AXIS_OUTSIDE, -100, 0, "to -0.750 mm"},
 		{CAN_AXIS_STOOD_STILL, 3000, 0, "was stopped for 3000 ms"},
 		{CAN_AXIS_HOME_OLD, 0, 0, "off and on"},
+		{CAN_AXIS_HOME_SPEED, 400, 0, "moved at 3 mm/s by"},
+		{CAN_AXIS_HOME_OPEN, 0, 0, "bit 12 of its statusword set"},
 		{CAN_AXIS_NO_STOP, CIA402_ENABLED, 0, "operation enabled: switch"},
 	};
 	struct can_axis axis = {.setup.step_mm = 0.0075};

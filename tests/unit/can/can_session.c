@@ -62,6 +62,40 @@ TEST(no_step_of_the_start_hangs_or_gives_power)
 		}
 }
 
+/* What is refused of the drive, and names what to do. */
+TEST(a_drive_that_does_not_fit_is_refused)
+{
+	static const struct {
+		bool echoes;
+		int64_t answer_ns;
+		uint32_t feed, increments;
+		const char *says;
+	} cases[] = {
+		{true, 0, 51200, 51200, "switch its echo off"},
+		{false, 350 * MS, 51200, 51200, "larger actuator.can.answer_ms"},
+		{false, 0, 1, 51200, "give counts_per_turn"},
+		{false, 0, 79, 79, "at most 0.05 mm"},
+		{false, 0, 81, 81, NULL},
+		{false, 150 * MS, 51200, 51200, NULL},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_error err = {0};
+
+		can_rig_init(&rig);
+		rig.drive.echoes = cases[i].echoes;
+		rig.drive.answer_ns = cases[i].answer_ns;
+		drive_set(&rig.drive, 0x6092, 1, cases[i].feed);
+		drive_set(&rig.drive, 0x608f, 1, cases[i].increments);
+		can_rig_open(&rig, &err);
+		if (!rig.stepper != !!cases[i].says ||
+		    (cases[i].says && !strstr(err.text, cases[i].says)))
+			fail_msg("case %zu: %s", i, err.text);
+		if (rig.stepper)
+			can_rig_close(&rig);
+	}
+}
+
 TEST(why_it_cannot_begin_is_said)
 {
 	static const struct {

@@ -532,8 +532,9 @@ TEST(it_homes_by_itself)
 }
 
 /*
- * Drives that begin late, keep the bits of their last homing, do not set their count, or set one of their
- * own: homed is only one whose shaft is where its count says, and a good drive always is.
+ * Drives that begin late, keep the bits of their last homing, never report to be there, do not set
+ * their count, or set one of their own: homed is only one whose shaft is where its count says, for
+ * the next program too, and a good drive always is.
  */
 TEST(homed_only_where_the_shaft_is)
 {
@@ -544,15 +545,23 @@ TEST(homed_only_where_the_shaft_is)
 	for (int i = 0; i < n; i++) {
 		bool late = (incise_random_bits(key, drawn++) % (2)),
 		     before = (incise_random_bits(key, drawn++) % (2));
-		int fault = (int)(incise_random_bits(key, drawn++) % (6));
+		/* Units that do not fit: from a hundredth of the speed to hundred times. */
+		double factor = pow(
+			10, (double)(incise_random_bits(key, drawn++) % 401) / 100 - 2);
+		int fault = (int)(incise_random_bits(key, drawn++) % (7));
 		double tolerance =
 			1.1 * COUNTS_PER_MM; /* following_mm, and its braking */
 		int rc;
 
 		can_rig_init(&rig);
+		/* Far enough for its speed to be seen, up to its 607F. */
+		rig.drive.origin = fault == 6 && factor > 1 ? 80000 : 20000;
+		rig.drive.speed_factor = fault == 6 ? factor : 1;
+		/* Its bits are not seen without power: it is homed in each session. */
+		rig.drive.mode_late = !(incise_random_bits(key, drawn++) % 8);
 		can_rig_open_or_fail(&rig);
 		can_rig_enable_or_fail(&rig);
-		if (before) {
+		if (before && fault != 6) {
 			rig.drive.homing_fails = (incise_random_bits(key, drawn++) % (2));
 			rc = incise_stepper_home(rig.stepper, NULL, NULL, &err);
 			assert_int_equal(!rc, !rig.drive.homing_fails);
@@ -567,6 +576,7 @@ TEST(homed_only_where_the_shaft_is)
 		rig.drive.homing_fails = fault == 1;
 		rig.drive.homing_keeps = fault == 2;
 		rig.drive.homing_no_count = fault == 3;
+		rig.drive.homing_no_reached = fault == 5;
 		if (fault == 4)
 			rig.drive.homing_own =
 				(late ? 2.0 : -2.0) * COUNTS_PER_MM *
@@ -579,15 +589,101 @@ TEST(homed_only_where_the_shaft_is)
 		} else {
 			assert_false(can_rig_look(&rig).homed);
 			assert_true(*err.text);
-			if (fault < 1 || fault > 4)
+			if (fault < 1)
 				fail_msg("case %d: %s", i, err.text);
 			refused++;
 		}
-		if (fault == 1 || fault == 4)
+		if (fault == 1 || fault == 4 || fault == 5)
 			assert_true(rc);
+		if (fault == 5)
+			assert_non_null(strstr(err.text, "bit 10"));
+		/* The slow ones also end by their time; between the bounds nothing is seen. */
+		if (fault == 6 && (factor > 2.2 || factor < 0.045))
+			assert_true(rc);
+		if (fault == 6 && factor < 1.8 && factor > 0.055)
+			assert_int_equal(rc, 0);
+		can_rig_close(&rig);
+		/* The drive says the same to the next program, but not to one of another rig.conf. */
+		can_rig_open_or_fail(&rig);
+		if (can_rig_look(&rig).homed != (!rc && !rig.drive.mode_late))
+			fail_msg(
+				"case %d: fault %d, late %d, before %d: %d, then homed %d",
+				i, fault, late, before, rc, !!rc);
+		can_rig_close(&rig);
+		rig.actuator.home_mm = 0.5;
+		can_rig_open_or_fail(&rig);
+		assert_false(can_rig_look(&rig).homed);
 		can_rig_close(&rig);
 	}
 	assert_true(good > n / 5 && refused > n / 5);
+}
+
+/* TPDO1 that is silent for a while on the way: at rest is only where it stands. */
+TEST(at_rest_only_with_a_position_from_there)
+{
+	const int n = cases_of(1000, 50);
+	uint64_t key = cases_seed(8), drawn = 0;
+
+	can_rig_init(&rig);
+	can_rig_open_or_fail(&rig);
+	can_rig_enable_or_fail(&rig);
+	for (int i = 0; i < n; i++) {
+		double to_mm = (double)(incise_random_bits(key, drawn++) % 200) / 20;
+		int from_ms = (int)(incise_random_bits(key, drawn++) % 300);
+		int silent_ms = (int)(incise_random_bits(key, drawn++) % 130);
+
+		for (int ms = 0; ms < 1500; ms += 5) {
+			struct incise_stepper_status s;
+
+			rig.drive.no_tpdo = ms >= from_ms && ms < from_ms + silent_ms;
+			can_rig_hold(&rig, to_mm, 5 * MS);
+			s = can_rig_look(&rig);
+			assert_int_equal(s.faults, 0);
+			if (s.state == INCISE_STEPPER_STATE_READY &&
+			    fabs(s.position_mm - at_mm()) > 1e-3)
+				fail_msg("case %d, %d ms: %g mm, and it is at %g mm", i,
+					 ms, s.position_mm, at_mm());
+		}
+		assert_int_equal(can_rig_look(&rig).state, INCISE_STEPPER_STATE_READY);
+	}
+	can_rig_close(&rig);
+}
+
+/* Its mode is what it is in when it is enabled, or it does not move. */
+TEST(a_mode_that_is_not_taken_is_not_used)
+{
+	can_rig_init(&rig);
+	rig.drive.mode_late = true;
+	can_rig_open_or_fail(&rig);
+	can_rig_enable_or_fail(&rig);
+	can_rig_hold(&rig, 5, 2000 * MS);
+	assert_true(fabs(at_mm() - 5) < 1e-3);
+	assert_int_equal(incise_stepper_disable(rig.stepper, NULL), 0);
+	rig.drive.mode_never = true;
+	assert_int_equal(incise_stepper_enable(rig.stepper, &err), -ETIMEDOUT);
+	assert_non_null(strstr(err.text, "none (0)"));
+	assert_false(drive_powered(&rig.drive));
+	can_rig_close(&rig);
+}
+
+/* Without 607D nothing tells the next program; this one need not be told. */
+TEST(a_drive_without_a_range_is_homed_in_each_session)
+{
+	can_rig_init(&rig);
+	drive_lacks(&rig.drive, 0x607d, -1);
+	can_rig_open_or_fail(&rig);
+	can_rig_enable_or_fail(&rig);
+	succeeds(!incise_stepper_home(rig.stepper, NULL, NULL, &err));
+	assert_true(can_rig_look(&rig).homed);
+	emcy(&rig.drive, true);
+	can_rig_hold(&rig, 0, 500 * MS);
+	assert_false(can_rig_look(&rig).homed);
+	succeeds(!incise_stepper_clear(rig.stepper, &err));
+	assert_true(can_rig_look(&rig).homed);
+	can_rig_close(&rig);
+	can_rig_open_or_fail(&rig);
+	assert_false(can_rig_look(&rig).homed);
+	can_rig_close(&rig);
 }
 
 TEST(homing_can_fail_and_be_stopped)

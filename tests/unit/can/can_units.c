@@ -72,10 +72,12 @@ TEST(limits_are_the_drives_with_room)
 	assert_int_equal(session.setup.following_ms, 50);
 	assert_int_equal(session.setup.deadman_ms, 100);
 	assert_int_equal(session.setup.heartbeat_ms, 25);
+	can_units_range(&session);
+	assert_int_equal(session.setup.position_min, INT32_MIN);
+	assert_int_equal(session.setup.position_max, INT32_MAX);
 	session.is_homed = true;
 	session.axis.zero_counts = 6400;
 	can_units_range(&session);
-	assert_true(session.setup.limited);
 	assert_int_equal(session.setup.position_min, 6400 - 12800);
 	assert_int_equal(session.setup.position_max, 6400 + 21 * 12800);
 	/* Inverted, with a home below 0. */

@@ -252,18 +252,23 @@ TEST(test_silence, setup)
 
 	w->drive.mute = true;
 	assert_int_equal(canopen_read(&w->master, 0x1000, 0, 4, &value), -ETIMEDOUT);
-	assert_int_equal(w->drive.now_ns, t + CANOPEN_ANSWER_NS);
+	assert_int_equal(w->drive.now_ns, t + CANOPEN_ANSWER_NS + CANOPEN_LATE_NS);
+	assert_int_equal(w->master.late_ns, 0);
 	drive_advance(&w->drive, DRIVE_MS);
 	assert_int_equal(w->drive.master_abort, ABORT_TIMEOUT);
 	w->master.answer_ns = 5 * DRIVE_MS;
 	t = w->drive.now_ns;
 	assert_int_equal(canopen_write(&w->master, 0x6060, 0, 1, 8), -ETIMEDOUT);
-	assert_int_equal(w->drive.now_ns, t + 5 * DRIVE_MS);
+	assert_int_equal(w->drive.now_ns, t + 5 * DRIVE_MS + CANOPEN_LATE_NS);
 
 	/* A late answer does not count for the next request. */
 	w->drive.mute = false;
 	w->drive.answer_ns = 10 * DRIVE_MS;
 	assert_int_equal(canopen_read(&w->master, 0x1018, 2, 4, &value), -ETIMEDOUT);
+	assert_in_range(w->master.late_ns, 10 * DRIVE_MS, 11 * DRIVE_MS);
+	w->drive.answer_ns = 500 * DRIVE_MS;
+	assert_int_equal(canopen_read(&w->master, 0x1018, 2, 4, &value), -ETIMEDOUT);
+	assert_int_equal(w->master.late_ns, 0);
 	w->drive.answer_ns = 0;
 	w->master.answer_ns = 0;
 	assert_int_equal(canopen_read(&w->master, 0x1018, 1, 4, &value), 0);
@@ -347,7 +352,8 @@ TEST(test_answers, setup)
 		assert_int_equal(canopen_read(&w->master, 0x1000, 0, 4, &value),
 				 cases[i].rc);
 		assert_int_equal(value, cases[i].value);
-		assert_true(w->drive.now_ns - t <= 2 * CANOPEN_ANSWER_NS);
+		assert_true(w->drive.now_ns - t <=
+			    2 * CANOPEN_ANSWER_NS + CANOPEN_LATE_NS);
 		drive_advance(&w->drive, DRIVE_MS);
 	}
 	script(w, "590#4300100000000000");

@@ -119,9 +119,14 @@ TEST(test_parse_tpdos)
 	uint32_t inputs = 7;
 	uint16_t word = 7;
 	int32_t position = 7;
+	int mode = 7;
 
-	memcpy(frame.data, "\x37\x12\xfe\xff\xff\xff", 6);
-	assert_true(cia402_parse_status(&frame, &word, &position));
+	memcpy(frame.data, "\x37\x12\xfe\xff\xff\xff\xfd", 7);
+	assert_true(cia402_parse_status(&frame, &word, &position, &mode));
+	assert_int_equal(mode, 7);
+	frame.len = 7;
+	assert_true(cia402_parse_status(&frame, &word, &position, &mode));
+	assert_int_equal(mode, -3);
 	assert_int_equal(word, 0x1237);
 	assert_int_equal(position, -2);
 	assert_false(cia402_parse_inputs(&frame, &inputs));
@@ -144,7 +149,7 @@ TEST(test_parse_tpdos)
 	for (size_t i = 0; i < COUNT(wrong); i++) {
 		frame.can_id = wrong[i].id;
 		frame.len = wrong[i].len;
-		assert_false(cia402_parse_status(&frame, &word, &position));
+		assert_false(cia402_parse_status(&frame, &word, &position, &mode));
 	}
 	assert_int_equal(word, 7);
 	assert_int_equal(position, 7);
@@ -298,8 +303,8 @@ TEST(test_units, setup)
 		{"608F=4096/1 6091=1/1 60A8=00B50000 60A9=00B44700 60AA=00C00300",
 		 {4096, 60, 60}},
 		/* Increments/s behind a gear. */
-		{"6092=1000/1 608F=4000/1 6091=3/1 60A9=00B50300 60AA=00B55700",
-		 {1000, 12000, 12000}},
+		{"6092=12000/1 608F=4000/1 6091=3/1 60A9=00B50300 60AA=00B55700",
+		 {12000, 12000, 12000}},
 		/* Degrees/s, ten of them/s²; radians; gon/min; minutes and seconds of arc. */
 		{"6092=51200/1 60A9=00410300 60AA=01415700", {51200, 360, 36}},
 		{"6092=51200/1 60A9=00100300 60AA=00105700",
@@ -340,6 +345,9 @@ TEST(test_refused_units, setup)
 		{"608F=4000/1 6091=1/0", "counts_per_turn"},
 		/* More than a position can hold. */
 		{"608F=4294967294/1 6091=4294967294/1", "counts_per_turn"},
+		/* Which of the two it counts by, nobody knows. */
+		{"6092=1/1 608F=51200/1", "counts_per_turn"},
+		{"6092=12000/1 608F=4000/1 6091=2/1", "counts_per_turn"},
 		{"6092=1000/1 608F=4000/1 6091=1/1 60A8=00AA0000", "counts_per_turn"},
 		{"6092=1000/1 608F=4000/1 6091=1/1 60A8=80410000", "counts_per_turn"},
 		{"6092=1000/1 608F=4000/1 6091=1/1 60A8=7F410000", "counts_per_turn"},
@@ -509,6 +517,10 @@ TEST(test_set_mode, setup)
 	assert_int_equal(cia402_set_mode(&led->client, CIA402_CSP), -ETIMEDOUT);
 	assert_non_null(strstr(led->err.text, "CSP (8)"));
 	assert_non_null(strstr(led->err.text, "homing (6)"));
+	/* It keeps the mode, and shows it with power. */
+	d->od[OD_MODE].deaf = false;
+	d->mode_late = true;
+	assert_int_equal(cia402_set_mode(&led->client, CIA402_CSP), 1);
 }
 
 static bool homed(struct led *led, int rc)

@@ -52,9 +52,7 @@ TEST(test_objects, setup)
 	for (size_t i = 0; i < COUNT(cases); i++)
 		assert_int_equal(led_value(led, cases[i].index, cases[i].sub),
 				 cases[i].value);
-	assert_true(led->supported.inputs && led->supported.position_limit &&
-		    led->supported.velocity_limit && led->supported.acceleration_limit &&
-		    led->supported.following_limit);
+	assert_true(led->supported.inputs);
 	assert_int_equal(led->drive.nmt, CANOPEN_OPERATIONAL);
 	assert_int_equal(led->drive.state, CIA402_DISABLED);
 	assert_int_equal(led->drive.enables, 0);
@@ -86,12 +84,9 @@ TEST(test_absences, setup)
 	} cases[] = {
 		{"60FD 1801", 0, offsetof(struct cia402_supported, inputs)},
 		{"1801:5", 0, offsetof(struct cia402_supported, inputs_timed)},
-		{"607D", 0, offsetof(struct cia402_supported, position_limit)},
-		{"607F", 0, offsetof(struct cia402_supported, velocity_limit)},
-		{"60C5", 0, offsetof(struct cia402_supported, acceleration_limit)},
-		{"6065", 0, offsetof(struct cia402_supported, following_limit)},
-		{"1400:5 1801:3 1006 1007 1029 6085 60C6 6072 6502 1401 1802", 0,
-		 SIZE_MAX},
+		{"1400:5 1801:3 1006 1007 1029 607D 607F 60C5 6065 6085 60C6 6072 6502 1401 "
+		 "1802",
+		 0, SIZE_MAX},
 		{"1005 1016 1017 1400 1800 6007 605A 6060 6064 607A 60C2", -EOPNOTSUPP,
 		 0},
 	};
@@ -319,17 +314,18 @@ TEST(test_unmapped_inputs, setup)
 	assert_int_equal(led_configure(led), 0);
 	assert_false(led->supported.inputs);
 	assert_true(led_value(led, 0x1801, 1) & 0x80000000);
-	assert_true(led->supported.position_limit);
 }
 
 /* Old limits do not stay: without homing there is no range. */
 TEST(test_unlimited, setup)
 {
+	bool has;
+
 	drive_set(&led->drive, 0x607d, 1, 5);
 	drive_set(&led->drive, 0x607d, 2, 9);
-	led->setup.limited = false;
+	led->setup.position_min = INT32_MIN;
+	led->setup.position_max = INT32_MAX;
 	assert_int_equal(led_configure(led), 0);
-	assert_false(led->supported.position_limit);
 	assert_int_equal((int32_t)led_value(led, 0x607d, 1), INT32_MIN);
 	assert_int_equal((int32_t)led_value(led, 0x607d, 2), INT32_MAX);
 	assert_int_equal(cia402_set_range(&led->client, 10, 20), 0);
@@ -337,6 +333,14 @@ TEST(test_unlimited, setup)
 	assert_int_equal(led_value(led, 0x607d, 1), 30);
 	assert_int_equal(led_value(led, 0x607d, 2), 40);
 	assert_int_equal(cia402_set_range(&led->client, 40, 40), -EINVAL);
+	assert_int_equal(cia402_has_range(&led->client, 30, 40, &has), 0);
+	assert_true(has);
+	assert_int_equal(cia402_has_range(&led->client, 30, 41, &has), 0);
+	assert_false(has);
+	drive_lacks(&led->drive, 0x607d, -1);
+	assert_int_equal(cia402_has_range(&led->client, 30, 40, &has), 0);
+	assert_false(has);
+	assert_int_equal(cia402_set_range(&led->client, 30, 40), 0);
 }
 
 /* Limits that are not set here stay the drive's. */
@@ -348,8 +352,6 @@ TEST(test_left_alone, setup)
 	led->setup.velocity = led->setup.acceleration = led->setup.following = 0;
 	led->setup.torque_permille = 0;
 	assert_int_equal(led_configure(led), 0);
-	assert_false(led->supported.velocity_limit || led->supported.acceleration_limit ||
-		     led->supported.following_limit);
 	assert_int_equal(led_value(led, 0x607f, 0), 7);
 	assert_int_equal(led_value(led, 0x60c5, 0), 8);
 	assert_int_equal(led_value(led, 0x6065, 0), 9);

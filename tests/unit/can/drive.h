@@ -174,15 +174,20 @@ struct drive {
 	bool homing_fails;
 	int64_t homing_late_ns; /* homing begins so late; until then its old bits stay … */
 	bool homing_keeps;	/* … and never fall: it does not begin */
-	bool homing_no_count; /* the count is not set at the switch … */
-	double homing_own;    /* … or to a position of its own, counts */
-	double gives_way;     /* counts that its shaft jumps when its brake opens */
-	bool no_tpdo;	      /* TPDO1 is not sent */
-	bool twice;	      /* each frame of it comes twice */
-	int send_error;	      /* of bus->ops->send, such as -ENOBUFS … */
-	uint32_t send_first;  /* so many frames are sent well before it starts */
-	uint32_t send_errors; /* … for so many frames; 0: until it is taken back */
-	int sync_error;	      /* likewise, of SYNCs alone */
+	bool homing_no_reached; /* bit 10 is never set in homing mode */
+	bool homing_no_count;	/* the count is not set at the switch … */
+	double homing_own;	/* … or to a position of its own, counts */
+	bool echoes;		/* its adapter sends back what it is sent */
+	bool mode_late;		/* 6061 is 0 until operation is enabled … */
+	bool mode_never;	/* … and then, too */
+	double speed_factor;	/* its unit of velocity is so many of what it reports */
+	double gives_way;	/* counts that its shaft jumps when its brake opens */
+	bool no_tpdo;		/* TPDO1 is not sent */
+	bool twice;		/* each frame of it comes twice */
+	int send_error;		/* of bus->ops->send, such as -ENOBUFS … */
+	uint32_t send_first;	/* so many frames are sent well before it starts */
+	uint32_t send_errors;	/* … for so many frames; 0: until it is taken back */
+	int sync_error;		/* likewise, of SYNCs alone */
 	int receive_error, wait_error; /* of the bus */
 	int can_state;		       /* of bus->ops->state */
 	uint32_t inputs;	       /* 60FD */
@@ -402,7 +407,7 @@ static inline uint16_t drive_statusword(const struct drive *d)
 	unsigned int word = bits[d->state] | 0x10 | CIA402_REMOTE;
 
 	if (d->od[OD_MODE_NOW].value == CIA402_HOMING) {
-		word |= d->homing ? 0 : CIA402_TARGET_REACHED;
+		word |= d->homing || d->homing_no_reached ? 0 : CIA402_TARGET_REACHED;
 		word |= d->homed ? CIA402_HOMED : 0;
 		word |= d->homing_error ? CIA402_FOLLOWING_ERROR : 0;
 	} else if (d->state == CIA402_ENABLED) {
@@ -418,6 +423,14 @@ static inline void drive_refresh(struct drive *d)
 	d->od[OD_STATUSWORD].value = drive_statusword(d);
 	d->od[OD_POSITION].value = (uint32_t)(int32_t)lrint(most);
 	d->od[OD_INPUTS].value = d->inputs;
+}
+
+/* What it reports of an object. */
+static inline uint32_t drive_shown(const struct drive *d, const struct drive_object *o)
+{
+	bool hidden = d->mode_never || (d->mode_late && d->state != CIA402_ENABLED);
+
+	return o == &d->od[OD_MODE_NOW] && hidden ? 0 : o->value;
 }
 
 /* --- motion --- */
@@ -452,7 +465,7 @@ static inline void drive_latch(struct drive *d)
 static inline double drive_homing(struct drive *d, double dt)
 {
 	double off = -5000 - (d->position + d->origin);
-	double step = d->od[OD_HOMING_SPEED].value * dt;
+	double step = d->od[OD_HOMING_SPEED].value * d->speed_factor * dt;
 
 	if (!d->homing)
 		return 0;
@@ -632,12 +645,14 @@ static inline void drive_send_tpdo(struct drive *d, const struct drive_object *p
 {
 	unsigned int at = 0;
 	uint8_t bytes[8] = {0};
+	uint32_t value;
 
 	drive_refresh(d);
 	for (uint32_t i = 0; i < pdo[PDO_COUNT].value; i++) {
 		const struct drive_object *o = drive_mapped(d, pdo[PDO_MAP + i].value);
 
-		memcpy(bytes + at, &o->value, o->size);
+		value = drive_shown(d, o);
+		memcpy(bytes + at, &value, o->size);
 		at += o->size;
 	}
 	drive_say_bytes(d, pdo[PDO_COB].value, bytes, at);
@@ -725,10 +740,12 @@ static inline void drive_upload(struct drive *d, const struct drive_object *o,
 				const uint8_t request[8])
 {
 	uint8_t bytes[8] = {0, request[1], request[2], request[3]};
+	uint32_t value;
 
 	drive_refresh(d);
+	value = drive_shown(d, o);
 	bytes[0] = (uint8_t)(0x43 | (4 - o->size) << 2);
-	memcpy(bytes + 4, &o->value, o->size); /* little-endian, as here */
+	memcpy(bytes + 4, &value, o->size); /* little-endian, as here */
 	drive_answer(d, bytes);
 }
 
@@ -946,6 +963,8 @@ static inline int drive_send(struct can_bus *bus, const struct can_frame *frame)
 		d->send_error = 0;
 	bus->counts.full += rc == -ENOBUFS;
 	bus->counts.sent += !rc;
+	if (!rc && d->echoes)
+		drive_say(d, frame);
 	if (!rc)
 		drive_process(d, frame);
 	return rc;
@@ -1022,6 +1041,7 @@ static inline void drive_init(struct drive *d)
 	d->latency_ns = DRIVE_LATENCY_NS;
 	d->enable_ns = 5 * DRIVE_MS;
 	d->torque_counts_s2 = 100;
+	d->speed_factor = 1;
 	memcpy(d->od, objects, sizeof(objects));
 	for (int i = 0; i < OD_N; i++)
 		if (d->od[i].access & OF_NODE)

@@ -25,7 +25,6 @@ static inline void led_init(struct led *led)
 			  .deadman_ms = LED_DEADMAN_MS,
 			  .master = LED_MASTER,
 			  .heartbeat_ms = 20,
-			  .limited = true,
 			  .position_min = -100,
 			  .position_max = 200000,
 			  .velocity = 50000,

@@ -67,6 +67,7 @@ static inline void can_rig_init(struct can_rig *rig)
 			.following_mm = 1,
 			.following_s = 0.05,
 			.start_s = 0.5,
+			.answer_s = 0.2,
 			.homing_method = 17,
 			.position_gain_1_s = 20,
 			.master = 127},

@@ -74,6 +74,10 @@ static const struct {
 	{"z\r\a", 3, SLCAN_REFUSED},
 	{"\nF80\r", 5, SLCAN_FLAGS},
 	{"sb256256\r", 9, SLCAN_STATE},
+	/* timestamps */
+	{"t1231AA12F4\r", 12, SLCAN_FRAME},
+	{"t1231AA0012F4E0\r", 16, SLCAN_FRAME},
+	{"T1FFFFFFF81122334455667788000EA5F0\r", 35, SLCAN_FRAME},
 	/* commands of another host, or answers to one */
 	{"C\r", 2, SLCAN_OTHER},
 	{"S8\r", 3, SLCAN_OTHER},
@@ -97,6 +101,8 @@ static const struct {
 	{"t1231AAB\r", 9, SLCAN_BROKEN},
 	{"t1231AABBCCD\r", 13, SLCAN_BROKEN},
 	{"t1231AA12G4\r", 12, SLCAN_BROKEN},
+	{"t1231AA12F4E0\r", 14, SLCAN_BROKEN},
+	{"t1231AA0012G4E0\r", 16, SLCAN_BROKEN},
 	{"t1231At\r", 8, SLCAN_BROKEN},
 	{"T200000000\r", 11, SLCAN_BROKEN},
 	{"T1234567\r", 9, SLCAN_BROKEN},

@@ -25,7 +25,7 @@
 static struct {
 	int socket_error, option_error, bind_error, poll_error;
 	int down, query_error;
-	uint32_t bitrate, restart_ms;
+	uint32_t bitrate;
 	int state;
 	int opened, bound;
 	/* set by options */
@@ -126,7 +126,6 @@ int __wrap_can_netlink_query(const char *name, struct can_netlink *link)
 	strcpy(link->kind, is_can0 ? "can" : is_can ? "vcan" : "");
 	if (is_can0) {
 		link->bitrate = kernel.bitrate;
-		link->restart_ms = kernel.restart_ms;
 		link->state = kernel.state;
 	}
 	return 0;
@@ -210,7 +209,6 @@ static void kernel_init(void)
 	kernel.now_ns = 1000 * S;
 	kernel.wall_ns = 1700000000 * S;
 	kernel.bitrate = 1000000;
-	kernel.restart_ms = 100;
 	kernel.state = CAN_STATE_ERROR_WARNING;
 }
 
@@ -292,15 +290,15 @@ TEST(settings_are_those_of_the_kernel)
 {
 	static const struct {
 		const char *device;
-		uint32_t set, asked_for, bitrate, restart_ms;
+		uint32_t set, asked_for, bitrate;
 		int state;
 		const char *name;
 	} cases[] = {
-		{"can0", 1000000, 0, 1000000, 100, CAN_STATE_ERROR_WARNING, "can0"},
-		{"can0", 1000000, 1000000, 1000000, 100, CAN_STATE_ERROR_WARNING, "can0"},
-		{"can0", 0, 500000, 0, 100, CAN_STATE_ERROR_WARNING, "can0"},
-		{"adapter", 500000, 500000, 500000, 100, CAN_STATE_ERROR_WARNING, "can0"},
-		{"vcan0", 1000000, 500000, 0, 0, -EOPNOTSUPP, "vcan0"},
+		{"can0", 1000000, 0, 1000000, CAN_STATE_ERROR_WARNING, "can0"},
+		{"can0", 1000000, 1000000, 1000000, CAN_STATE_ERROR_WARNING, "can0"},
+		{"can0", 0, 500000, 0, CAN_STATE_ERROR_WARNING, "can0"},
+		{"adapter", 500000, 500000, 500000, CAN_STATE_ERROR_WARNING, "can0"},
+		{"vcan0", 1000000, 500000, 0, -EOPNOTSUPP, "vcan0"},
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
@@ -309,7 +307,6 @@ TEST(settings_are_those_of_the_kernel)
 		assert_int_equal(
 			open_bus(&bus, cases[i].device, cases[i].asked_for, 0, &err), 0);
 		assert_int_equal(bus->bitrate, cases[i].bitrate);
-		assert_int_equal(bus->restart_ms, cases[i].restart_ms);
 		assert_int_equal(bus->ops->state(bus), cases[i].state);
 		assert_string_equal(bus->name, cases[i].name);
 		bus->ops->close(bus);

@@ -54,7 +54,6 @@ enum {
 	BITRATE = 100,
 	STATE = 148,
 	STATE_VALUE = 152,
-	RESTART = 160,
 	END = 172,
 };
 
@@ -117,7 +116,6 @@ TEST(a_controller_is_told)
 		assert_int_equal(link.index, 5);
 		assert_true(link.is_can && link.is_up);
 		assert_int_equal(link.bitrate, 500000);
-		assert_int_equal(link.restart_ms, 100);
 		assert_int_equal(link.state, CAN_STATE_ERROR_PASSIVE);
 		/* In any order: the data before their kind. */
 		memcpy(m.bytes + KIND, usual.bytes + DATA, END - DATA);
@@ -141,7 +139,6 @@ TEST(what_is_not_known_is_not_made_up)
 	put16(&m, DATA + 2, 0x802a); /* no data */
 	assert_int_equal(parse_message(&m, &link), 1);
 	assert_int_equal(link.bitrate, 0);
-	assert_int_equal(link.restart_ms, 0);
 	assert_int_equal(link.state, -EOPNOTSUPP);
 }
 
@@ -174,7 +171,6 @@ TEST(other_kinds_tell_no_rate)
 		assert_string_equal(link.kind, cases[i].is);
 		assert_int_equal(link.is_can, cases[i].type == ARPHRD_CAN);
 		assert_int_equal(link.bitrate, 0);
-		assert_int_equal(link.restart_ms, 0);
 		assert_int_equal(link.state, -EOPNOTSUPP);
 	}
 }
@@ -188,9 +184,7 @@ TEST(what_has_not_its_size_is_refused)
 	} cases[] = {
 		{TIMING, 4 + sizeof(struct can_bittiming) - 1, -EBADMSG},
 		{STATE, 4 + 3, -EBADMSG},
-		{STATE, 4 + 8, -EBADMSG}, /* with the empty one behind it */
-		{RESTART, 4 + 2, -EBADMSG},
-		{RESTART, 4 + 8, -EBADMSG},
+		{STATE, 4 + 8, -EBADMSG},     /* with the empty one behind it */
 		{DATA, 3, -EBADMSG},	      /* less than its own header */
 		{DATA, 999, -EBADMSG},	      /* more than there is */
 		{DATA, 43, -EBADMSG},	      /* ends within an attribute */

@@ -99,6 +99,7 @@ TEST(every_range_ends_where_the_manual_says)
 		{"following_mm", "0.0009", "0.001", "20", "20.001"},
 		{"following_ms", "0.9", "1", "10000", "10001"},
 		{"start_ms", "9", "10", "60000", "60001"},
+		{"answer_ms", "9", "10", "2000", "2001"},
 		{"homing_method", "-129", "-128", "127", "128"},
 		{"position_gain_1_s", "0.09", "0.1", "10000", "10001"},
 		{"stiffness_permille_mm", "0.0009", "0.001", "1000000", "1000001"},

@@ -267,7 +267,7 @@ TEST(settings_that_the_chip_lacks, begin, end)
 	strcpy(a.driver, "tmc2209:0");
 	refuse_setting(a, EINVAL, "tmc2209:TTY:NODE");
 	strcpy(a.driver, "tmc2209:/nowhere:0");
-	refuse_setting(a, ENOENT, "/nowhere");
+	refuse_setting(a, ENODEV, "/nowhere");
 }
 
 static unsigned int wait_for_fault(struct incise_driver *driver)

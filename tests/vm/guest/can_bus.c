@@ -304,7 +304,7 @@ int main(int argc, char **argv)
 		note("%s", err.text);
 		return 0;
 	}
-	check(!bus->bitrate && !bus->restart_ms && bus->ops->state(bus) == -EOPNOTSUPP,
+	check(!bus->bitrate && bus->ops->state(bus) == -EOPNOTSUPP,
 	      "it has no bit rate and no state");
 	check(!bus->ops->send(bus, &frame) &&
 		      read(peer, &seen, sizeof(seen)) == sizeof(seen) &&

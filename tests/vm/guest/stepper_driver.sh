@@ -44,7 +44,7 @@ check "cleared" says 0 "" stepper clear
 check "homed again" says 0 "homed, at 0.0000 mm" stepper home
 kill $chip
 wait $chip 2>/dev/null
-check "without the chip the rig is not opened" says 1 "name the serial line of the chip" stepper home
+check "without the chip the rig is not opened" says 1 "plug" stepper home
 cd /
 echo 0 >$config/bench/live
 rmdir $config/bench/motor0 $config/bench

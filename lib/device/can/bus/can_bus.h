@@ -62,9 +62,8 @@ struct can_bus_counts {
 
 struct can_bus {
 	const struct can_bus_ops *ops;
-	char name[40];	     /* "can0", "/dev/ttyACM0": for messages */
-	uint32_t bitrate;    /* bit/s; 0: no bit rate (vcan), or unknown */
-	uint32_t restart_ms; /* automatic restart after bus-off; 0: no restart */
+	char name[40];	  /* "can0", "/dev/ttyACM0": for messages */
+	uint32_t bitrate; /* bit/s; 0: no bit rate (vcan), or unknown */
 	struct can_bus_counts counts;
 };
 

@@ -120,50 +120,6 @@ static ssize_t tty_read(struct slcan_tty *tty, void *bytes, size_t size)
 	return n ? n : tty_failed(tty, EIO);
 }
 
-static int refuse_tty(const char *path, int code, const char *where,
-		      struct incise_error *err)
-{
-	switch (code) {
-	case ENOENT:
-	case ENXIO:
-	case ENODEV:
-		return incise_error_set(err, ENODEV,
-					"%s: no such device %s; plug in the adapter; "
-					"/dev/serial/by-id lists the serial ports",
-					where, path);
-	case EACCES:
-	case EPERM:
-		return incise_error_set(
-			err, EACCES,
-			"%s: no permission to open %s; join its group, usually dialout",
-			where, path);
-	case EBUSY:
-	case EWOULDBLOCK:
-		return incise_error_set(err, EBUSY,
-					"%s: another program has %s open; end it first",
-					where, path);
-	case ENOTTY:
-	case EINVAL:
-		return incise_error_set(
-			err, EINVAL,
-			"%s: %s is not a serial port; expected the tty of an slcan "
-			"adapter, for example /dev/ttyACM0",
-			where, path);
-	case ENOMEM:
-		return incise_error_set(err, ENOMEM, "%s: out of memory", where);
-	default:
-		return incise_error_set(err, EIO, "%s: %s: %s", where, path,
-					strerror(code));
-	}
-}
-
-static int tty_open(struct slcan_tty *tty, const char *path, const char *where,
-		    struct incise_error *err)
-{
-	*tty = (struct slcan_tty){.fd = incise_tty_open(path, B0)};
-	return tty->fd < 0 ? refuse_tty(path, -tty->fd, where, err) : 0;
-}
-
 /*
  * Send @last and wait until the adapter has read it, 100 ms at most. Then flush the rest, as
  * close() of a tty may wait 30 s for it; but only then, as flushing a pty also discards bytes
@@ -455,9 +411,10 @@ static int slcan_open(struct can_bus **bus, const struct can_bus_request *reques
 	snprintf(s->bus.name, sizeof(s->bus.name), "%.39s", path);
 	/* The adapter may refuse each: C when it is closed, S when it has one rate only … */
 	slcan_status_init(&s->status, START_COMMANDS, slcan_now(&s->bus));
-	rc = tty_open(&s->tty, path, request->where, err);
-	if (!rc)
-		rc = start_slcan(s, request, err);
+	s->tty.fd = incise_tty_open(path, B0);
+	rc = s->tty.fd < 0 ? incise_tty_refuse(path, -s->tty.fd, request->where,
+					       "the tty of an slcan adapter", err)
+			   : start_slcan(s, request, err);
 	if (rc) {
 		free(s);
 		return rc;

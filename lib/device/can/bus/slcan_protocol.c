@@ -46,8 +46,9 @@ static enum slcan_kind parse_frame(const char *text, unsigned int n,
 	frame->can_id = id | (extended ? CAN_EFF_FLAG : 0) | (remote ? CAN_RTR_FLAG : 0);
 	frame->can_dlc = (uint8_t)(text[at - 1] - '0');
 	end = at + (remote ? 0 : 2u * frame->can_dlc);
-	/* With a timestamp of four digits or without; other lengths come of lost bytes. */
-	if (n != end && (n != end + 4 || !parse_hex(text + end, 4, &value)))
+	/* With a timestamp of 4 or 8 digits or without; other lengths come of lost bytes. */
+	if (n != end &&
+	    ((n != end + 4 && n != end + 8) || !parse_hex(text + end, n - end, &value)))
 		return SLCAN_BROKEN;
 	for (unsigned int i = 0; at < end; i++, at += 2) {
 		if (!parse_hex(text + at, 2, &value))

@@ -5,8 +5,8 @@
  *
  *   t123 2 AABB [01F4] ╮  data, 11 bit       r1232   remote    z, Z, ""  done
  *   T12345678 2 AABB   ├╴ data, 29 bit       R…      remote    BEL       refused
- *     id      │ data   ╯  timestamp, ms,     F80     status    saXXXYYY  state (newer ones)
- *             ╰ bytes, 0 … 8   if on
+ *     id      │ data   ╯  timestamp if on:   F80     status    saXXXYYY  state (newer ones)
+ *             ╰ bytes, 0 … 8   4 digits, of some adapters 8
  *
  * A line ends with CR, or is a BEL. Anything else is reported once and skipped to its end.
  */
@@ -19,7 +19,7 @@
 #include <linux/can.h>
 
 /* The longest line without its CR: "T", 8 digits, length, 16 digits, timestamp. */
-#define SLCAN_LINE_MAX 30
+#define SLCAN_LINE_MAX 34
 
 enum slcan_kind {
 	SLCAN_NONE,    /* an unfinished line, or an acknowledgement */

@@ -312,7 +312,6 @@ static int look_up(struct socketcan *s, const struct can_bus_request *request,
 			strcmp(link.kind, "can") ? "" : " type can bitrate 1000000");
 	memcpy(s->bus.name, link.name, sizeof(link.name));
 	s->bus.bitrate = link.bitrate;
-	s->bus.restart_ms = link.restart_ms;
 	s->state = link.state;
 	rc = check_rate(s, request, err);
 	return rc ? rc : link.index;

@@ -84,11 +84,6 @@ static int read_controller(struct can_netlink *link, const struct nlattr *attr)
 		if (mnl_attr_get_u32(attr) < CAN_STATE_MAX)
 			link->state = (int)mnl_attr_get_u32(attr);
 		return 0;
-	case IFLA_CAN_RESTART_MS:
-		if (size != sizeof(uint32_t))
-			return -EBADMSG;
-		link->restart_ms = mnl_attr_get_u32(attr);
-		return 0;
 	default:
 		return 0;
 	}

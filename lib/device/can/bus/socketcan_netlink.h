@@ -21,9 +21,8 @@ struct can_netlink {
 	char kind[16];		/* "can", "vcan" …; "": no kind */
 	int index;
 	bool is_can, is_up;
-	uint32_t bitrate;    /* bit/s; 0: no bit rate, or unknown to the driver */
-	uint32_t restart_ms; /* automatic restart after bus-off; 0: no restart */
-	int state;	     /* enum can_state; -EOPNOTSUPP: not reported */
+	uint32_t bitrate; /* bit/s; 0: no bit rate, or unknown to the driver */
+	int state;	  /* enum can_state; -EOPNOTSUPP: not reported */
 };
 
 /*

@@ -119,6 +119,10 @@ uint32_t canopen_handle(struct canopen *master, const struct can_frame *frame,
 	case CANOPEN_SDO_ANSWER:
 		handle_answer(master, frame);
 		return function;
+	case CANOPEN_SDO_REQUEST:
+		master->echoes +=
+			frame->len == 8 && !memcmp(frame->data, master->request, 8);
+		return 0;
 	case CANOPEN_TPDO1:
 	case CANOPEN_TPDO2:
 	case 0x380:
@@ -231,6 +235,8 @@ static int send_request(struct canopen *master, const uint8_t request[8],
 	int rc;
 
 	memcpy(frame.data, request, 8);
+	memcpy(master->request, request, 8);
+	master->requests++;
 	for (;;) {
 		rc = bus->ops->send(bus, &frame);
 		if (rc != -ENOBUFS)
@@ -267,9 +273,11 @@ static int exchange(struct canopen *master, const uint8_t request[8],
 	struct canopen_answer *answer = &master->answer;
 	int64_t timeout_ns =
 		master->answer_ns > 0 ? master->answer_ns : CANOPEN_ANSWER_NS;
+	int64_t sent_ns;
 	/* Earlier answers belong to earlier requests. */
 	int rc = canopen_await(master, NULL, bus->ops->now(bus));
 
+	master->late_ns = 0;
 	if (rc)
 		return rc;
 	rc = send_request(master, request, bus->ops->now(bus) + timeout_ns);
@@ -280,7 +288,12 @@ static int exchange(struct canopen *master, const uint8_t request[8],
 		.segment = (request[0] & 0xe0) == SEGMENT,
 	};
 	memcpy(answer->object, object, sizeof(answer->object));
-	rc = canopen_await(master, answered, bus->ops->now(bus) + timeout_ns);
+	sent_ns = bus->ops->now(bus);
+	rc = canopen_await(master, answered, sent_ns + timeout_ns);
+	/* A slow node is not an absent one. */
+	if (rc == -ETIMEDOUT &&
+	    !canopen_await(master, answered, sent_ns + timeout_ns + CANOPEN_LATE_NS))
+		master->late_ns = bus->ops->now(bus) - sent_ns;
 	answer->wanted = false;
 	if (rc == -ETIMEDOUT)
 		return abort_transfer(master, object, ABORT_TIMEOUT, rc);

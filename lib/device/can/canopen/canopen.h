@@ -68,8 +68,12 @@ struct canopen {
 	uint32_t foreign;
 
 	uint32_t abort; /* code of the last aborted SDO */
+	int64_t late_ns; /* after which the answer came that the last SDO did not wait for; 0 */
+	/* Requests sent, and how many of them came back as they were: an adapter's echo. */
+	uint32_t requests, echoes;
 
 	/* private */
+	uint8_t request[8]; /* the last one */
 	int64_t next_heartbeat_ns;
 	/* The answer that an SDO waits for: about this object, or the next segment. */
 	struct canopen_answer {
@@ -84,6 +88,7 @@ void canopen_pack(uint8_t *bytes, int n, uint32_t value);
 uint32_t canopen_unpack(const uint8_t *bytes, int n);
 
 #define CANOPEN_ANSWER_NS 200000000 /* ample also for a busy drive */
+#define CANOPEN_LATE_NS 400000000   /* more, in which a late answer is only noted */
 
 /*
  * Handle a received frame: heartbeats, boot-ups, EMCYs and error frames update @master. For
@@ -113,7 +118,7 @@ int canopen_await(struct canopen *master, bool (*done)(const struct canopen *mas
 
 /*
  * Read or write an object by SDO. Both return 0; -EREMOTEIO (aborted: master->abort),
- * -ETIMEDOUT (no answer; the node receives an abort), -EPROTO (an invalid answer, or one of
+ * -ETIMEDOUT (no answer, or late_ns; the node receives an abort), -EPROTO (an invalid answer, or one of
  * another size), -EINTR, or an error of the bus. Answers about other objects, which another
  * master requested, are skipped.
  *

@@ -16,6 +16,13 @@
 #define OBEY_NS (20 * MS)    /* from the command to the start of a quick stop */
 #define OLD_BITS_NS \
 	(5000 * MS) /* from the command to homing: the bits of the last one fall */
+#define STAND_NS (1000 * MS) /* homed at rest: bit 10 of the statusword comes */
+/* Homing: its speed by its position, against that which it was given. */
+#define GAUGE_NS (100 * MS)
+#define GAUGE_COUNTS 8	   /* less in that time is noise */
+#define TOO_FAST 2	   /* times home_mm_s */
+#define TOO_SLOW (0.1 / 2) /* half of the speed to zero, 6099:2 */
+#define REST_ANSWERS 2	   /* of which the second was sampled at rest */
 #define INPUTS_NS (3 * CIA402_INPUTS_MS * MS)
 #define OPEN_CYCLES 10	  /* without an answer, in csv and cst … */
 #define OPEN_NS (20 * MS) /* … and at least that */
@@ -91,8 +98,7 @@ static int32_t next_target(struct can_axis *axis)
 	return mode_target(axis, &slot);
 }
 
-/* Returns whether the drive is within the limits, so that its first target is no jump. */
-static bool is_within(const struct can_axis *axis)
+bool can_axis_is_within(const struct can_axis *axis)
 {
 	const struct incise_stepper_config *config = &axis->motion.config;
 	int64_t slack = 1 + (int64_t)config->velocity * config->tick_ns / 1000000000;
@@ -187,7 +193,7 @@ static void handle_status(struct can_axis *axis, const struct can_frame *frame)
 {
 	int32_t before = axis->position;
 
-	if (!cia402_parse_status(frame, &axis->statusword, &axis->position))
+	if (!cia402_parse_status(frame, &axis->statusword, &axis->position, &axis->mode))
 		return;
 	if (axis->has_status)
 		axis->speed += SMOOTH * ((double)axis->position - before - axis->speed);
@@ -280,6 +286,7 @@ static void check_drive(struct can_axis *axis)
 {
 	const struct canopen *master = axis->master;
 	enum cia402_state state = cia402_state(axis->statusword);
+	int64_t most_ns = axis->setup.silence_ns;
 
 	if (master->bus_offs != axis->bus_offs)
 		set_fault(axis, INCISE_STEPPER_FAULT_BUS, CAN_AXIS_BUS_OFF, 0, 0);
@@ -307,13 +314,11 @@ static void check_drive(struct can_axis *axis)
 		set_fault(axis, INCISE_STEPPER_FAULT_LOST, CAN_AXIS_NO_INPUTS,
 			  INPUTS_NS / MS, 0);
 	/* A loop that is closed here must not stay open for long. */
-	if (axis->setup.mode != CIA402_CSP && axis->missed >= OPEN_CYCLES &&
-	    axis->now_ns - axis->tpdo_ns > OPEN_NS)
-		set_fault(axis, INCISE_STEPPER_FAULT_LOST, CAN_AXIS_NO_TPDO, OPEN_NS / MS,
+	if (axis->setup.mode != CIA402_CSP && axis->missed >= OPEN_CYCLES)
+		most_ns = OPEN_NS;
+	if (axis->now_ns - axis->tpdo_ns > most_ns)
+		set_fault(axis, INCISE_STEPPER_FAULT_LOST, CAN_AXIS_NO_TPDO, most_ns / MS,
 			  0);
-	if (axis->now_ns - axis->tpdo_ns > axis->setup.silence_ns)
-		set_fault(axis, INCISE_STEPPER_FAULT_LOST, CAN_AXIS_NO_TPDO,
-			  axis->setup.silence_ns / MS, 0);
 }
 
 /* E-stop, and the limit ahead. */
@@ -418,22 +423,29 @@ static void run_starting(struct can_axis *axis)
 {
 	enum cia402_state state = cia402_state(axis->statusword);
 	bool homes = axis->limit_ns, fresh = axis->tpdo_ns != axis->since_ns;
+	bool enabled = fresh && state == CIA402_ENABLED;
+	bool started = enabled && axis->mode == axis->mode_set;
 
 	check_inputs(axis);
 	if (axis->phase != CAN_AXIS_STARTING)
 		return;
 
-	if (fresh && state == CIA402_ENABLED && !homes && !is_within(axis)) {
+	if (started && !homes && !can_axis_is_within(axis)) {
 		/* It gave way so far that its first target would be a jump. */
 		set_cause(axis, CAN_AXIS_OUTSIDE, axis->motion.status.position, 0);
 		abandon(axis, -ERANGE);
-	} else if (fresh && state == CIA402_ENABLED) {
+	} else if (started) {
 		axis->motion.seen_ns = axis->now_ns;
 		/* It may have given way a little while it got power. */
 		incise_motion_halt(&axis->motion, false);
 		for (int i = 0; i < 4; i++)
 			axis->commanded[i] =
 				incise_profile_position(&axis->motion.profile);
+		axis->rested = REST_ANSWERS;
+		axis->stood_ns = 0;
+		axis->gauge_ns = axis->tpdo_ns;
+		axis->gauge_counts = axis->position;
+		axis->gauge_steps_s = axis->sustained = 0;
 		axis->motion.status.state =
 			homes ? INCISE_STEPPER_STATE_MOVING : INCISE_STEPPER_STATE_READY;
 		axis->old_bits =
@@ -442,6 +454,8 @@ static void run_starting(struct can_axis *axis)
 			axis->result = 0;
 		enter_phase(axis, homes ? CAN_AXIS_HOMING : CAN_AXIS_RUNNING);
 	} else if (axis->now_ns - axis->since_ns > axis->setup.start_ns) {
+		if (enabled)
+			set_cause(axis, CAN_AXIS_NO_MODE, axis->mode, 0);
 		set_cause(axis, CAN_AXIS_NO_START, state, 0);
 		abandon(axis, -ETIMEDOUT);
 	}
@@ -450,6 +464,16 @@ static void run_starting(struct can_axis *axis)
 		axis->setpoint_sent = true;
 	else if (axis->phase != CAN_AXIS_QUICK_STOP)
 		send_setpoint(axis, cia402_next_controlword(state), hold_target(axis));
+}
+
+/* It is at rest where its position is not one from before that. */
+static void check_rest(struct can_axis *axis)
+{
+	struct incise_motion *m = &axis->motion;
+
+	axis->rested = m->resting ? axis->rested + axis->status_received : 0;
+	if (axis->rested < REST_ANSWERS && m->status.state == INCISE_STEPPER_STATE_READY)
+		m->status.state = INCISE_STEPPER_STATE_MOVING;
 }
 
 static void run_running(struct can_axis *axis)
@@ -462,12 +486,53 @@ static void run_running(struct can_axis *axis)
 	check_inputs(axis);
 	if (m->ending && m->resting && axis->phase == CAN_AXIS_RUNNING)
 		enter_phase(axis, CAN_AXIS_ENDING);
-	if (axis->phase == CAN_AXIS_RUNNING)
+	if (axis->phase == CAN_AXIS_RUNNING) {
 		send_setpoint(axis, CIA402_ENABLE, next_target(axis));
+		check_rest(axis);
+	}
+}
+
+/* Returns whether it has stood for a while, homed by its bit 12, and not there by its bit 10. */
+static bool stands_open(struct can_axis *axis, uint16_t word)
+{
+	if (!(word & CIA402_HOMED) || fabs(axis->speed) >= 1)
+		axis->stood_ns = 0;
+	else if (!axis->stood_ns)
+		axis->stood_ns = axis->now_ns;
+	return axis->stood_ns && axis->now_ns - axis->stood_ns > STAND_NS;
+}
+
+/*
+ * Returns whether its position (6064) moves at the speed that it was given (6099), so far or at its
+ * end. That shows a drive whose counts are others than it reports, or than rig.conf has. It does
+ * not show a factor between the two bounds, one that its unit of velocity has too, or a wrong
+ * lead_mm: then all that a drive reports fits, and only a ruler differs.
+ */
+static bool fits_home_speed(struct can_axis *axis, bool ended)
+{
+	double asked = axis->setup.home_steps_s,
+	       per_step = fabs(axis->setup.counts_per_step);
+	int64_t t_ns = axis->tpdo_ns - axis->gauge_ns;
+	double noise = GAUGE_COUNTS * 1e9 / GAUGE_NS / per_step, is;
+
+	if (t_ns >= GAUGE_NS) {
+		is = fabs((double)axis->position - axis->gauge_counts) * 1e9 /
+		     (double)t_ns / per_step;
+		/* Where its count is set at the switch, one of two is wrong. */
+		axis->sustained = fmax(axis->sustained, fmin(is, axis->gauge_steps_s));
+		axis->gauge_steps_s = is;
+		axis->gauge_ns = axis->tpdo_ns;
+		axis->gauge_counts = axis->position;
+	}
+	if (!asked || axis->sustained < noise)
+		return true;
+	return axis->sustained <= TOO_FAST * asked &&
+	       (!ended || axis->sustained >= TOO_SLOW * asked);
 }
 
 static void run_homing(struct can_axis *axis)
 {
+	bool ended;
 	uint16_t word = axis->statusword;
 	bool waited = axis->now_ns - axis->since_ns > OLD_BITS_NS;
 
@@ -482,21 +547,27 @@ static void run_homing(struct can_axis *axis)
 	 */
 	if (!waited || axis->old_bits & CIA402_FOLLOWING_ERROR)
 		word &= ~axis->old_bits;
+	ended = word & CIA402_HOMED && word & CIA402_TARGET_REACHED;
 	if (axis->stop_homing) {
 		axis->motion.status.state = INCISE_STEPPER_STATE_STOPPING;
 		abandon(axis, -EINTR);
 	} else if (word & CIA402_FOLLOWING_ERROR) {
 		set_fault(axis, INCISE_STEPPER_FAULT_ALARM, CAN_AXIS_NO_HOME, 0, 0);
+	} else if (!fits_home_speed(axis, ended)) {
+		set_fault(axis, INCISE_STEPPER_FAULT_ALARM, CAN_AXIS_HOME_SPEED,
+			  llround(axis->sustained), 0);
 	} else if (axis->now_ns > axis->limit_ns) {
 		axis->outcome = -ETIMEDOUT;
 		set_fault(axis, INCISE_STEPPER_FAULT_ALARM, CAN_AXIS_HOME_TIME, 0, 0);
 	} else if (waited && axis->old_bits & CIA402_FOLLOWING_ERROR) {
 		axis->outcome = -ETIMEDOUT;
 		set_fault(axis, INCISE_STEPPER_FAULT_ALARM, CAN_AXIS_HOME_OLD, 0, 0);
-	} else if (word & CIA402_HOMED && word & CIA402_TARGET_REACHED) {
+	} else if (ended) {
 		axis->outcome = 0;
 		axis->motion.ending = true;
 		enter_phase(axis, CAN_AXIS_ENDING);
+	} else if (stands_open(axis, word)) {
+		set_fault(axis, INCISE_STEPPER_FAULT_ALARM, CAN_AXIS_HOME_OPEN, 0, 0);
 	} else {
 		send_setpoint(axis, CIA402_HOME_START, 0);
 	}
@@ -650,7 +721,7 @@ int can_axis_power(struct can_axis *axis, int64_t now_ns, int64_t homing_ns)
 	const struct canopen *master = axis->master;
 	int rc;
 
-	if (!homing_ns && !is_within(axis))
+	if (!homing_ns && !can_axis_is_within(axis))
 		return -ERANGE;
 	rc = incise_motion_power_on(m, now_ns);
 	if (rc <= 0)
@@ -673,6 +744,7 @@ int can_axis_power(struct can_axis *axis, int64_t now_ns, int64_t homing_ns)
 	axis->tpdo_ns = now_ns;
 	axis->inputs_ns = 0;
 	axis->limit_ns = homing_ns ? now_ns + homing_ns : 0;
+	axis->mode = axis->mode_set = homing_ns ? CIA402_HOMING : axis->setup.mode;
 	axis->result = 1;
 	axis->outcome = -EIO;
 	enter_phase(axis, CAN_AXIS_STARTING);
@@ -738,15 +810,12 @@ int can_axis_cause_text(const struct can_axis *axis, char *text, size_t size)
 				"clear",
 				cia402_state_name((enum cia402_state)a));
 	case CAN_AXIS_NO_HEARTBEAT:
-		return snprintf(
-			text, size,
-			"no heartbeat from it for %lld ms: check its power and cable, "
-			"then clear",
-			a);
 	case CAN_AXIS_NO_TPDO:
 		return snprintf(text, size,
-				"no status (TPDO1) from it for %lld ms: check its "
-				"power and cable, then clear",
+				"no %s from it for %lld ms: check its power and cable, "
+				"then clear",
+				axis->cause == CAN_AXIS_NO_TPDO ? "status (TPDO1)"
+								: "heartbeat",
 				a);
 	case CAN_AXIS_NO_INPUTS:
 		return snprintf(
@@ -793,6 +862,12 @@ int can_axis_cause_text(const struct can_axis *axis, char *text, size_t size)
 				"it did not reach operation enabled and remains in %s: "
 				"check its supply, enable and safe-torque-off inputs",
 				cia402_state_name((enum cia402_state)a));
+	case CAN_AXIS_NO_MODE:
+		return snprintf(
+			text, size,
+			"it is enabled in the mode %s (6061) and not in that which "
+			"was set (6060): see its manual",
+			cia402_mode_name((int)a));
 	case CAN_AXIS_NO_HOME:
 		return snprintf(
 			text, size,
@@ -807,6 +882,20 @@ int can_axis_cause_text(const struct can_axis *axis, char *text, size_t size)
 			text, size,
 			"it still reports that its last homing failed, and not "
 			"whether it homed now: switch it off and on, and home again");
+	case CAN_AXIS_HOME_OPEN:
+		return snprintf(
+			text, size,
+			"it stands after its homing with bit 12 of its statusword set "
+			"(homed) and bit 10 not (target reached): see its manual for "
+			"bit 10 in homing mode and its position window (6067), then clear");
+	case CAN_AXIS_HOME_SPEED:
+		return snprintf(
+			text, size,
+			"it moved at %.3g mm/s by its position (6064), and was given %.3g "
+			"(6099): its units do not fit each other; give counts_per_turn "
+			"and velocity_per_turn_s in rig.conf, then clear",
+			(double)a * axis->setup.step_mm,
+			axis->setup.home_steps_s * axis->setup.step_mm);
 	case CAN_AXIS_OUTSIDE:
 		return snprintf(
 			text, size,

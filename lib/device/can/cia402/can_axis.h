@@ -49,9 +49,12 @@ enum can_axis_cause {
 	CAN_AXIS_FOREIGN,    /* another master */
 	CAN_AXIS_OFF_TARGET, /* a: steps */
 	CAN_AXIS_NO_START,   /* a: enum cia402_state */
+	CAN_AXIS_NO_MODE,    /* a: the mode that it is in */
 	CAN_AXIS_NO_HOME,    /* the drive reports that homing failed */
 	CAN_AXIS_HOME_TIME,
 	CAN_AXIS_HOME_OLD,    /* the error bit of the last homing stays set */
+	CAN_AXIS_HOME_OPEN,   /* it stands, with bit 12 and without bit 10 */
+	CAN_AXIS_HOME_SPEED,  /* a: steps/s by its position */
 	CAN_AXIS_OUTSIDE,     /* a: steps; it gave way while getting power */
 	CAN_AXIS_STOOD_STILL, /* a: ms; this program, not the drive */
 	CAN_AXIS_NO_STOP, /* a: enum cia402_state; it did not report to have no power */
@@ -63,6 +66,7 @@ struct can_axis_setup {
 	enum cia402_mode mode;
 	double counts_per_step;	 /* negative if inverted */
 	double units_per_step_s; /* CSV: velocity units of a step/s; same sign */
+	double home_steps_s;	 /* of 6099:1; 0: homing does not move it */
 	double gain_1_s;	 /* CSV */
 	double torque_per_step, torque_s_per_step, torque_most; /* CST: ‰; same sign */
 	int64_t silence_ns;   /* of the drive until it counts as lost */
@@ -86,8 +90,9 @@ struct can_axis {
 	struct can_axis_setup setup;
 	double zero_counts; /* of the drive, at position 0 */
 	uint16_t statusword;
-	int32_t position; /* the drive's, counts */
-	bool has_status;  /* a TPDO1 came */
+	int32_t position;   /* the drive's, counts */
+	int mode, mode_set; /* by 6061, if TPDO1 has it; by 6060 */
+	bool has_status;    /* a TPDO1 came */
 	enum can_axis_phase phase;
 	struct can_axis_counts counts;
 	/* Read by another thread once a fault is seen. */
@@ -112,6 +117,11 @@ struct can_axis {
 	bool setpoint_sent;   /* with its SYNC, in this cycle */
 	bool status_received; /* in this cycle */
 	uint16_t old_bits;    /* of the statusword, left by an earlier homing */
+	int64_t stood_ns;     /* homed, but "not there": since when it stands; 0: not */
+	int64_t gauge_ns;     /* homing: when its speed was gauged … */
+	int32_t gauge_counts; /* … from here … */
+	double gauge_steps_s, sustained; /* … the last one; the largest of two in a row */
+	uint32_t rested;    /* cycles with an answer since the profile rests */
 	int64_t inputs_ns;  /* duration of cycles with an answer since the last inputs */
 	bool command_sent;  /* the command of this phase */
 	bool heartbeat_off; /* it did not obey a stop: leave it to its deadman */
@@ -146,6 +156,9 @@ void can_axis_disable(struct can_axis *axis);
 
 /* Update by 60FD. */
 void can_axis_inputs(struct can_axis *axis, uint32_t inputs);
+
+/* Returns whether the drive is within the limits, so that its first target is no jump. */
+bool can_axis_is_within(const struct can_axis *axis);
 
 /* Convert counts, rounded. */
 int64_t can_axis_steps(const struct can_axis *axis, int32_t counts);

@@ -60,6 +60,7 @@ static int set_filter(struct can_session *s)
 		CANOPEN_TPDO2 + node,
 		CANOPEN_RPDO1 + node,
 		CANOPEN_SDO_ANSWER + node,
+		CANOPEN_SDO_REQUEST + node, /* an echo */
 		CANOPEN_HEARTBEAT + node,
 		CANOPEN_HEARTBEAT + s->master.own,
 	};
@@ -77,6 +78,8 @@ static int open_bus(struct can_session *s, const struct can_transport *transport
 {
 	struct incise_error *err = s->client.err;
 	const struct incise_actuator_can *can = &request->actuator->can;
+	const char *example =
+		strcmp(transport->name, "can") ? "slcan:/dev/ttyACM0" : "can:can0";
 	char device[DEVICE_MAX];
 	struct can_bus_request bus = {
 		.where = request->where, .device = device, .bitrate = can->bitrate};
@@ -86,15 +89,10 @@ static int open_bus(struct can_session *s, const struct can_transport *transport
 	if (rc)
 		return incise_error_set(
 			err, EINVAL,
-			"%s: expected %s:DEVICE:NODE such as %s with a "
-			"node id of 1 to 127, found %s:%.60s; `incise "
-			"info %s` lists drives",
-			request->where, transport->name,
-			strcmp(transport->name, "can") ? "slcan:/dev/ttyACM0:0x10"
-						       : "can:can0:0x10",
-			transport->name, request->arguments,
-			strcmp(transport->name, "can") ? "slcan:/dev/ttyACM0"
-						       : "can:can0");
+			"%s: expected %s:DEVICE:NODE such as %s:0x10 with a node id of "
+			"1 to 127, found %s:%.60s; `incise info %s` lists drives",
+			request->where, transport->name, example, transport->name,
+			request->arguments, example);
 	if (node == (unsigned int)can->master)
 		return incise_error_set(err, EINVAL,
 					"%s: node %u is also actuator.can.master, the "
@@ -105,8 +103,11 @@ static int open_bus(struct can_session *s, const struct can_transport *transport
 	rc = transport->open(&s->bus, &bus, err);
 	if (rc)
 		return rc;
-	s->master = (struct canopen){
-		.bus = s->bus, .node = (uint8_t)node, .state = CANOPEN_UNKNOWN};
+	s->master =
+		(struct canopen){.bus = s->bus,
+				 .node = (uint8_t)node,
+				 .answer_ns = (int64_t)(can->answer_s * INCISE_NS_PER_S),
+				 .state = CANOPEN_UNKNOWN};
 	snprintf(s->name, sizeof(s->name), "drive 0x%02x at %.36s", node, s->bus->name);
 	return 0;
 }
@@ -136,8 +137,6 @@ static int check_alone(struct can_session *s)
 /* Read the position, and place 0. @keep: the drive's count continues. */
 static int read_position(struct can_session *s, bool keep)
 {
-	const struct incise_actuator *a = &s->actuator;
-	double per_mm = s->axis.setup.counts_per_step / incise_actuator_step_mm(a);
 	struct incise_stepper_motor_status *status = &s->axis.motion.status;
 	const struct cia402_object position = {0x6064, 0, 4, "position"};
 	uint32_t counts;
@@ -147,7 +146,7 @@ static int read_position(struct can_session *s, bool keep)
 		return rc;
 	s->axis.position = (int32_t)counts;
 	if (s->is_homed)
-		s->axis.zero_counts = -a->home_mm * per_mm;
+		s->axis.zero_counts = -s->actuator.home_mm * can_units_per_mm(s);
 	else if (!keep)
 		s->axis.zero_counts = (int32_t)counts;
 	status->position = can_axis_steps(&s->axis, s->axis.position);
@@ -157,12 +156,35 @@ static int read_position(struct can_session *s, bool keep)
 	return 0;
 }
 
+/*
+ * A drive that reports to be homed may have been homed by another program, to another place, or
+ * without its count being set. It is trusted where its 607D is the range of this rig.conf, which
+ * is written only after a homing that can_session_homed() found right, and taken back before the
+ * next one.
+ */
 static int read_homed(struct can_session *s)
 {
+	bool known = s->is_homed && s->is_setup && s->boots == s->master.boots;
+	double zero = s->axis.zero_counts;
+	int rc;
+
 	s->is_homed = s->actuator.can.absolute;
 	if (s->is_homed || !s->actuator.can.homing_method)
 		return 0;
-	return cia402_read_homed(&s->client, s->setup.mode, &s->is_homed);
+	rc = cia402_read_homed(&s->client, s->setup.mode, &s->is_homed);
+	if (rc || !s->is_homed || known)
+		return rc;
+	s->axis.zero_counts = -s->actuator.home_mm * can_units_per_mm(s);
+	can_units_range(s);
+	s->axis.zero_counts = zero;
+	return cia402_has_range(&s->client, s->setup.position_min, s->setup.position_max,
+				&s->is_homed);
+}
+
+static int write_range(struct can_session *s)
+{
+	can_units_range(s);
+	return cia402_set_range(&s->client, s->setup.position_min, s->setup.position_max);
 }
 
 /* The drive does not report which inputs are wired: all that 60FD has a bit for. */
@@ -251,11 +273,17 @@ static int prepare(struct can_session *s)
 	rc = cia402_identify(client);
 	if (!rc)
 		rc = cia402_read_units(client, &s->units);
+	if (!rc && s->master.echoes > s->master.requests / 2)
+		rc = cia402_error(
+			client, EPROTO,
+			"%s sends back what this program sends (echo), which looks "
+			"like another master; switch its echo off",
+			s->bus->name);
 	if (rc)
 		return rc;
-	can_units_steps(s);
+	rc = can_units_steps(s);
 	can_units_setup(s);
-	return can_units_axis(s);
+	return rc ? rc : can_units_axis(s);
 }
 
 int can_session_open(struct can_session *s, const struct can_transport *transport,
@@ -370,6 +398,20 @@ static int read_inputs(struct can_session *s)
 	return 0;
 }
 
+/* A drive that shows its mode with power only shows it in TPDO1: the axis waits for it. */
+static int set_mode(struct can_session *s, enum cia402_mode mode)
+{
+	int rc = cia402_set_mode(&s->client, mode);
+
+	if (rc > 0 && !s->setup.mode_mapped) {
+		s->setup.mode_mapped = true;
+		rc = cia402_configure(&s->client, &s->setup, &s->supported);
+		if (!rc)
+			rc = cia402_set_mode(&s->client, mode);
+	}
+	return rc < 0 ? rc : 0;
+}
+
 int can_session_ready(struct can_session *s, bool homing, struct incise_error *err)
 {
 	const struct incise_actuator *a = &s->actuator;
@@ -383,6 +425,8 @@ int can_session_ready(struct can_session *s, bool homing, struct incise_error *e
 	/* Unhomed until homing succeeds. */
 	s->is_homed = s->is_homed && (!homing || a->can.absolute);
 	if (!rc && homing)
+		rc = write_range(s);
+	if (!rc && homing)
 		rc = cia402_set_homing(
 			&s->client, a->can.homing_method,
 			can_units_whole(a->home_mm_s * per_turn_s),
@@ -390,7 +434,7 @@ int can_session_ready(struct can_session *s, bool homing, struct incise_error *e
 			can_units_whole(a->acceleration_mm_s2 / a->lead_mm *
 					s->units.acceleration_per_turn_s2));
 	if (!rc)
-		rc = cia402_set_mode(&s->client, homing ? CIA402_HOMING : s->setup.mode);
+		rc = set_mode(s, homing ? CIA402_HOMING : s->setup.mode);
 	if (!rc)
 		rc = read_inputs(s);
 	if (rc)
@@ -434,11 +478,11 @@ int can_session_clear(struct can_session *s, struct incise_error *err)
 static int check_homed(struct can_session *s, struct incise_error *err)
 {
 	const struct incise_actuator *a = &s->actuator;
-	double per_mm = s->axis.setup.counts_per_step / incise_actuator_step_mm(a);
-	double off_mm = s->axis.position / per_mm;
+	double off_mm = s->axis.position / can_units_per_mm(s);
 	double brake_mm = a->home_mm_s * a->home_mm_s / (2 * a->acceleration_mm_s2);
 
-	if (fabs(off_mm) <= brake_mm + a->can.following_mm)
+	if (fabs(off_mm) <= brake_mm + a->can.following_mm &&
+	    can_axis_is_within(&s->axis))
 		return 0;
 	s->is_homed = false;
 	s->axis.motion.status.flags &= ~INCISE_STEPPER_FLAG_HOMED;
@@ -459,10 +503,7 @@ int can_session_homed(struct can_session *s, struct incise_error *err)
 	rc = read_position(s, false);
 	if (!rc)
 		rc = check_homed(s, err);
-	if (rc)
-		return rc;
-	can_units_range(s);
-	return cia402_set_range(&s->client, s->setup.position_min, s->setup.position_max);
+	return rc ? rc : write_range(s);
 }
 
 void can_session_close(struct can_session *s)
@@ -496,7 +537,8 @@ static void receive_can_session(struct can_session *s, int64_t now)
 		uint32_t function = canopen_handle(&s->master, &frame, t_ns);
 
 		if (function == CANOPEN_TPDO1 &&
-		    cia402_parse_status(&frame, &axis->statusword, &axis->position))
+		    cia402_parse_status(&frame, &axis->statusword, &axis->position,
+					&axis->mode))
 			s->watch.tpdo_ns = now;
 		else if (function == CANOPEN_TPDO2 &&
 			 cia402_parse_inputs(&frame, &inputs))

@@ -168,7 +168,8 @@ static void nap(struct can_stepper *c, int64_t ns)
 
 static int post(struct can_stepper *c, enum command command)
 {
-	int64_t end = now_of(c) + ANSWER_NS;
+	/* A look at a drive that is watched takes up to three SDOs. */
+	int64_t end = now_of(c) + ANSWER_NS + 3 * c->session.master.answer_ns;
 
 	atomic_store_explicit(&c->command, command, memory_order_release);
 	while (atomic_load_explicit(&c->command, memory_order_acquire) != NONE) {

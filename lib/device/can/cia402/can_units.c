@@ -14,8 +14,9 @@
 #define DEADMAN_LEAST_S 0.02  /* heartbeats are in whole ms, and four must fit */
 #define MARGIN 1.25	      /* of the drive's limits over the profile's */
 #define FINEST_STEPS_S 150000 /* of the profile: below its largest */
+#define COARSEST_MM 0.05      /* of a count: more is felt as steps */
 
-void can_units_steps(struct can_session *s)
+int can_units_steps(struct can_session *s)
 {
 	struct incise_actuator *a = &s->actuator;
 	double most = fmin(FINEST_STEPS_S * a->lead_mm / a->velocity_mm_s,
@@ -25,6 +26,20 @@ void can_units_steps(struct can_session *s)
 		1, floor(fmin(fmin(s->units.counts_per_turn, most), INT32_MAX)));
 	a->microsteps = 1;
 	a->tick_ns = a->can.cycle_ns;
+	if (a->lead_mm / s->units.counts_per_turn <= COARSEST_MM)
+		return 0;
+	return cia402_error(&s->client, ERANGE,
+			    "a count of the drive is %.3g mm, as a turn of the screw has "
+			    "%g counts; at most %g mm are allowed; set finer units in "
+			    "the drive (60A8, 6092), or, if it counts otherwise than it "
+			    "reports, counts_per_turn in rig.conf",
+			    a->lead_mm / s->units.counts_per_turn,
+			    s->units.counts_per_turn, COARSEST_MM);
+}
+
+double can_units_per_mm(const struct can_session *s)
+{
+	return s->axis.setup.counts_per_step / incise_actuator_step_mm(&s->actuator);
 }
 
 uint32_t can_units_whole(double value)
@@ -41,15 +56,14 @@ static int32_t counts_of(double value)
 void can_units_range(struct can_session *s)
 {
 	const struct incise_actuator *a = &s->actuator;
-	double per_mm = s->axis.setup.counts_per_step / incise_actuator_step_mm(a);
+	double per_mm = can_units_per_mm(s);
 	double low = s->axis.zero_counts +
 		     per_mm * (fmin(0, a->home_mm) - a->can.following_mm);
 	double high = s->axis.zero_counts + per_mm * (a->travel_mm + a->can.following_mm);
 
 	s->in_range = fmin(low, high) > -COUNTS_MOST && fmax(low, high) < COUNTS_MOST;
-	s->setup.limited = s->is_homed;
-	s->setup.position_min = counts_of(fmin(low, high));
-	s->setup.position_max = counts_of(fmax(low, high));
+	s->setup.position_min = s->is_homed ? counts_of(fmin(low, high)) : INT32_MIN;
+	s->setup.position_max = s->is_homed ? counts_of(fmax(low, high)) : INT32_MAX;
 }
 
 void can_units_setup(struct can_session *s)
@@ -96,6 +110,10 @@ int can_units_axis(struct can_session *s)
 		.mode = s->setup.mode,
 		.counts_per_step = turns * s->units.counts_per_turn,
 		.units_per_step_s = turns * s->units.velocity_per_turn_s,
+		/* Methods 35 and 37 take the present position. */
+		.home_steps_s = a->can.homing_method == 35 || a->can.homing_method == 37
+					? 0
+					: a->home_mm_s / step_mm,
 		.gain_1_s = a->can.position_gain_1_s,
 		.torque_per_step = sign * a->can.stiffness_permille_mm * step_mm,
 		.torque_s_per_step = sign * a->can.damping_permille_s_mm * step_mm,

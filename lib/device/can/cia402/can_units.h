@@ -8,13 +8,16 @@
 
 #include "can_session.h"
 
-/* Set the actuator's steps: as fine as the drive's counts, or as the profile allows. */
-void can_units_steps(struct can_session *session);
+/* Set the actuator's steps: as fine as counts and profile allow. -ERANGE: counts are too coarse. */
+int can_units_steps(struct can_session *session);
+
+/* Returns the drive's counts per mm; negative if inverted. */
+double can_units_per_mm(const struct can_session *session);
 
 /* Compute session->setup, and the period of both heartbeats. */
 void can_units_setup(struct can_session *session);
 
-/* Compute the range of positions in the setup from the place of 0; sets in_range. */
+/* Compute the range in the setup from the place of 0; unlimited before homing. Sets in_range. */
 void can_units_range(struct can_session *session);
 
 /* Initialize session->axis. Returns 0, -EINVAL, -ERANGE. */

@@ -153,12 +153,14 @@ static bool is_pdo(const struct can_frame *frame, uint32_t function, unsigned in
 }
 
 bool cia402_parse_status(const struct can_frame *frame, uint16_t *statusword,
-			 int32_t *position)
+			 int32_t *position, int *mode)
 {
 	if (!is_pdo(frame, CANOPEN_TPDO1, TPDO1_LENGTH))
 		return false;
 	*statusword = (uint16_t)canopen_unpack(frame->data, 2);
 	*position = (int32_t)canopen_unpack(frame->data + 2, 4);
+	if (frame->len > TPDO1_LENGTH)
+		*mode = (int8_t)frame->data[TPDO1_LENGTH];
 	return true;
 }
 
@@ -206,6 +208,13 @@ int cia402_fail(const struct cia402_client *client, const struct cia402_object *
 				    canopen_abort_text(client->master->abort, why,
 						       sizeof(why)));
 	case -ETIMEDOUT:
+		if (client->master->late_ns)
+			return cia402_error(
+				client, ETIMEDOUT,
+				"an answer came late, after %d ms, when %s was "
+				"to be %s; give a larger actuator.can.answer_ms "
+				"in rig.conf",
+				(int)(client->master->late_ns / 1000000), what, action);
 		return cia402_error(client, ETIMEDOUT,
 				    "no answer when %s was to be %s; check the drive's "
 				    "power, its wiring, node id and bit rate",

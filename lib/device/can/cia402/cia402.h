@@ -9,7 +9,7 @@
  *                 fault ◀─ fault reaction ◀─ (any)
  *
  *   RPDO1, with SYNC:  6040 controlword (16)  target (32; 16 for torque)
- *   TPDO1, at SYNC:    6041 statusword (16)   6064 position (32)
+ *   TPDO1, at SYNC:    6041 statusword (16)   6064 position (32)   [6061 mode (8)]
  *   TPDO2, at change:  60FD digital inputs (32), if it has them
  */
 #ifndef INCISE_CIA402_H
@@ -78,9 +78,9 @@ uint16_t cia402_next_controlword(enum cia402_state state);
 void cia402_pack_rpdo(struct can_frame *frame, uint8_t node, enum cia402_mode mode,
 		      uint16_t controlword, int32_t target);
 
-/* TPDO1 and TPDO2. Return false for another frame or a short one. */
+/* TPDO1 and TPDO2. Return false for another frame or a short one. *mode stays without 6061. */
 bool cia402_parse_status(const struct can_frame *frame, uint16_t *statusword,
-			 int32_t *position);
+			 int32_t *position, int *mode);
 bool cia402_parse_inputs(const struct can_frame *frame, uint32_t *inputs);
 
 /* --- by SDO: functions that return 0, or a negative errno with a message --- */
@@ -155,18 +155,18 @@ struct cia402_units {
  * Read the drive's factors: for positions 6092 (feed constant), else 608F and 6091 (encoder
  * resolution, gear ratio), or 60A8 (SI unit) if it is an angle or increments; for velocity and
  * acceleration 60A9 and 60AA (SI units), else counts/s and counts/s². Fields other than 0, from
- * rig.conf, stay. -EPROTO: missing or impossible factors, which rig.conf must have.
+ * rig.conf, stay. -EPROTO: missing, impossible or contradicting factors, which rig.conf must have.
  */
 int cia402_read_units(const struct cia402_client *client, struct cia402_units *units);
 
 /* The setup of a drive before it may move, in its units. */
 struct cia402_setup {
 	enum cia402_mode mode;
+	bool mode_mapped;  /* 6061 in TPDO1, for drives that show it with power only */
 	uint32_t cycle_ns; /* 60C2; a digit times a power of ten, as the drive keeps it */
 	uint32_t deadman_ms;   /* silence of this side before the drive quick-stops */
 	uint8_t master;	       /* node id of this side's heartbeat */
 	uint32_t heartbeat_ms; /* 1017: period of the drive's heartbeat */
-	bool limited;	       /* positions are the machine's */
 	int32_t position_min, position_max; /* 607D */
 	uint32_t velocity;		    /* 607F: largest */
 	uint32_t acceleration;	  /* 60C5, 60C6: largest; 6085: of a quick stop */
@@ -181,7 +181,6 @@ struct cia402_setup {
 struct cia402_supported {
 	bool inputs;	   /* 60FD comes in TPDO2 … */
 	bool inputs_timed; /* … each CIA402_INPUTS_MS also without a change */
-	bool position_limit, velocity_limit, acceleration_limit, following_limit;
 };
 
 /*
@@ -198,12 +197,14 @@ struct cia402_supported {
 int cia402_configure(const struct cia402_client *client, const struct cia402_setup *setup,
 		     struct cia402_supported *supported);
 
-/* Write 6060, and wait until 6061 agrees. */
+/* Write 6060, and wait until 6061 agrees. 1: it keeps 6060, and 6061 may follow with power. */
 int cia402_set_mode(const struct cia402_client *client, enum cia402_mode mode);
 
-/* Write 607D alone, after homing. */
+/* Write 607D alone, if the drive has it; read whether it has it with that range. */
 int cia402_set_range(const struct cia402_client *client, int32_t position_min,
 		     int32_t position_max);
+int cia402_has_range(const struct cia402_client *client, int32_t position_min,
+		     int32_t position_max, bool *has);
 
 /* Set how the drive homes: method 6098, speeds 6099, acceleration 609A, offset 607C = 0. */
 int cia402_set_homing(const struct cia402_client *client, int method, uint32_t speed,
@@ -211,7 +212,7 @@ int cia402_set_homing(const struct cia402_client *client, int method, uint32_t s
 
 /*
  * Read whether the drive's position is the machine's: enter homing mode without power,
- * read the statusword (bits 10, 12), and enter @mode again.
+ * read the statusword (bits 10, 12), and enter @mode again. Where 6061 needs power it is not.
  */
 int cia402_read_homed(const struct cia402_client *client, enum cia402_mode mode,
 		      bool *homed);

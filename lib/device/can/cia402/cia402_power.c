@@ -108,18 +108,22 @@ int cia402_set_mode(const struct cia402_client *client, enum cia402_mode mode)
 	struct can_bus *bus = client->master->bus;
 	int rc = cia402_write(client, &operation, (uint32_t)mode);
 	int64_t until_ns = bus->ops->now(bus) + CHANGE_NS;
-	uint32_t is = 0;
+	uint32_t is = 0, kept;
 
 	while (!rc) {
 		rc = cia402_read(client, &operation_now, &is);
 		if (rc || is == (uint32_t)mode)
 			break;
-		if (bus->ops->now(bus) >= until_ns)
+		if (bus->ops->now(bus) >= until_ns) {
+			rc = cia402_read(client, &operation, &kept);
+			if (rc || kept == (uint32_t)mode)
+				return rc ? rc : 1;
 			return cia402_error(client, ETIMEDOUT,
 					    "the drive does not accept the mode %s and "
 					    "remains in %s; see its manual",
 					    cia402_mode_name(mode),
 					    cia402_mode_name((int8_t)is));
+		}
 		rc = cia402_pause(client, POLL_NS);
 	}
 	return rc;
@@ -171,7 +175,7 @@ int cia402_read_homed(const struct cia402_client *client, enum cia402_mode mode,
 		*homed = word & CIA402_HOMED && word & CIA402_TARGET_REACHED &&
 			 !(word & CIA402_FOLLOWING_ERROR);
 	/* In any case return to @mode, with the message of the first error. */
-	after.err = rc ? NULL : client->err;
+	after.err = rc < 0 ? NULL : client->err;
 	back = cia402_set_mode(&after, mode);
-	return rc ? rc : back;
+	return rc < 0 ? rc : back < 0 ? back : 0;
 }

@@ -57,6 +57,7 @@ static const struct cia402_object modes = {0x6502, 0, 4, "supported drive modes"
 #define MAP_CONTROLWORD 0x60400010
 #define MAP_STATUSWORD 0x60410010
 #define MAP_POSITION 0x60640020
+#define MAP_MODE 0x60610008
 #define MAP_INPUTS 0x60fd0020
 #define MAP_TARGET_POSITION 0x607a0020
 #define MAP_TARGET_VELOCITY 0x60ff0020
@@ -67,7 +68,7 @@ struct pdo {
 	uint32_t id;
 	uint8_t type;
 	uint8_t n; /* objects */
-	uint32_t map[2];
+	uint32_t map[3];
 };
 
 static struct cia402_object id_of(uint16_t index)
@@ -215,7 +216,11 @@ static int set_pdos(const struct cia402_client *client, const struct cia402_setu
 		{MAP_CONTROLWORD, target(setup->mode)},
 	};
 	const struct pdo actual = {
-		TPDO, CANOPEN_TPDO1 + node, AT_SYNC, 2, {MAP_STATUSWORD, MAP_POSITION},
+		TPDO,
+		CANOPEN_TPDO1 + node,
+		AT_SYNC,
+		2 + setup->mode_mapped,
+		{MAP_STATUSWORD, MAP_POSITION, MAP_MODE},
 	};
 	bool has, kept;
 	int rc = switch_others_off(client, RPDO, 1);
@@ -249,74 +254,65 @@ static const struct cia402_object window_ms = {0x6066, 0, 2, "following error ti
 static const struct cia402_object torque = {0x6072, 0, 2, "largest torque"};
 static const struct cia402_object stop_ramp = {0x6085, 0, 4, "quick-stop deceleration"};
 
-/* Write the range so that the least is never above the largest, which some drives refuse. */
-static int write_range(const struct cia402_client *client, int32_t min, int32_t max)
-{
-	uint32_t end;
-	int rc = cia402_read(client, &ranges[1], &end);
-
-	if (!rc && min >= (int32_t)end)
-		rc = cia402_write(client, &ranges[1], (uint32_t)max);
-	if (!rc)
-		rc = cia402_write_verified(client, &ranges[0], (uint32_t)min);
-	return rc ? rc : cia402_write_verified(client, &ranges[1], (uint32_t)max);
-}
-
 int cia402_set_range(const struct cia402_client *client, int32_t position_min,
 		     int32_t position_max)
 {
+	uint32_t end;
+	bool has;
+	int rc;
+
 	if (position_min >= position_max)
 		return cia402_error(client, EINVAL,
 				    "an empty range from %d to %d; check travel_mm and "
 				    "counts_per_turn in rig.conf",
 				    position_min, position_max);
-	return write_range(client, position_min, position_max);
-}
-
-/* Before homing the range is unknown: then the drive must not keep an old one. */
-static int set_range(const struct cia402_client *client, const struct cia402_setup *setup,
-		     bool *limited)
-{
-	uint32_t end;
-	bool has;
-	int rc = cia402_read_optional(client, &ranges[1], &end, &has);
-
-	*limited = has && setup->limited;
+	rc = cia402_read_optional(client, &ranges[1], &end, &has);
 	if (rc || !has)
 		return rc;
-	if (!setup->limited)
-		return write_range(client, INT32_MIN, INT32_MAX);
-	return cia402_set_range(client, setup->position_min, setup->position_max);
+	/* The least is never above the largest, which some drives refuse. */
+	if (position_min >= (int32_t)end)
+		rc = cia402_write(client, &ranges[1], (uint32_t)position_max);
+	if (!rc)
+		rc = cia402_write_verified(client, &ranges[0], (uint32_t)position_min);
+	return rc ? rc
+		  : cia402_write_verified(client, &ranges[1], (uint32_t)position_max);
+}
+
+int cia402_has_range(const struct cia402_client *client, int32_t position_min,
+		     int32_t position_max, bool *has)
+{
+	uint32_t low = 0, high = 0;
+	int rc = cia402_read_optional(client, &ranges[0], &low, has);
+
+	if (!rc && *has)
+		rc = cia402_read(client, &ranges[1], &high);
+	*has = *has && (int32_t)low == position_min && (int32_t)high == position_max;
+	return rc;
 }
 
 static int set_limits(const struct cia402_client *client,
-		      const struct cia402_setup *setup,
-		      struct cia402_supported *supported)
+		      const struct cia402_setup *setup)
 {
 	bool has;
 	const struct {
-		uint32_t wanted; /* 0: leave it to the drive */
 		const struct cia402_object *object;
-		uint32_t value;
-		bool *has;
+		uint32_t value; /* 0: leave it to the drive */
 	} limits[] = {
-		{setup->velocity, &speed, setup->velocity, &supported->velocity_limit},
-		{setup->acceleration, &acceleration, setup->acceleration,
-		 &supported->acceleration_limit},
+		{&speed, setup->velocity},
+		{&acceleration, setup->acceleration},
 		/* A drive without this limit brakes by the limit of accelerations. */
-		{setup->acceleration, &deceleration, setup->acceleration, &has},
-		{setup->acceleration, &stop_ramp, setup->acceleration, &has},
-		{setup->following, &window, setup->following,
-		 &supported->following_limit},
-		{setup->following, &window_ms, setup->following_ms, &has},
-		{setup->torque_permille, &torque, setup->torque_permille, &has},
+		{&deceleration, setup->acceleration},
+		{&stop_ramp, setup->acceleration},
+		{&window, setup->following},
+		{&window_ms, setup->following ? setup->following_ms : 0},
+		{&torque, setup->torque_permille},
 	};
-	int rc = set_range(client, setup, &supported->position_limit);
+	int rc = cia402_set_range(client, setup->position_min, setup->position_max);
 
 	for (size_t i = 0; i < sizeof(limits) / sizeof(*limits) && !rc; i++)
-		if (limits[i].wanted)
+		if (limits[i].value)
 			rc = cia402_write_optional(client, limits[i].object,
-						   limits[i].value, limits[i].has);
+						   limits[i].value, &has);
 	return rc;
 }
 
@@ -406,7 +402,7 @@ static int set_cycle(const struct cia402_client *client, const struct cia402_set
 				    "firmware",
 				    cia402_mode_name(setup->mode), available);
 	rc = cia402_set_mode(client, setup->mode);
-	if (!rc)
+	if (rc >= 0)
 		rc = cia402_ensure(client, &sync_id, SYNC_ID);
 	if (rc)
 		return rc;
@@ -481,26 +477,22 @@ static int start_cia402_setup(const struct cia402_client *client,
 int cia402_configure(const struct cia402_client *client, const struct cia402_setup *setup,
 		     struct cia402_supported *supported)
 {
-	struct cia402_supported found = {0};
-	int rc;
+	int rc = check_cia402_setup(client, setup);
 
-	*supported = found;
-	rc = check_cia402_setup(client, setup);
+	*supported = (struct cia402_supported){0};
 	if (!rc)
 		rc = check_power(client);
 	if (!rc)
 		rc = send_nmt(client, CANOPEN_PREPARE);
 	if (!rc)
-		rc = set_pdos(client, setup, &found);
+		rc = set_pdos(client, setup, supported);
 	if (!rc)
-		rc = set_limits(client, setup, &found);
+		rc = set_limits(client, setup);
 	if (!rc)
 		rc = set_cycle(client, setup);
 	if (!rc)
 		rc = set_watch(client, setup);
 	if (!rc)
 		rc = start_cia402_setup(client, setup);
-	if (!rc)
-		*supported = found;
 	return rc;
 }

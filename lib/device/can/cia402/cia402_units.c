@@ -14,11 +14,6 @@
 #define MOST_PER_TURN 4294967296.0
 
 /* Numerators that belong to an angle. */
-#define UNIT_RADIAN 0x10
-#define UNIT_GON 0x40
-#define UNIT_DEGREE 0x41
-#define UNIT_MINUTE_OF_ARC 0x42
-#define UNIT_SECOND_OF_ARC 0x43
 #define UNIT_TURN 0xb4
 #define UNIT_INCREMENT 0xb5
 #define UNIT_TURN_PER_MINUTE 0xc0 /* of an acceleration: maxon's rpm/s */
@@ -48,7 +43,7 @@ int cia402_identify(const struct cia402_client *client)
 	int rc = canopen_read(client->master, device_type.index, device_type.sub,
 			      device_type.size, &type);
 
-	if (rc == -ETIMEDOUT)
+	if (rc == -ETIMEDOUT && !client->master->late_ns)
 		return cia402_error(client, ENODEV,
 				    "no answer from node 0x%02x on %s; check the "
 				    "drive's power, its wiring, node id and bit rate, "
@@ -105,25 +100,45 @@ static int read_increments(const struct cia402_client *client, double *value, bo
 	return rc;
 }
 
+/*
+ * A drive whose factor group was never set up may have 6092 = 1/1 and count increments. Which of
+ * the two it counts by cannot be read.
+ */
+static int check_feed(const struct cia402_client *client, double units)
+{
+	double increments = units;
+	bool has;
+	int rc = read_increments(client, &increments, &has);
+
+	if (rc || fabs(increments - units) <= 1e-9 * units)
+		return rc;
+	return cia402_error(
+		client, EPROTO,
+		"a turn of the screw is %g units by the drive's 6092, and %g "
+		"increments by its 608F and 6091; give counts_per_turn in "
+		"rig.conf: how many it counts (6064) when the screw turns once",
+		units, increments);
+}
+
 /* Returns units per turn; 0: the unit is no angle. */
 static double angle_per_turn(uint8_t unit)
 {
-	switch (unit) {
-	case UNIT_TURN:
-		return 1;
-	case UNIT_DEGREE:
-		return 360;
-	case UNIT_RADIAN:
-		return TWO_PI;
-	case UNIT_GON:
-		return 400;
-	case UNIT_MINUTE_OF_ARC:
-		return 360 * 60;
-	case UNIT_SECOND_OF_ARC:
-		return 360 * 3600;
-	default:
-		return 0;
-	}
+	static const struct {
+		uint8_t unit;
+		double per_turn;
+	} angles[] = {
+		{UNIT_TURN, 1},
+		{0x41 /* degree */, 360},
+		{0x10 /* radian */, TWO_PI},
+		{0x40 /* gon */, 400},
+		{0x42 /* minute of arc */, 360 * 60},
+		{0x43 /* second of arc */, 360 * 3600},
+	};
+
+	for (size_t i = 0; i < sizeof(angles) / sizeof(*angles); i++)
+		if (angles[i].unit == unit)
+			return angles[i].per_turn;
+	return 0;
 }
 
 static double power_of_ten(uint32_t unit)
@@ -160,6 +175,8 @@ static int read_positions(const struct cia402_client *client, double *per_turn)
 		rc = read_ratio(client, feed, per_turn, &has);
 		if (!rc && !has)
 			rc = read_increments(client, per_turn, &has);
+		else if (!rc && code != UNIT_METRE)
+			rc = check_feed(client, *per_turn);
 	} else {
 		return refuse_unit(client, &position_unit, unit, "counts_per_turn");
 	}
