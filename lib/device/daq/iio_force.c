@@ -282,10 +282,7 @@ static int voltages(const struct iio_device *device, struct iio_channel **first)
 	for (unsigned int i = 0; i < n; i++) {
 		struct iio_channel *c = iio_device_get_channel(device, i);
 
-		if (iio_channel_is_output(c) || !iio_channel_is_scan_element(c) ||
-		    strncmp(iio_channel_get_id(c), "voltage", 7) != 0)
-			continue;
-		if (!count++)
+		if (iio_source_can_sample(c) && !count++)
 			*first = c;
 	}
 	return count;
@@ -328,6 +325,7 @@ static void describe_iio_force(const struct iio_context *context,
 	struct iio_format format;
 	bool stamped = iio_device_find_channel(iio, "timestamp", false);
 	bool plain = !iio_format_of(&format, data, 31);
+	char names[100];
 
 	*device = (struct incise_scan_device){0};
 	snprintf(device->device, sizeof(device->device), "iio:%.90s",
@@ -340,6 +338,8 @@ static void describe_iio_force(const struct iio_context *context,
 		incise_scan_tell(device, "name", "%.90s", name);
 	incise_scan_tell(device, "channels", "%d", channels);
 	incise_scan_tell(device, "channel", "%.90s", iio_channel_get_id(channel));
+	iio_source_list_channels(iio, names, sizeof(names));
+	incise_scan_tell(device, "channel_names", "%s", names);
 	incise_scan_tell(device, "bits", "%u", data->bits);
 	device->usable = stamped && plain;
 	if (plain && iio_source_volts(channel, &format, &full_scale_V, &offset_V))

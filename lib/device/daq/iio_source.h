@@ -81,6 +81,11 @@ int64_t iio_source_timestamp(const struct iio_source *source, int i);
 int iio_format_of(struct iio_format *format, const struct iio_data_format *data,
 		  unsigned int bits_max);
 
+/* Whether it is a voltage that a buffer can have. */
+bool iio_source_can_sample(const struct iio_channel *channel);
+/* "voltage0-voltage1, voltage0": all of these, as force_setup.channel names them. */
+void iio_source_list_channels(const struct iio_device *device, char *text, size_t size);
+
 /* The range of its codes; false: the driver does not say. */
 bool iio_source_volts(const struct iio_channel *channel, const struct iio_format *format,
 		      double *full_scale_V, double *offset_V);
