@@ -163,6 +163,8 @@ static const struct incise_setting camera_settings[] = {
 		       "(as set)", "colour temperature"),
 	SETTING_NUMBER(focus, camera.focus, "", 1, 1e6, "(as set)",
 		       "focus, in units of the driver"),
+	SETTING_NUMBER(age_ms, camera.age_ms, "ms", 1, 60000, "(see below)",
+		       "largest age of a timestamp when its frame arrives"),
 	{0},
 };
 

@@ -54,6 +54,7 @@ struct incise_camera_setup {
 	double gain; /**< units of the driver */
 	double white_balance_K;
 	double focus; /**< units of the driver */
+	double age_ms; /**< largest age of a timestamp; default exposure + 3 periods + 100 */
 };
 
 struct incise_camera;

@@ -22,7 +22,7 @@ static const char everything[] =
 	"force_setup = { rate_hz = 12500.5; channel = \"voltage3\"; full_scale_V = 2.5;\n"
 	"	trigger = \"incise\"; reference = \"common\"; };\n"
 	"camera_setup = { width = 640; height = 480; rate_hz = 60; format = \"mjpeg\";\n"
-	"	exposure_ms = 4; gain = 2; white_balance_K = 4600; focus = 30; };\n"
+	"	exposure_ms = 4; gain = 2; white_balance_K = 4600; focus = 30; age_ms = 900; };\n"
 	"vision = { hue = [170, 10]; saturation = [1, 2]; value = [3, 4]; full_px = 400.25;\n"
 	"	roi = [200, 0, 240, 480]; };\n"
 	"sign_key = \"/etc/incise/rig_ed25519\"; "

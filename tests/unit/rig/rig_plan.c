@@ -420,7 +420,7 @@ TEST(all_keys_are_read)
 		    " trigger = \"my trigger\"; reference = \"differential\"; };"
 		    "camera_setup = { width = 640; height = 480; rate_hz = 59.94;"
 		    " format = \"grey\"; exposure_ms = 4.5; gain = 10;"
-		    " white_balance_K = 5000; focus = 7; };"
+		    " white_balance_K = 5000; focus = 7; age_ms = 950; };"
 		    "vision = { hue = [170, 10]; saturation = [80, 255]; value = [9, 9];"
 		    " full_px = 400.5; roi = [8192, 0, 16, 8192]; };"
 		    "foot_switch = { device = \"/dev/input/by-id/x-event-kbd\"; key = \"f2\"; };",
@@ -440,7 +440,7 @@ TEST(all_keys_are_read)
 	assert_true(all.camera.width == 640 && all.camera.height == 480 &&
 		    all.camera.rate_hz == 59.94 && all.camera.exposure_ms == 4.5 &&
 		    all.camera.gain == 10 && all.camera.white_balance_K == 5000 &&
-		    all.camera.focus == 7);
+		    all.camera.focus == 7 && all.camera.age_ms == 950);
 	assert_int_equal(all.camera.pixels, INCISE_PIXELS_GREY);
 	assert_true(all.has_vision);
 	assert_true(all.vision.hue[0] == 170 && all.vision.hue[1] == 10);
