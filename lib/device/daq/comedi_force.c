@@ -44,7 +44,7 @@ struct card {
 	int bits;
 	double full_scale_V, offset_V;
 	double period_ns; /* accepted by the card */
-	char note[160];	  /* see struct incise_force_info */
+	char note[300];	  /* see struct incise_force_info */
 };
 
 /* Bits of codes 0 … @maxdata; 0: no converter has these. */

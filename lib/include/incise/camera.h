@@ -42,7 +42,7 @@ struct incise_camera_info {
 		damaged; /**< frames that are corrupt or too short; also counted as lost */
 	/** How much the age of frames at their arrival, the least of many, changed so far. */
 	int64_t clock_ns;
-	char note[160]; /**< a doubt of its timestamps; empty: none */
+	char note[300]; /**< a doubt of its timestamps; empty: none */
 };
 
 /** Settings of a real camera; the group `camera_setup` of rig.conf. 0: not changed. */

@@ -34,7 +34,7 @@ struct incise_force_info {
 	/** It measures newtons itself: full_scale_V and offset_V are in N, not in V. */
 	bool newtons;
 	int64_t t_sd_ns; /**< standard deviation of its timestamps; 0: not known */
-	char note[160];	 /**< a setting that its user should check; empty: none */
+	char note[300];	 /**< a setting that its user should check; empty: none */
 };
 
 /** The voltage that an input is compared with. */
