@@ -153,7 +153,9 @@ static void *run_iio_force(void *argument)
 		/* No successor of the held sample comes within the next periods. */
 		if (quiet_ms > 2 * QUIET_MS)
 			spacing_flush(&f->spacing);
-		got = quiet_ms > dead_ms ? -ETIME : 0;
+		got = quiet_ms > dead_ms	       ? -ETIME
+		      : iio_source_changed(&f->source) ? -ESTALE
+						       : 0;
 		if (got)
 			break;
 	}
@@ -164,8 +166,11 @@ static void *run_iio_force(void *argument)
 				    : 0,
 		     got == -ETIME ? "no more samples arrived; check that its trigger "
 				     "runs, and start again"
-				   : "its buffer cannot be read any more; see dmesg, "
-				     "and start again");
+		     : got == -ESTALE
+			     ? "another program changed its scale, so that the last "
+			       "samples may be wrong; end it, and start again"
+			     : "its buffer cannot be read any more; see dmesg, "
+			       "and start again");
 	return NULL;
 }
 

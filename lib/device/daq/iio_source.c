@@ -13,6 +13,7 @@
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include "../../base/monotonic.h"
 #include "iio_source.h"
 
 /* --- format --- */
@@ -226,7 +227,8 @@ static int set_rate(struct iio_source *s, const struct iio_device *trigger,
 
 /* --- set-up --- */
 
-#define CODE_BITS_MAX 31 /* of incise_force_sample.code */
+#define CODE_BITS_MAX 31      /* of incise_force_sample.code */
+#define CHECK_NS 1000000000LL /* between two checks of the scale */
 
 bool iio_source_can_sample(const struct iio_channel *channel)
 {
@@ -483,7 +485,9 @@ static int set_clock(struct iio_source *s, struct incise_error *err)
 
 static int set_volts(struct iio_source *s, struct incise_error *err)
 {
-	if (iio_source_volts(s->voltage, &s->format, &s->full_scale_V, &s->offset_V))
+	s->has_scale =
+		iio_source_volts(s->voltage, &s->format, &s->full_scale_V, &s->offset_V);
+	if (s->has_scale)
 		return 0;
 	if (s->setup.full_scale_V <= 0)
 		return incise_error_set(
@@ -595,14 +599,28 @@ int iio_source_open(struct iio_source *s, const char *name, struct incise_error 
 	rc = rc ? rc : check_alone(s, err);
 	rc = rc ? rc : with_own_trigger(s, name, err);
 	rc = rc ? rc : take_channels(s, err);
-	rc = rc ? rc : set_volts(s, err);
 	rc = rc ? rc : set_clock(s, err);
 	rc = rc ? rc : set_trigger(s, err);
 	if (rc)
 		return rc;
 	trigger = *s->trigger_used ? iio_context_find_device(s->context, s->trigger_used)
 				   : NULL;
-	return set_rate(s, trigger, err);
+	rc = set_rate(s, trigger, err);
+	/* Of some converters the scale follows the rate. */
+	return rc ? rc : set_volts(s, err);
+}
+
+bool iio_source_changed(struct iio_source *s)
+{
+	int64_t now_ns = incise_monotonic_ns();
+	double full_scale_V, offset_V;
+
+	if (now_ns - s->checked_ns < CHECK_NS)
+		return false;
+	s->checked_ns = now_ns;
+	return s->has_scale &&
+	       iio_source_volts(s->voltage, &s->format, &full_scale_V, &offset_V) &&
+	       (full_scale_V != s->full_scale_V || offset_V != s->offset_V);
 }
 
 void iio_source_close(struct iio_source *s)

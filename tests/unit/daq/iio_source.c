@@ -479,6 +479,23 @@ TEST(volts, setup)
 	}
 }
 
+TEST(a_scale_that_is_changed, setup)
+{
+	struct attribute *scale = the_voltage()->attributes;
+
+	assert_int_equal(open_source(&s, "adc", 10000, "", &err), 0);
+	assert_false(iio_source_changed(&s));
+	snprintf(scale->text, sizeof(scale->text), "0.3");
+	/* It was read just now. */
+	assert_false(iio_source_changed(&s));
+	s.checked_ns = 0;
+	assert_true(iio_source_changed(&s));
+	s.checked_ns = 0;
+	scale->key = "else";
+	assert_false(iio_source_changed(&s));
+	iio_source_close(&s);
+}
+
 /* Without a scale the set-up's is taken; a rate may be the channel's. */
 TEST(what_the_driver_does_not_say, setup)
 {
