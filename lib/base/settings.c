@@ -382,6 +382,8 @@ static int read_one(const struct incise_setting *row, const config_setting_t *se
 		store(row, &value, to);
 		return 0;
 	}
+	if (row->read)
+		return row->read(to, setting, path, err);
 	say_expected(row, expected, sizeof(expected));
 	return incise_conf_error(setting, NULL, path, err, "%s", expected);
 }
@@ -624,7 +626,7 @@ void incise_settings_list(struct incise_settings_list *list,
 		    *rows->initial != '(')
 			incise_setting_quoted(rows->initial, text, sizeof(text));
 		else if (rows->kind == SETTING_IS_OWN ||
-			 (setting && rows->kind == SETTING_IS_TEXT))
+			 (setting && config_setting_type(setting) == CONFIG_TYPE_STRING))
 			as_written(setting, text, sizeof(text));
 		else
 			incise_setting_text(rows, of, text, sizeof(text));

@@ -58,6 +58,7 @@ struct incise_setting {
 	size_t count; /* offset of the int that counts the numbers, or 0: all */
 	const char *const *words; /* ends with NULL */
 	const struct incise_setting *rows;
+	/* A row of another kind than SETTING_IS_OWN reads by it values that do not fit. */
 	int (*read)(void *to, const config_setting_t *setting, const char *path,
 		    struct incise_error *err);
 	/* A further condition of a value, given its numbers or its text; and the condition in words. */

@@ -74,12 +74,30 @@ static int read_foot_key(void *to, const config_setting_t *setting, const char *
 	return 0;
 }
 
+/* A number is the usual form. */
+static int read_channel(void *to, const config_setting_t *setting, const char *path,
+			struct incise_error *err)
+{
+	struct incise_force_setup *force = &((struct incise_rig_plan *)to)->force;
+	const char *name = config_setting_get_string(setting);
+	size_t size = sizeof(force->channel_name);
+
+	if (!name || !*name || strlen(name) >= size || !has_no_slash(NULL, 0, name))
+		return incise_conf_error(
+			setting, NULL, path, err,
+			"a whole number from 0 to 255, or for IIO the name of a channel, "
+			"such as \"voltage0-voltage1\"");
+	snprintf(force->channel_name, size, "%s", name);
+	return 0;
+}
+
 static int read_actuators(void *to, const config_setting_t *all, const char *path,
 			  struct incise_error *err);
 static int read_sim(void *to, const config_setting_t *group, const char *path,
 		    struct incise_error *err);
 
 static const char *const clocks[] = {"real", "simulated", NULL};
+static const char *const references[] = {"any", "ground", "common", "differential", NULL};
 static const char *const syncs[] = {"internal", "external", "video", NULL};
 static const char *const formats[] = {"rgb", "grey", "yuyv", "mjpeg", NULL};
 
@@ -113,7 +131,12 @@ static const struct incise_setting tracker_settings[] = {
 static const struct incise_setting force_settings[] = {
 	SETTING_NUMBER(rate_hz, force.rate_hz, "Hz", 1, 100000, "10000",
 		       "samples per second"),
-	SETTING_WHOLE(channel, force.channel, "", 0, 255, "0", "channel of the device"),
+	SETTING_WHOLE(channel, force.channel, "", 0, 255, "0",
+		      "channel of the device; IIO: or its name in quotes",
+		      .read = read_channel),
+	SETTING_WORD(reference, force.reference, references, "any",
+		     "comedi: what the input is compared with: ground, common, "
+		     "differential, or any, the first of these that the card has"),
 	SETTING_NUMBER(full_scale_V, force.full_scale_V, "V", 1e-6, 1000,
 		       "(by the device)", "input range"),
 	SETTING_TEXT(trigger, force.trigger, "(see below)",
@@ -140,6 +163,8 @@ static const struct incise_setting camera_settings[] = {
 		       "(as set)", "colour temperature"),
 	SETTING_NUMBER(focus, camera.focus, "", 1, 1e6, "(as set)",
 		       "focus, in units of the driver"),
+	SETTING_NUMBER(age_ms, camera.age_ms, "ms", 1, 60000, "(see below)",
+		       "largest age of a timestamp when its frame arrives"),
 	{0},
 };
 

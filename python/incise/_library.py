@@ -230,6 +230,7 @@ class Stream(ctypes.Structure):
         ("offset_ms", c_double),
         ("offset_sd_ms", c_double),
         ("ended", c_char * 200),
+        ("note", c_char * 300),
     ]
     c_name = "struct incise_stream"
 

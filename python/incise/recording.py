@@ -93,6 +93,7 @@ class Stream(NamedTuple):
     offset_ms: float  #: of times: the delay, and the expected error of the line
     offset_sd_ms: float  #: standard uncertainty of times
     ended: str  #: cause of an end before the recording's; empty: none
+    note: str  #: a doubt of the device or its settings; empty: none
 
 
 class Info(NamedTuple):

@@ -56,6 +56,17 @@ until_records() {
 		FROM tracker) WHERE d <= 0")" = 0 ]
 }
 
+@test "a tip offset that another program left is a warning, and in the recording" {
+	plug_in --tip 5.25
+	incise capture -o a.rec --duration 1s >report 2>err || true # a busy machine loses some
+	grep -q '^incise capture: warning: FASTRAK .*: settings of the tracker alter its poses: N1 5.25 0 0$' err
+	grep -q '^warning: tracker: settings of the tracker alter its poses: N1 5.25 0 0$' report
+	[ "$(ask a.rec "SELECT value FROM meta WHERE key='tracker_note'")" = \
+		"settings of the tracker alter its poses: N1 5.25 0 0" ]
+	incise info a.rec --json >info.json
+	grep -q 'N1 5.25 0 0' info.json
+}
+
 # bats test_tags=check
 @test "info asks a source that is named, of whatever kind" {
 	plug_in

@@ -39,6 +39,7 @@ void emulator_init(struct emulator *e, enum emulator_kind kind, int64_t now_ns)
 		e->items[i][2] = 1;
 		e->n_items[i] = 3;
 		e->hemisphere[i][0] = 1;
+		e->alignment[i][3] = e->alignment[i][7] = 200;
 	}
 	/* As somebody left it: filters on, and an increment that holds records back. */
 	for (int i = 0; i < 2; i++)
@@ -433,13 +434,24 @@ static void set_items(struct emulator *e, int i, const double *v, int n)
 		e->items[i][j] = (int)v[j];
 }
 
+/* Numbers that follow each other without a blank, if they are as long as their fields. */
+static void reply_list(struct emulator *e, int station, char c, const double *v, int n,
+		       const char *form)
+{
+	char text[100] = "";
+
+	for (int j = 0; j < n; j++)
+		snprintf(text + strlen(text), sizeof(text) - strlen(text), form, v[j]);
+	reply(e, "2%d%c%s", station, c, text);
+}
+
 static void fastrak_command(struct emulator *e)
 {
 	char c = e->command[0];
 	double v[EMULATOR_ITEMS + 1];
 	int n, i;
 
-	if (!c || !strchr("OHIlxvye", c)) {
+	if (!c || !strchr("OHIlxvyeABNr", c)) {
 		error(e, -99);
 		return;
 	}
@@ -448,11 +460,11 @@ static void fastrak_command(struct emulator *e)
 		error(e, -2);
 		return;
 	}
-	if (strchr("OHIle", c) && (n < 1 || !is_station(v[0]))) {
+	if (strchr("OHIleABNr", c) && (n < 1 || !is_station(v[0]))) {
 		error(e, n < 1 ? -1 : -3);
 		return;
 	}
-	i = n && strchr("OHIle", c) ? (int)v[0] - 1 : 0;
+	i = n && strchr("OHIleABNr", c) ? (int)v[0] - 1 : 0;
 	if (is_stuck(e, c) && n > (strchr("xvy", c) ? 0 : 1))
 		return;
 	switch (c) {
@@ -478,6 +490,18 @@ static void fastrak_command(struct emulator *e)
 			      e->hemisphere[i][1], e->hemisphere[i][2]);
 		else
 			error(e, -1);
+		break;
+	case 'A':
+		reply_list(e, i + 1, c, e->alignment[i], 9, "%7.2f");
+		break;
+	case 'B':
+		e->boresights++;
+		break;
+	case 'N':
+		reply_list(e, i + 1, c, e->tip[i], 3, "%7.3f");
+		break;
+	case 'r':
+		reply_list(e, i + 1, c, e->mounting[i], 3, "%8.3f");
 		break;
 	case 'I':
 		if (n == 2)
@@ -521,7 +545,7 @@ static void fastrak_command(struct emulator *e)
 
 static void answer_reals(struct emulator *e, int station, char c, const double *v, int n)
 {
-	float f[4];
+	float f[9];
 
 	for (int i = 0; i < n; i++)
 		f[i] = (float)v[i];
@@ -549,7 +573,7 @@ static void liberty_command(struct emulator *e)
 	char c = e->command[0];
 	double v[EMULATOR_ITEMS + 1];
 	int n = numbers(e->command + 1, v, EMULATOR_ITEMS + 1), i;
-	bool stationed = c && strchr("OHL\025", c);
+	bool stationed = c && strchr("OHLAN\025", c);
 
 	if (n < 0 || !c ||
 	    (stationed && (n < 1 || (!is_station(v[0]) && c != ('U' & 31))))) {
@@ -589,6 +613,10 @@ static void liberty_command(struct emulator *e)
 		memcpy(e->hemisphere[i], v + 1, sizeof(e->hemisphere[i]));
 	else if (c == 'H')
 		answer_reals(e, i + 1, c, e->hemisphere[i], 3);
+	else if (c == 'A' && n == 1)
+		answer_reals(e, i + 1, c, e->alignment[i], 9);
+	else if (c == 'N' && n == 1)
+		answer_reals(e, i + 1, c, e->tip[i], 3);
 	else if ((c == 'X' || c == 'Y') && n == 4)
 		memcpy(e->filters[c == 'Y'], v, sizeof(e->filters[0]));
 	else if (c == 'X' || c == 'Y')

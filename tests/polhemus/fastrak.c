@@ -3,7 +3,7 @@
  * The emulator as a program, in real time:
  *
  *   fastrak [--kind fastrak|liberty|patriot] [--stations 12] [--flip N] [--lose N] [--link PATH]
- *           [--usb FOLDER]
+ *           [--tip CM] [--usb FOLDER]
  *
  * behind a pseudo terminal, which it prints as "ready tty:/dev/pts/5:115200" (of PATH, a link,
  * when that is given), or as a device of USB in a mounted FunctionFS. N are parts of a
@@ -134,7 +134,7 @@ static void serve_tty(void)
 static int usage(void)
 {
 	fputs("usage: fastrak [--kind fastrak|liberty|patriot] [--stations 12] [--flip N] "
-	      "[--lose N] [--link PATH] [--usb FOLDER]\n",
+	      "[--lose N] [--link PATH] [--tip CM] [--usb FOLDER]\n",
 	      stderr);
 	return 2;
 }
@@ -144,6 +144,7 @@ int main(int argc, char **argv)
 	enum emulator_kind kind = EMULATOR_FASTRAK;
 	const char *stations = "1";
 	struct emulator_damage damage = {.to = UINT64_MAX};
+	double tip_cm = 0;
 
 	for (int i = 1; i + 1 < argc; i += 2) {
 		if (!strcmp(argv[i], "--kind"))
@@ -158,6 +159,8 @@ int main(int argc, char **argv)
 			damage.lose = (unsigned int)atoi(argv[i + 1]);
 		else if (!strcmp(argv[i], "--link"))
 			link_path = argv[i + 1];
+		else if (!strcmp(argv[i], "--tip"))
+			tip_cm = atof(argv[i + 1]);
 		else if (!strcmp(argv[i], "--usb"))
 			usb_folder = argv[i + 1];
 		else
@@ -169,6 +172,7 @@ int main(int argc, char **argv)
 	setvbuf(stdin, NULL, _IONBF, 0);
 	emulator_init(&e, kind, now_ns());
 	e.damage = damage;
+	e.tip[0][0] = tip_cm;
 	for (; *stations >= '1' && *stations <= '4'; stations++)
 		e.present[*stations - '1'] = true;
 	if (usb_folder)

@@ -95,9 +95,12 @@ void stream_table(const struct incise_stream *streams, int n)
 		puts(line);
 	}
 	not_calibrated(streams, n);
-	for (int i = 0; i < n; i++)
+	for (int i = 0; i < n; i++) {
+		if (*streams[i].note)
+			printf("warning: %s: %s\n", streams[i].name, streams[i].note);
 		if (*streams[i].ended)
 			printf("%s ended: %s\n", streams[i].name, streams[i].ended);
+	}
 }
 
 json_t *stream_json(const struct incise_stream *streams, int n)
@@ -109,22 +112,23 @@ json_t *stream_json(const struct incise_stream *streams, int n)
 
 		json_array_append_new(
 			array,
-			json_pack("{so so sb so so so sI sI sI so so so so so so so so}",
-				  "name", json_text(s->name), "device",
-				  json_text(s->device), "stamped", s->timestamped,
-				  "nominal_hz", json_number(s->nominal_hz), "delay_ms",
-				  json_number(s->delay_ms), "delay_sd_ms",
-				  json_number(s->delay_sd_ms), "rows",
-				  (json_int_t)s->rows, "lost", (json_int_t)s->lost,
-				  "late", (json_int_t)s->late, "rate_hz",
-				  json_number(s->rate_hz), "drift_ppm",
-				  json_number(s->drift_ppm), "drift_sd_ppm",
-				  json_number(s->drift_sd_ppm), "jitter_ms",
-				  json_number(s->jitter_ms), "jitter_max_ms",
-				  json_number(s->jitter_max_ms), "offset_ms",
-				  json_number(s->offset_ms), "offset_sd_ms",
-				  json_number(s->offset_sd_ms), "ended",
-				  json_text_or_null(s->ended)));
+			json_pack(
+				"{so so so sb so so so sI sI sI so so so so so so so so}",
+				"note", json_text_or_null(s->note), "name",
+				json_text(s->name), "device", json_text(s->device),
+				"stamped", s->timestamped, "nominal_hz",
+				json_number(s->nominal_hz), "delay_ms",
+				json_number(s->delay_ms), "delay_sd_ms",
+				json_number(s->delay_sd_ms), "rows", (json_int_t)s->rows,
+				"lost", (json_int_t)s->lost, "late", (json_int_t)s->late,
+				"rate_hz", json_number(s->rate_hz), "drift_ppm",
+				json_number(s->drift_ppm), "drift_sd_ppm",
+				json_number(s->drift_sd_ppm), "jitter_ms",
+				json_number(s->jitter_ms), "jitter_max_ms",
+				json_number(s->jitter_max_ms), "offset_ms",
+				json_number(s->offset_ms), "offset_sd_ms",
+				json_number(s->offset_sd_ms), "ended",
+				json_text_or_null(s->ended)));
 	}
 	return array;
 }

@@ -44,6 +44,7 @@ struct card {
 	int bits;
 	double full_scale_V, offset_V;
 	double period_ns; /* accepted by the card */
+	char note[300];	  /* see struct incise_force_info */
 };
 
 /* Bits of codes 0 … @maxdata; 0: no converter has these. */
@@ -165,9 +166,59 @@ static int open_device(struct card *card, struct incise_error *err)
 				card->where, card->path, strerror(code));
 }
 
+static const struct {
+	int flag, reference;
+	const char *name;
+} references[] = {
+	[INCISE_FORCE_GROUND] = {SDF_GROUND, AREF_GROUND, "ground"},
+	[INCISE_FORCE_COMMON] = {SDF_COMMON, AREF_COMMON, "common"},
+	[INCISE_FORCE_DIFFERENTIAL] = {SDF_DIFF, AREF_DIFF, "differential"},
+};
+
+/* "ground, differential": references of a subdevice; their number. */
+static int list_references(int flags, char *text, size_t size)
+{
+	int n = 0;
+
+	snprintf(text, size, "none");
+	for (int i = INCISE_FORCE_GROUND; i <= INCISE_FORCE_DIFFERENTIAL; i++)
+		if (flags & references[i].flag) {
+			size_t used = n ? strlen(text) : 0;
+
+			snprintf(text + used, size - used, "%s%s", n++ ? ", " : "",
+				 references[i].name);
+		}
+	return n;
+}
+
+/* The one of rig.conf, or the first that the subdevice has. */
+static int take_reference(struct card *card, int flags, struct incise_error *err)
+{
+	enum incise_force_reference asked = card->setup.reference, i = asked;
+	char known[40];
+	int n = list_references(flags, known, sizeof(known));
+
+	if (!asked)
+		for (i = INCISE_FORCE_GROUND; n && !(flags & references[i].flag);)
+			i++;
+	if (asked && !(flags & references[asked].flag))
+		return incise_error_set(err, EINVAL,
+					"%s: %s has no reference \"%s\"; correct "
+					"force_setup.reference (available: %s)",
+					card->where, card->path, references[asked].name,
+					known);
+	card->reference = n ? (unsigned int)references[i].reference : AREF_OTHER;
+	if (!asked && n > 1)
+		snprintf(card->note, sizeof(card->note),
+			 "compared with %s, but the card has %s; set "
+			 "force_setup.reference as the sensor is wired",
+			 references[i].name, known);
+	return 0;
+}
+
 static int take_subdevice(struct card *card, int asked, struct incise_error *err)
 {
-	int n = comedi_get_n_subdevices(card->device), flags;
+	int n = comedi_get_n_subdevices(card->device), flags, rc;
 
 	for (int i = 0; i < n && asked < 0; i++)
 		if (can_stream(card->device, (unsigned int)i))
@@ -185,10 +236,9 @@ static int take_subdevice(struct card *card, int asked, struct incise_error *err
 					"%s: %s is in use by another program; end it",
 					card->where, card->path);
 	card->wide = flags & SDF_LSAMPL;
-	card->reference = flags & SDF_GROUND   ? AREF_GROUND
-			  : flags & SDF_COMMON ? AREF_COMMON
-			  : flags & SDF_DIFF   ? AREF_DIFF
-					       : AREF_OTHER;
+	rc = take_reference(card, flags, err);
+	if (rc)
+		return rc;
 	/* A file reads one subdevice; any but the first must be chosen. */
 	if (comedi_get_read_subdevice(card->device) != asked &&
 	    comedi_set_read_subdevice(card->device, card->subdevice) < 0)
@@ -219,7 +269,8 @@ static int take_channel(struct card *card, struct incise_error *err)
 	comedi_range ranges[RANGES_MAX] = {0};
 	lsampl_t maxdata;
 
-	if (card->setup.channel < 0 || card->setup.channel >= n)
+	if (card->setup.channel < 0 || card->setup.channel >= n ||
+	    *card->setup.channel_name)
 		return incise_error_set(err, EINVAL,
 					"%s: %s has channels 0 to %d; correct "
 					"force_setup.channel",
@@ -549,6 +600,7 @@ static int start_comedi_force(struct comedi_force *f, struct incise_error *err)
 	info->offset_V = f->card.offset_V;
 	snprintf(info->name, sizeof(info->name), "%.36s channel %d, by arrival",
 		 comedi_get_board_name(f->card.device), f->card.setup.channel);
+	snprintf(info->note, sizeof(info->note), "%s", f->card.note);
 	times_init(&f->times, f->card.period_ns);
 	rc = daq_feed_init(&f->feed);
 	if (!rc && fcntl(fd, F_SETFL, fcntl(fd, F_GETFL) | O_NONBLOCK) < 0)
@@ -623,7 +675,7 @@ static void describe_comedi_force(const char *path, comedi_t *card,
 	unsigned int chanlist[1] = {CR_PACK(0, 0, AREF_GROUND)};
 	double period_ns;
 	comedi_cmd command;
-	char stable[80];
+	char stable[80], known[40];
 
 	*device = (struct incise_scan_device){0};
 	/* /dev/comediN depends on the order of probing; the link names slot or socket. */
@@ -640,6 +692,8 @@ static void describe_comedi_force(const char *path, comedi_t *card,
 	incise_scan_tell(device, "channels", "%d", n);
 	incise_scan_tell(device, "bits", "%d", bits);
 	add_ranges(device, card, subdevice);
+	list_references(flags, known, sizeof(known));
+	incise_scan_tell(device, "references", "%s", known);
 	/* The shortest accepted period; tests do not disturb a running command. */
 	period_ns = command_period(card, subdevice, chanlist, 1, &command);
 	device->usable = bits && period_ns > 0;

@@ -153,7 +153,9 @@ static void *run_iio_force(void *argument)
 		/* No successor of the held sample comes within the next periods. */
 		if (quiet_ms > 2 * QUIET_MS)
 			spacing_flush(&f->spacing);
-		got = quiet_ms > dead_ms ? -ETIME : 0;
+		got = quiet_ms > dead_ms	       ? -ETIME
+		      : iio_source_changed(&f->source) ? -ESTALE
+						       : 0;
 		if (got)
 			break;
 	}
@@ -164,8 +166,11 @@ static void *run_iio_force(void *argument)
 				    : 0,
 		     got == -ETIME ? "no more samples arrived; check that its trigger "
 				     "runs, and start again"
-				   : "its buffer cannot be read any more; see dmesg, "
-				     "and start again");
+		     : got == -ESTALE
+			     ? "another program changed its scale, so that the last "
+			       "samples may be wrong; end it, and start again"
+			     : "its buffer cannot be read any more; see dmesg, "
+			       "and start again");
 	return NULL;
 }
 
@@ -282,10 +287,7 @@ static int voltages(const struct iio_device *device, struct iio_channel **first)
 	for (unsigned int i = 0; i < n; i++) {
 		struct iio_channel *c = iio_device_get_channel(device, i);
 
-		if (iio_channel_is_output(c) || !iio_channel_is_scan_element(c) ||
-		    strncmp(iio_channel_get_id(c), "voltage", 7) != 0)
-			continue;
-		if (!count++)
+		if (iio_source_can_sample(c) && !count++)
 			*first = c;
 	}
 	return count;
@@ -328,6 +330,7 @@ static void describe_iio_force(const struct iio_context *context,
 	struct iio_format format;
 	bool stamped = iio_device_find_channel(iio, "timestamp", false);
 	bool plain = !iio_format_of(&format, data, 31);
+	char names[100];
 
 	*device = (struct incise_scan_device){0};
 	snprintf(device->device, sizeof(device->device), "iio:%.90s",
@@ -340,6 +343,8 @@ static void describe_iio_force(const struct iio_context *context,
 		incise_scan_tell(device, "name", "%.90s", name);
 	incise_scan_tell(device, "channels", "%d", channels);
 	incise_scan_tell(device, "channel", "%.90s", iio_channel_get_id(channel));
+	iio_source_list_channels(iio, names, sizeof(names));
+	incise_scan_tell(device, "channel_names", "%s", names);
 	incise_scan_tell(device, "bits", "%u", data->bits);
 	device->usable = stamped && plain;
 	if (plain && iio_source_volts(channel, &format, &full_scale_V, &offset_V))

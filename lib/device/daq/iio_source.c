@@ -13,9 +13,8 @@
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include "../../base/monotonic.h"
 #include "iio_source.h"
-
-/* --- format --- */
 
 /* --- format --- */
 
@@ -39,7 +38,6 @@ int iio_format_of(struct iio_format *format, const struct iio_data_format *data,
 }
 
 /* The bits at @at, shifted down; without regard to sign. */
-/* The bits at @at, shifted down; without regard to sign. */
 static uint64_t raw_value(const struct iio_format *format, const void *at)
 {
 	const unsigned char *byte = at;
@@ -51,7 +49,6 @@ static uint64_t raw_value(const struct iio_format *format, const void *at)
 	return format->bits < 64 ? value & ((UINT64_C(1) << format->bits) - 1) : value;
 }
 
-/* The same as a code: 0 … 2^bits - 1, growing with the voltage. For bits up to 31. */
 /* The same as a code: 0 … 2^bits - 1, growing with the voltage. For bits up to 31. */
 static int32_t code_of(const struct iio_format *format, const void *at)
 {
@@ -70,16 +67,8 @@ static int32_t code_of(const struct iio_format *format, const void *at)
  * kernels that have iio-trig-hrtimer loaded.
  */
 
-/*
- * --- trigger ---
- *
- * An hrtimer trigger "incise-PID-N", made through configfs while a channel is open, on
- * kernels that have iio-trig-hrtimer loaded.
- */
-
 #define OURS_MAX 16 /* of one process */
 
-/* 0 and its name; -ENOENT (the kernel has none), -EACCES, -ENOSPC … */
 /* 0 and its name; -ENOENT (the kernel has none), -EACCES, -ENOSPC … */
 static int make_trigger(const char *folder, char *name, size_t size)
 {
@@ -98,7 +87,6 @@ static int make_trigger(const char *folder, char *name, size_t size)
 }
 
 /* @name may be empty. */
-/* @name may be empty. */
 static void remove_trigger(const char *folder, const char *name)
 {
 	char path[PATH_MAX];
@@ -109,7 +97,6 @@ static void remove_trigger(const char *folder, const char *name)
 	rmdir(path);
 }
 
-/* Remove triggers of processes that have ended. */
 /* Remove triggers of processes that have ended. */
 static void sweep_triggers(const char *folder)
 {
@@ -186,7 +173,6 @@ static void read_available(const struct rate_place *place, char *text, size_t si
 }
 
 /* @trigger: the one in use, or NULL. Sets s->rate_hz. */
-/* @trigger: the one in use, or NULL. Sets s->rate_hz. */
 static int set_rate(struct iio_source *s, const struct iio_device *trigger,
 		    struct incise_error *err)
 {
@@ -241,29 +227,95 @@ static int set_rate(struct iio_source *s, const struct iio_device *trigger,
 
 /* --- set-up --- */
 
-/* --- set-up --- */
+#define CODE_BITS_MAX 31      /* of incise_force_sample.code */
+#define CHECK_NS 1000000000LL /* between two checks of the scale */
 
-#define CODE_BITS_MAX 31 /* of incise_force_sample.code */
+bool iio_source_can_sample(const struct iio_channel *channel)
+{
+	return !iio_channel_is_output(channel) && iio_channel_is_scan_element(channel) &&
+	       !strncmp(iio_channel_get_id(channel), "voltage", 7);
+}
 
-/* "voltage0", or "voltage0-voltage1" of a differential one; NULL: none for a buffer. */
-/* "voltage0", or "voltage0-voltage1" of a differential one; NULL: none for a buffer. */
-static struct iio_channel *find_voltage(const struct iio_device *device, int channel)
+/* "voltage0", or "voltage0_force" of a channel with a name. */
+static void print_channel(const struct iio_channel *channel, char *text, size_t size)
+{
+	const char *name = iio_channel_get_name(channel);
+
+	snprintf(text, size, "%.60s%s%.60s", iio_channel_get_id(channel), name ? "_" : "",
+		 name ? name : "");
+}
+
+void iio_source_list_channels(const struct iio_device *device, char *text, size_t size)
 {
 	unsigned int n = iio_device_get_channels_count(device);
-	char id[24];
-	size_t length;
+	size_t used = 0;
 
-	snprintf(id, sizeof(id), "voltage%d", channel);
-	length = strlen(id);
+	snprintf(text, size, "none");
+	for (unsigned int i = 0; i < n && used + 2 < size; i++) {
+		const struct iio_channel *c = iio_device_get_channel(device, i);
+
+		if (!iio_source_can_sample(c))
+			continue;
+		used += (size_t)snprintf(text + used, size - used, used ? ", " : "");
+		print_channel(c, text + used, size - used);
+		used += strlen(text + used);
+	}
+}
+
+/* A name is a channel's id, the id of the first input of its difference, or as printed. */
+enum fit { FITS_ID, FITS_INPUT, FITS_PRINTED };
+
+static bool fits_channel(const struct iio_channel *channel, const char *name,
+			 enum fit how)
+{
+	const char *id = iio_channel_get_id(channel);
+	size_t length = strlen(name);
+	char printed[130];
+
+	if (how != FITS_PRINTED)
+		return !strncmp(id, name, length) &&
+		       id[length] == (how == FITS_INPUT ? '-' : '\0');
+	print_channel(channel, printed, sizeof(printed));
+	return !strcmp(printed, name);
+}
+
+/* Count the channels that fit; *found is the last one. */
+static int count_fits(const struct iio_device *device, const char *name, enum fit how,
+		      struct iio_channel **found)
+{
+	unsigned int n = iio_device_get_channels_count(device);
+	int count = 0;
+
 	for (unsigned int i = 0; i < n; i++) {
 		struct iio_channel *c = iio_device_get_channel(device, i);
-		const char *is = iio_channel_get_id(c);
 
-		if (!iio_channel_is_output(c) && iio_channel_is_scan_element(c) &&
-		    !strncmp(is, id, length) && (!is[length] || is[length] == '-'))
-			return c;
+		if (!iio_source_can_sample(c) || !fits_channel(c, name, how))
+			continue;
+		*found = c;
+		count++;
 	}
-	return NULL;
+	return count;
+}
+
+/* NULL: no channel has this name, or several do. */
+static struct iio_channel *find_named(const struct iio_device *device, const char *name)
+{
+	struct iio_channel *found = NULL;
+	int n = count_fits(device, name, FITS_ID, &found);
+
+	if (!n)
+		n = count_fits(device, name, FITS_INPUT, &found);
+	if (n != 1)
+		n = count_fits(device, name, FITS_PRINTED, &found);
+	return n == 1 ? found : NULL;
+}
+
+static struct iio_channel *find_voltage(const struct iio_device *device, int channel)
+{
+	char name[24];
+
+	snprintf(name, sizeof(name), "voltage%d", channel);
+	return find_named(device, name);
 }
 
 bool iio_source_volts(const struct iio_channel *channel, const struct iio_format *format,
@@ -366,16 +418,27 @@ static int check_alone(struct iio_source *s, struct incise_error *err)
 
 static int take_channels(struct iio_source *s, struct incise_error *err)
 {
-	const char *id = iio_device_get_id(s->device);
+	const char *id = iio_device_get_id(s->device), *name = s->setup.channel_name;
 	const struct iio_data_format *data;
+	char known[200], number[16];
 
-	s->voltage = find_voltage(s->device, s->setup.channel);
-	if (!s->voltage)
-		return incise_error_set(err, ENODEV,
-					"%s: %s has no voltage%d for buffers; see `ls "
-					"/sys/bus/iio/devices/%s/scan_elements` and set "
+	s->voltage = *name ? find_named(s->device, name)
+			   : find_voltage(s->device, s->setup.channel);
+	if (!s->voltage) {
+		iio_source_list_channels(s->device, known, sizeof(known));
+		snprintf(number, sizeof(number), "%d", s->setup.channel);
+		return incise_error_set(
+			err, ENODEV,
+			"%s: channel %s is no single channel of %s; set "
+			"force_setup.channel to one of these, in quotes: %s",
+			s->where, *name ? name : number, id, known);
+	}
+	if (s->setup.reference)
+		return incise_error_set(err, EINVAL,
+					"%s: only comedi has force_setup.reference; name "
+					"an input or a difference of two in "
 					"force_setup.channel",
-					s->where, id, s->setup.channel, id);
+					s->where);
 	s->timestamp = iio_device_find_channel(s->device, "timestamp", false);
 	if (!s->timestamp || !iio_channel_is_scan_element(s->timestamp) ||
 	    iio_format_of(&s->timestamp_format, iio_channel_get_data_format(s->timestamp),
@@ -422,7 +485,9 @@ static int set_clock(struct iio_source *s, struct incise_error *err)
 
 static int set_volts(struct iio_source *s, struct incise_error *err)
 {
-	if (iio_source_volts(s->voltage, &s->format, &s->full_scale_V, &s->offset_V))
+	s->has_scale =
+		iio_source_volts(s->voltage, &s->format, &s->full_scale_V, &s->offset_V);
+	if (s->has_scale)
 		return 0;
 	if (s->setup.full_scale_V <= 0)
 		return incise_error_set(
@@ -534,14 +599,28 @@ int iio_source_open(struct iio_source *s, const char *name, struct incise_error 
 	rc = rc ? rc : check_alone(s, err);
 	rc = rc ? rc : with_own_trigger(s, name, err);
 	rc = rc ? rc : take_channels(s, err);
-	rc = rc ? rc : set_volts(s, err);
 	rc = rc ? rc : set_clock(s, err);
 	rc = rc ? rc : set_trigger(s, err);
 	if (rc)
 		return rc;
 	trigger = *s->trigger_used ? iio_context_find_device(s->context, s->trigger_used)
 				   : NULL;
-	return set_rate(s, trigger, err);
+	rc = set_rate(s, trigger, err);
+	/* Of some converters the scale follows the rate. */
+	return rc ? rc : set_volts(s, err);
+}
+
+bool iio_source_changed(struct iio_source *s)
+{
+	int64_t now_ns = incise_monotonic_ns();
+	double full_scale_V, offset_V;
+
+	if (now_ns - s->checked_ns < CHECK_NS)
+		return false;
+	s->checked_ns = now_ns;
+	return s->has_scale &&
+	       iio_source_volts(s->voltage, &s->format, &full_scale_V, &offset_V) &&
+	       (full_scale_V != s->full_scale_V || offset_V != s->offset_V);
 }
 
 void iio_source_close(struct iio_source *s)
@@ -560,8 +639,6 @@ void iio_source_close(struct iio_source *s)
 		close(s->fd);
 	remove_trigger(s->trigger_folder, s->trigger);
 }
-
-/* --- buffer --- */
 
 /* --- buffer --- */
 
@@ -607,14 +684,12 @@ static void clear_scan(const char *folder)
 		closedir(dir);
 }
 
-/* "voltage0", or "voltage0_force" of a channel with a name. */
 static int enable(const char *folder, const struct iio_channel *channel)
 {
-	const char *name = iio_channel_get_name(channel);
-	char file[200];
+	char name[130], file[200];
 
-	snprintf(file, sizeof(file), "scan_elements/in_%.60s%s%.60s_en",
-		 iio_channel_get_id(channel), name ? "_" : "", name ? name : "");
+	print_channel(channel, name, sizeof(name));
+	snprintf(file, sizeof(file), "scan_elements/in_%s_en", name);
 	return write_text(folder, file, "1");
 }
 

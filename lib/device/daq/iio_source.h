@@ -38,6 +38,8 @@ struct iio_source {
 	struct iio_channel *voltage, *timestamp;
 	struct iio_format format, timestamp_format;
 	double rate_hz, full_scale_V, offset_V;
+	bool has_scale;	    /* of the driver */
+	int64_t checked_ns; /* when it was last read */
 	const char
 		*trigger_folder; /* where our own trigger is made: IIO_SOURCE_TRIGGERS */
 	bool trigger_refused;	 /* for lack of permission */
@@ -71,6 +73,12 @@ int iio_source_start(struct iio_source *source, const char *folder, unsigned int
 /* The device may be gone. */
 void iio_source_stop(struct iio_source *source);
 
+/*
+ * Whether the scale is another one than at the set-up, so that codes have another meaning; it is read
+ * once a second.
+ */
+bool iio_source_changed(struct iio_source *source);
+
 /* Number of scans read, or -errno: -EAGAIN (no scan), -ENODEV. */
 int iio_source_read(struct iio_source *source);
 /* The code and the timestamp of scan @i that was read. */
@@ -80,6 +88,11 @@ int64_t iio_source_timestamp(const struct iio_source *source, int i);
 /* 0; -EINVAL: an impossible format, one of more than @bits_max bits, or a vector. */
 int iio_format_of(struct iio_format *format, const struct iio_data_format *data,
 		  unsigned int bits_max);
+
+/* Whether it is a voltage that a buffer can have. */
+bool iio_source_can_sample(const struct iio_channel *channel);
+/* "voltage0-voltage1, voltage0": all of these, as force_setup.channel names them. */
+void iio_source_list_channels(const struct iio_device *device, char *text, size_t size);
 
 /* The range of its codes; false: the driver does not say. */
 bool iio_source_volts(const struct iio_channel *channel, const struct iio_format *format,

@@ -9,7 +9,8 @@
 #include "polhemus_dialogue.h"
 #include "polhemus_setup.h"
 
-#define NEAR 0.02 /* printed numbers have two to four decimals */
+#define NEAR 0.02   /* printed numbers have two to four decimals */
+#define ALIGNMENT 9 /* numbers of it */
 
 /* Bit 0 is station 1. */
 static uint8_t mask_of(const struct incise_tracker_setup *setup)
@@ -65,6 +66,70 @@ static int measure_polhemus_setup(struct polhemus_dialogue *d,
 		"%s: the tracker at %s answers P with %d bytes, which are not one "
 		"record of each of its %d stations; check its sensors",
 		d->where, d->line->name, total, setup->n_stations);
+}
+
+/* Note the values of a setting that alters poses: of an alignment the origin, a point of +x, one of +y. */
+static void note_setting(struct polhemus_identity *identity, int station, char command,
+			 const double *values, int n)
+{
+	char *note = identity->note;
+	size_t size = sizeof(identity->note), used = strlen(note);
+	bool usual = true;
+
+	for (int i = 0; i < n; i++)
+		usual &= n == ALIGNMENT && (i == 3 || i == 7) ? values[i] > 0
+							      : fabs(values[i]) <= NEAR;
+	if (usual)
+		return;
+	used += (size_t)snprintf(
+		note + used, size - used, "%s%c%d",
+		used ? "; " : "settings of the tracker alter its poses: ", command,
+		station);
+	for (int i = 0; i < n && used < size; i++)
+		used += (size_t)snprintf(note + used, size - used, " %.6g", values[i]);
+}
+
+/*
+ * Ask for a setting of @n numbers. An old tracker may refuse the question, or not answer: then
+ * nothing is noted.
+ */
+static int ask_setting(struct polhemus_dialogue *d, struct polhemus_identity *identity,
+		       int station, char command, int n)
+{
+	char question[8], reply[POLHEMUS_REPLY_MAX];
+	struct polhemus_frame frame = {0};
+	double values[ALIGNMENT];
+	int rc, m = 0;
+
+	snprintf(question, sizeof(question), "%c%d\r", command, station);
+	if (identity->layout.family == POLHEMUS_FASTRAK) {
+		rc = polhemus_ask(d, question, command, reply);
+		if (!rc)
+			m = polhemus_reply_numbers(reply, values, n);
+	} else {
+		rc = polhemus_ask_frame(d, question, (unsigned char)command, &frame);
+		for (; !rc && m < n && frame.n >= (size_t)(m + 1) * 4; m++)
+			values[m] = polhemus_real(frame.payload + (size_t)m * 4);
+	}
+	if (rc == -EINVAL && d->err)
+		*d->err = (struct incise_error){0};
+	if (m == n)
+		note_setting(identity, station, command, values, n);
+	return rc == -EINVAL || rc == -ETIMEDOUT ? 0 : rc;
+}
+
+static int ask_settings(struct polhemus_dialogue *d,
+			const struct incise_tracker_setup *setup,
+			struct polhemus_identity *identity)
+{
+	const char *commands = identity->layout.family == POLHEMUS_FASTRAK ? "ArN" : "AN";
+	int rc = 0;
+
+	for (int i = 0; i < setup->n_stations; i++)
+		for (const char *c = commands; *c && !rc; c++)
+			rc = ask_setting(d, identity, setup->stations[i], *c,
+					 *c == 'A' ? ALIGNMENT : 3);
+	return rc;
 }
 
 /*
@@ -212,6 +277,8 @@ static int fastrak_setup(struct polhemus_dialogue *d,
 		rc = fastrak_stations(d, mask_of(setup));
 	for (int i = 0; !rc && i < setup->n_stations; i++)
 		rc = set_station(d, setup->stations[i], setup->hemisphere);
+	if (!rc)
+		rc = ask_settings(d, setup, identity);
 	if (!rc)
 		rc = fastrak_put(d, "x0,1,0,0\r", "x\r", 0, unfiltered, 4,
 				 "no position filter");
@@ -381,6 +448,8 @@ static int liberty_setup(struct polhemus_dialogue *d,
 					 "its hemisphere");
 	}
 	if (!rc)
+		rc = ask_settings(d, setup, identity);
+	if (!rc)
 		rc = liberty_put(d, "X0,1,0,0\r", "X\r", true, unfiltered, 4,
 				 "no position filter");
 	if (!rc)
@@ -461,10 +530,15 @@ static int find_family(struct polhemus_dialogue *d, struct polhemus_identity *id
 
 static int identify(struct polhemus_dialogue *d, struct polhemus_identity *identity)
 {
-	int rc = quiet(d);
+	int rc = -ETIMEDOUT;
 
-	memset(identity, 0, sizeof(*identity));
-	return rc ? rc : find_family(d, identity);
+	/* Again if bytes came: a late answer to quiet() may have spoilt the first answer. */
+	for (int i = 0; rc == -ETIMEDOUT && (!i || (i == 1 && d->first_ns)); i++) {
+		memset(identity, 0, sizeof(*identity));
+		rc = quiet(d);
+		rc = rc ? rc : find_family(d, identity);
+	}
+	return rc;
 }
 
 int polhemus_setup(struct polhemus_line *line, const struct incise_tracker_setup *setup,

@@ -5,7 +5,8 @@
  * Set are binary output, centimetres, items, stations, hemisphere, no filters, no
  * increment (it would hold records back), a stylus button that is only reported (else it
  * stops the stream) and the sync mode. Not changed are alignment, boresight, mounting
- * frame and tip offset of a stylus, which a user may have set on purpose. Nothing is
+ * frame and tip offset of a stylus, which a user may have set on purpose: those that can be
+ * read are noted. (B of a FASTRAK does not read the boresight, it sets it.) Nothing is
  * written to the EEPROM: power off and on restores the old settings.
  */
 #ifndef INCISE_POLHEMUS_SETUP_H
@@ -20,6 +21,7 @@ struct polhemus_identity {
 	struct polhemus_layout layout; /* of its records from now on */
 	char name[64];		       /* "FASTRAK 3.02 OutputCompensat CPG2030-003-10" */
 	char version[16];
+	char note[300]; /* see struct incise_tracker_info */
 	int sensors;	/* bit 0: station 1 has one; -1: not known */
 	int test_error; /* of the self-test at power-on */
 };

@@ -154,6 +154,7 @@ static void tracker_info(const struct incise_tracker *tracker,
 		.grain_ns = t->line->grain_ns,
 	};
 	snprintf(info->name, sizeof(info->name), "%s", t->identity.name);
+	snprintf(info->note, sizeof(info->note), "%s", t->identity.note);
 }
 
 static uint64_t tracker_lost(const struct incise_tracker *tracker)

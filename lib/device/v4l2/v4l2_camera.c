@@ -31,6 +31,7 @@
 #define WAIT_MS 100	      /* for a frame; close takes no longer than that */
 #define CHECK_NS 1000000000LL /* between two checks of the controls, … */
 #define CHECK_FRAMES 64	      /* … or so many frames, whichever is first */
+#define CLOCK_NS 5000000      /* change of the age of frames that is worth a note */
 
 struct v4l2_camera {
 	struct incise_camera camera;
@@ -88,6 +89,11 @@ static void camera_info(const struct incise_camera *camera,
 {
 	const struct v4l2_camera *c = v4l2_camera_of(camera);
 
+	long long clock_ns =
+		atomic_load_explicit(&c->stream.clock_ns, memory_order_relaxed);
+	unsigned int stride =
+		atomic_load_explicit(&c->stream.stride, memory_order_relaxed);
+
 	*info = (struct incise_camera_info){
 		.rate_hz = c->stream.shape.rate_hz,
 		.width = c->stream.shape.width,
@@ -95,7 +101,16 @@ static void camera_info(const struct incise_camera *camera,
 		.pixels = c->stream.shape.pixels,
 		.exposure_ns = c->controls.exposure_ns,
 		.damaged = atomic_load_explicit(&c->stream.damaged, memory_order_relaxed),
+		.clock_ns = clock_ns,
 	};
+	if (clock_ns > CLOCK_NS)
+		snprintf(info->note, sizeof(info->note),
+			 "the age of its frames changed by %.1f ms: its clock drifts or "
+			 "was stepped, and times are uncertain by as much",
+			 (double)clock_ns / 1e6);
+	else if (stride > 1)
+		snprintf(info->note, sizeof(info->note),
+			 "its driver counts %u for each frame, which is no loss", stride);
 	snprintf(info->name, sizeof(info->name), "%s", c->identity.card);
 }
 
@@ -201,6 +216,7 @@ static int set_up_v4l2_camera(struct v4l2_camera *c,
 	rc = v4l2_format_set(c->fd, setup, c->where, &shape, err);
 	if (rc)
 		return rc;
+	shape.age_ms = setup->age_ms;
 	rc = v4l2_controls_lock(&c->controls, c->fd, setup, shape.rate_hz, c->where, err);
 	if (rc)
 		return rc;

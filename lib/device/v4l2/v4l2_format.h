@@ -19,6 +19,7 @@ struct v4l2_shape {
 	int stride;	/* bytes from row to row; 0: MJPEG */
 	size_t least;	/* bytes of a whole frame */
 	double rate_hz; /* 0: not known */
+	double age_ms;	/* largest age of a timestamp; 0: by exposure and rate */
 };
 
 /*

@@ -4,6 +4,7 @@
  * buffer, size within it, a rising timestamp near now, a rising count.
  */
 #include <errno.h>
+#include <math.h>
 #include <poll.h>
 #include <string.h>
 #include <sys/mman.h>
@@ -22,13 +23,15 @@
 #define DAMAGED_ROW 30 /* damaged frames in a row end the stream */
 #define SILENT_NS 5000000000LL /* without a frame; or so many periods: */
 #define SILENT_PERIODS 20
-#define STALE_NS 10000000000LL /* largest valid age of a frame */
-/*
- * A driver may compute a timestamp: from the camera's own clock (UVC), or for the end of
- * a frame that it returns before that (vivid). Other clocks are off by more.
- */
-#define FUTURE_NS 300000000
-#define JUMP_MAX 1000 /* valid step of the count of a damaged frame */
+#define FUTURE_NS 5000000 /* of timestamps computed from the camera's clock (UVC) */
+#define AGE_NS 100000000  /* of frames, beside exposure and … */
+#define AGE_PERIODS 3
+#define PERIOD_NS 100000000 /* … if their rate is not known */
+#define WINDOW 8	    /* frames, beside those that may wait in all buffers */
+#define STEP_ROW 3 /* timestamps off the grid, in a row, that are a step of the clock */
+#define LEAK (1.0 / 16) /* of lateness, into what is expected */
+#define HOLE 256	/* zeros in a row in a JPEG: less than a packet of USB */
+#define JUMP_MAX 1000	/* valid step of the count of a damaged frame */
 
 static struct v4l2_buffer buffer_at(uint32_t index)
 {
@@ -142,6 +145,11 @@ int v4l2_stream_start(struct v4l2_stream *s, int fd, const struct v4l2_shape *sh
 	s->exposure_ns = exposure_ns;
 	s->where = where;
 	s->held = NONE;
+	s->clock.lowest_ns = INT64_MAX;
+	s->clock.highest_ns = INT64_MIN;
+	if (shape->rate_hz > 0)
+		s->clock.period_ns = 1e9 / shape->rate_hz;
+	atomic_store_explicit(&s->stride, 1, memory_order_relaxed);
 	rc = take_buffers(s, err);
 	for (int i = 0; i < s->n && !rc; i++)
 		rc = queue(s, i, err);
@@ -191,29 +199,192 @@ static int take_back(struct v4l2_stream *s, struct incise_error *err)
 	return rc;
 }
 
-/* A JPEG from its first marker to its last, which padding may follow. */
+/*
+ * A JPEG from its first marker (SOI) to its last (EOI), which padding may follow.
+ *
+ *     SOI [ marker, length, … ] [ DHT … ] [ SOS … ] coded RST0 coded RST1 coded … EOI
+ *
+ * A lost part shows by another SOI, by restarts out of order, or by a hole of zeros: in coded data
+ * the shortest code is all zeros, and unless that is the end of a block (EOB), as in the tables
+ * of a few cameras, only blocks of noise would have it again and again.
+ */
+struct jpeg {
+	bool zeros_end[4];	/* by the number of the table: its shortest code is EOB */
+	bool sequential, dense; /* coded data have no long row of zeros */
+	unsigned int restarts;
+};
+
+/* Tables of codes: class and number, how many of each length, the symbols. */
+static void read_tables(struct jpeg *jpeg, const uint8_t *at, const uint8_t *end)
+{
+	while (end - at > 17) {
+		int n = 0;
+
+		for (int i = 1; i <= 16; i++)
+			n += at[i];
+		if (*at >> 4)
+			jpeg->zeros_end[*at & 3] = n && !at[17];
+		at = end - at > 17 + n ? at + 17 + n : end;
+	}
+}
+
+/* @code of the marker; from @at to @end behind its length. */
+static void read_segment(struct jpeg *jpeg, uint8_t code, const uint8_t *at,
+			 const uint8_t *end)
+{
+	if (code == 0xc4)
+		read_tables(jpeg, at, end);
+	else if (code >= 0xc0 && code <= 0xcf && code != 0xc8 && code != 0xcc)
+		jpeg->sequential = code <= 0xc1;
+	else if (code == 0xda && end - at > 2)
+		jpeg->dense = jpeg->sequential && !jpeg->zeros_end[at[2] & 3];
+	jpeg->restarts = 0;
+}
+
 static bool is_jpeg(const uint8_t *data, size_t size)
 {
+	struct jpeg jpeg = {{false, true}, true, true, 0};
+	size_t zeros = 0;
+
 	if (size < 4 || data[0] != 0xff || data[1] != 0xd8)
 		return false;
-	for (size_t i = size - 1; i > 2; i--)
-		if (data[i] == 0xd9 && data[i - 1] == 0xff)
+	for (size_t i = 2; i + 1 < size; i++) {
+		uint8_t code = data[i + 1];
+
+		zeros = data[i] ? 0 : zeros + 1;
+		if (zeros > HOLE && jpeg.dense)
+			return false;
+		if (data[i] != 0xff || code == 0xff)
+			continue;
+		i++;
+		if (code == 0xd9)
 			return true;
+		if (code == 0xd8 ||
+		    (code >= 0xd0 && code <= 0xd7 && (code & 7) != jpeg.restarts++ % 8))
+			return false;
+		if (code >= 0xc0 && (code < 0xd0 || code > 0xd7)) {
+			size_t length =
+				i + 2 < size ? data[i + 1] * 256U + data[i + 2] : 0;
+
+			if (length < 2 || length >= size - i)
+				return false;
+			read_segment(&jpeg, code, data + i + 3, data + i + length + 1);
+			i += length;
+		}
+	}
 	return false;
 }
 
 /* The timestamp, ns; -1: an impossible one. */
-static int64_t timestamp_of(const struct v4l2_stream *s, const struct v4l2_buffer *buffer,
-			    int64_t now)
+static int64_t timestamp_of(const struct v4l2_buffer *buffer)
 {
-	int64_t t;
-
 	if (buffer->timestamp.tv_sec < 0 || buffer->timestamp.tv_sec > 1000000000 ||
 	    buffer->timestamp.tv_usec < 0 || buffer->timestamp.tv_usec > 999999)
 		return -1;
-	t = buffer->timestamp.tv_sec * INCISE_NS_PER_S + buffer->timestamp.tv_usec * 1000;
-	return t > s->timestamp_ns && t <= now + FUTURE_NS && t >= now - STALE_NS ? t
-										  : -1;
+	return buffer->timestamp.tv_sec * INCISE_NS_PER_S +
+	       buffer->timestamp.tv_usec * 1000;
+}
+
+/* Largest age of a frame, ns. */
+static double age_most(const struct v4l2_stream *s)
+{
+	double period_ns =
+		s->shape.rate_hz > 0 ? INCISE_NS_PER_S / s->shape.rate_hz : PERIOD_NS;
+
+	return s->shape.age_ms > 0
+		       ? s->shape.age_ms * 1e6
+		       : (double)s->exposure_ns + AGE_PERIODS * period_ns + AGE_NS;
+}
+
+/* Whether timestamps that do not fit, the last one of frame s->seq, follow each other. */
+static bool has_stepped(struct v4l2_stream *s, int64_t t)
+{
+	struct v4l2_clock *c = &s->clock;
+	double step_ns = (double)(t - c->odd_ns) / (double)(s->seq - c->odd_seq);
+
+	c->odd_row = c->odd_row && step_ns > 0 && step_ns < 1.5 * c->period_ns
+			     ? c->odd_row + 1
+			     : 1;
+	c->odd_ns = t;
+	c->odd_seq = s->seq;
+	return c->odd_row >= STEP_ROW;
+}
+
+/* Whether the timestamp of frame s->seq, which arrived with this age, may be right. */
+static bool fits_clock(struct v4l2_stream *s, int64_t t, int64_t age)
+{
+	struct v4l2_clock *c = &s->clock;
+	double frames = (double)(s->seq - c->seq);
+	double late = (double)t - c->grid_ns - frames * c->period_ns;
+	double older = (double)age - c->age_ns;
+	double most = fmax(c->period_ns / 2, FUTURE_NS);
+	bool odd = s->timestamp_ns && c->period_ns > 0 &&
+		   ((late < -most && older > most) || (late > most && older < -most));
+
+	/* No step makes a frame too old. */
+	if (odd && ((double)age > age_most(s) || !has_stepped(s, t)))
+		return false;
+	c->odd_row = 0;
+	c->grid_ns = (double)t;
+	if (s->timestamp_ns && !odd && late > 0 && c->period_ns > 0)
+		c->grid_ns -= late * (1 - LEAK);
+	c->age_ns += s->timestamp_ns && !odd && older > 0 ? older * LEAK : older;
+	c->seq = s->seq;
+	return true;
+}
+
+/*
+ * Follow the least age of a window, in which not all frames have waited for the thread. 0, or
+ * -EIO: they are too old.
+ */
+static int follow_clock(struct v4l2_stream *s, int64_t t, int64_t age,
+			struct incise_error *err)
+{
+	struct v4l2_clock *c = &s->clock;
+	double most = age_most(s);
+
+	if (!c->n++) {
+		c->first_ns = t;
+		c->first_seq = s->seq;
+		c->least_ns = age;
+	}
+	c->least_ns = age < c->least_ns ? age : c->least_ns;
+	if (c->n < s->n + WINDOW)
+		return 0;
+	c->n = 0;
+	c->period_ns = (double)(t - c->first_ns) / (double)(s->seq - c->first_seq);
+	c->lowest_ns = c->least_ns < c->lowest_ns ? c->least_ns : c->lowest_ns;
+	c->highest_ns = c->least_ns > c->highest_ns ? c->least_ns : c->highest_ns;
+	atomic_store_explicit(&s->clock_ns, c->highest_ns - c->lowest_ns,
+			      memory_order_relaxed);
+	if ((double)c->least_ns <= most)
+		return 0;
+	return incise_error_set(
+		err, EIO,
+		"%s: timestamps of the camera are %.1f ms old when its frames arrive, "
+		"more than %.1f ms: its clock is not the computer's; use another camera "
+		"or driver, or set camera_setup.age_ms and calibrate its delay",
+		s->where, (double)c->least_ns / 1e6, most / 1e6);
+}
+
+/*
+ * 1: a timestamp that may be right; 0: a wrong one; -EIO: of a wrong clock. A driver may return a
+ * frame before what it says is its end (vivid).
+ */
+static int judge_timestamp(struct v4l2_stream *s, const struct v4l2_buffer *buffer,
+			   int64_t t, int64_t now, struct incise_error *err)
+{
+	bool at_end = (buffer->flags & V4L2_BUF_FLAG_TSTAMP_SRC_MASK) ==
+		      V4L2_BUF_FLAG_TSTAMP_SRC_EOF;
+	double ahead = FUTURE_NS + (at_end ? s->clock.period_ns : 0);
+	int rc;
+
+	s->clock.last_ns = now - t;
+	if (t < 0 || t <= s->timestamp_ns || (double)(t - now) > ahead ||
+	    !fits_clock(s, t, now - t))
+		return 0;
+	rc = follow_clock(s, t, now - t, err);
+	return rc ? rc : 1;
 }
 
 /*
@@ -241,9 +412,26 @@ static bool is_whole(const struct v4l2_stream *s, const struct v4l2_buffer *buff
 	       is_jpeg(slot->data, buffer->bytesused);
 }
 
+/*
+ * The number of frames that the driver's count went on by. Some drivers count fields: then it goes
+ * on by as many within one period.
+ */
+static uint32_t frames_of(struct v4l2_stream *s, uint32_t step, int64_t t)
+{
+	uint32_t stride = atomic_load_explicit(&s->stride, memory_order_relaxed);
+
+	if (stride == 1 && !s->seq && s->shape.rate_hz > 0 && step <= JUMP_MAX &&
+	    (double)(t - s->timestamp_ns) < 1.5e9 / s->shape.rate_hz)
+		stride = step;
+	if (!stride || step % stride)
+		stride = 1;
+	atomic_store_explicit(&s->stride, stride, memory_order_relaxed);
+	return step / stride;
+}
+
 /* Advance the counts; frames in a gap are lost. */
 static int count_v4l2_stream(struct v4l2_stream *s, uint32_t sequence, bool whole,
-			     struct incise_error *err)
+			     int64_t t, struct incise_error *err)
 {
 	uint32_t step = s->any ? sequence - s->sequence : 1;
 
@@ -259,8 +447,10 @@ static int count_v4l2_stream(struct v4l2_stream *s, uint32_t sequence, bool whol
 			"cannot be detected; use another camera or driver",
 			s->where, sequence, s->sequence);
 	/* The first frame is number 0. */
-	if (s->any)
+	if (s->any) {
+		step = frames_of(s, step, t);
 		s->seq += step;
+	}
 	s->any = true;
 	s->sequence = sequence;
 	atomic_fetch_add_explicit(&s->lost, step - 1, memory_order_relaxed);
@@ -273,10 +463,17 @@ static int drop_damaged(struct v4l2_stream *s, int i, struct incise_error *err)
 	atomic_fetch_add_explicit(&s->lost, 1, memory_order_relaxed);
 	if (++s->damaged_row < DAMAGED_ROW)
 		return queue(s, i, err);
+	if (s->wrong_row)
+		return incise_error_set(
+			err, EIO,
+			"%s: the last timestamps of the camera are wrong: the clock is "
+			"not the computer's, or stands, or was stepped, and now their "
+			"age is %.1f ms; use another camera or driver",
+			s->where, (double)s->clock.last_ns / 1e6);
 	return incise_error_set(
 		err, EIO,
-		"%s: the last %d frames of the camera were all damaged, too short or "
-		"had a wrong time; check its cable",
+		"%s: the last %d frames of the camera were all damaged or too short; "
+		"check its cable",
 		s->where, DAMAGED_ROW);
 }
 
@@ -319,7 +516,7 @@ static int publish(struct v4l2_stream *s, int i, struct incise_error *err)
 		if (!take_tail(s, tail))
 			old = NONE;
 	}
-	s->damaged_row = 0;
+	s->damaged_row = s->wrong_row = 0;
 	atomic_store_explicit(&s->waiting[head % V4L2_BUFFERS_MAX], (signed char)i,
 			      memory_order_relaxed);
 	atomic_store_explicit(&s->head, head + 1, memory_order_release);
@@ -347,10 +544,15 @@ static int take_v4l2_stream(struct v4l2_stream *s, const struct v4l2_buffer *buf
 	slot->queued = false;
 	if (!is_monotonic(buffer))
 		return other_clock(s, EIO, err);
-	timestamp = timestamp_of(s, buffer, now);
-	whole = timestamp >= 0 && is_whole(s, buffer, slot);
-	rc = count_v4l2_stream(s, buffer->sequence, whole, err);
-	if (rc)
+	timestamp = timestamp_of(buffer);
+	whole = is_whole(s, buffer, slot);
+	rc = count_v4l2_stream(s, buffer->sequence, whole, timestamp, err);
+	if (!rc && whole) {
+		rc = judge_timestamp(s, buffer, timestamp, now, err);
+		s->wrong_row += !rc;
+		whole = rc > 0;
+	}
+	if (rc < 0)
 		return rc;
 	if (!whole)
 		return drop_damaged(s, (int)buffer->index, err);

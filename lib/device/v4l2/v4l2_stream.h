@@ -36,6 +36,30 @@ struct v4l2_slot {
 	uint64_t seq;
 };
 
+/*
+ * The clock of the timestamps. A frame arrives later than its timestamp, by its age, and timestamps
+ * lie on a grid. Camera and thread may be late; a timestamp that is off the grid by more than half
+ * a period, and by as much nearer to the arrival or farther from it, is wrong, unless the next two
+ * follow it: then the clock was stepped.
+ *
+ *     grid          |       |       |       |       |       |
+ *     timestamps    |       |  |        x   |       |       |          x is wrong
+ *     arrivals         |       |  |        |   |       |       |
+ */
+struct v4l2_clock {
+	double period_ns;	 /* 0: not known */
+	double grid_ns, age_ns;	 /* of the last frame, without lateness */
+	uint64_t seq, odd_seq;	 /* of the last frame, of the last one off the grid */
+	int64_t odd_ns, last_ns; /* its timestamp; age of the last frame of any kind */
+	int odd_row;
+	/* The present window: its frames, the first one, the least age. */
+	int n;
+	uint64_t first_seq;
+	int64_t first_ns, least_ns;
+	/* The least ages of all windows. */
+	int64_t lowest_ns, highest_ns;
+};
+
 struct v4l2_stream {
 	int fd, n;
 	const char *where;
@@ -49,6 +73,8 @@ struct v4l2_stream {
 	_Atomic signed char waiting[V4L2_BUFFERS_MAX];
 	atomic_uint returned; /* a bit per slot */
 	atomic_ullong lost, damaged;
+	atomic_llong clock_ns; /* see struct incise_camera_info */
+	atomic_uint stride;    /* of the driver's count, from frame to frame */
 	/* The reader's. */
 	_Alignas(64) int held;
 	/* The thread's. */
@@ -58,6 +84,8 @@ struct v4l2_stream {
 	int64_t timestamp_ns; /* of the last whole one */
 	int64_t seen_ns;      /* when the last one came */
 	int errors, damaged_row;
+	int wrong_row; /* of these, whole but for the timestamp */
+	struct v4l2_clock clock;
 };
 
 /*

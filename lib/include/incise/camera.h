@@ -40,6 +40,9 @@ struct incise_camera_info {
 	int64_t exposure_ns; /**< 0: unknown; then t_ns is the device's timestamp */
 	uint64_t
 		damaged; /**< frames that are corrupt or too short; also counted as lost */
+	/** How much the age of frames at their arrival, the least of many, changed so far. */
+	int64_t clock_ns;
+	char note[300]; /**< a doubt of its timestamps; empty: none */
 };
 
 /** Settings of a real camera; the group `camera_setup` of rig.conf. 0: not changed. */
@@ -51,6 +54,7 @@ struct incise_camera_setup {
 	double gain; /**< units of the driver */
 	double white_balance_K;
 	double focus; /**< units of the driver */
+	double age_ms; /**< largest age of a timestamp; default exposure + 3 periods + 100 */
 };
 
 struct incise_camera;

@@ -34,12 +34,24 @@ struct incise_force_info {
 	/** It measures newtons itself: full_scale_V and offset_V are in N, not in V. */
 	bool newtons;
 	int64_t t_sd_ns; /**< standard deviation of its timestamps; 0: not known */
+	char note[300];	 /**< a setting that its user should check; empty: none */
+};
+
+/** The voltage that an input is compared with. */
+enum incise_force_reference {
+	INCISE_FORCE_ANY, /**< the first of these that the card has */
+	INCISE_FORCE_GROUND,
+	INCISE_FORCE_COMMON,
+	INCISE_FORCE_DIFFERENTIAL,
 };
 
 /** Settings of a real force channel; the group `force_setup` of rig.conf. */
 struct incise_force_setup {
 	double rate_hz; /**< 1 … 100000; default 10000 */
 	int channel;	/**< 0 …; default 0 */
+	/** IIO: its name, such as "voltage0-voltage1"; empty: it has the number @channel. */
+	char channel_name[64];
+	enum incise_force_reference reference; /**< comedi; default INCISE_FORCE_ANY */
 	/** Range to select, and the scale of an IIO device without one; 0: the device's own. */
 	double full_scale_V;
 	/** IIO: name of the trigger; empty: an hrtimer if the kernel has it, else the driver's. */

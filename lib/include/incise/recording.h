@@ -46,6 +46,7 @@ struct incise_stream {
 	 */
 	double offset_sd_ms;
 	char ended[200]; /**< cause of an early end; empty: no early end */
+	char note[300];	 /**< a doubt of the device or its settings; empty: none */
 };
 
 struct incise_recording;

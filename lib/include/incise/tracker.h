@@ -65,6 +65,7 @@ struct incise_tracker_info {
 	uint8_t scalpel_station;
 	uint8_t tube_station; /**< station at the end of the tube; 0: no such station */
 	bool network;	      /**< poses come over a network, whose delay has no bound */
+	char note[300];	      /**< a setting that its user should check; empty: none */
 };
 
 /** Counts of poses and of their flags. */

@@ -278,7 +278,8 @@ static bool take_stream(sqlite3_stmt *stmt, struct incise_stream *s)
 	       take_known(stmt, 13, 1e-6, &s->jitter_max_ms) &&
 	       take_known(stmt, 14, 1e-6, &s->offset_ms) &&
 	       take_known(stmt, 15, 1e-6, &s->offset_sd_ms) &&
-	       take_recording_text(stmt, 16, true, s->ended, sizeof(s->ended));
+	       take_recording_text(stmt, 16, true, s->ended, sizeof(s->ended)) &&
+	       take_recording_text(stmt, 18, true, s->note, sizeof(s->note));
 }
 
 /* Table streams, and what the sources need of it. Returns the number of its rows, or -errno. */
@@ -291,8 +292,9 @@ static int read_table(struct incise_recording *rec, struct incise_error *err)
 		    rec->db,
 		    "SELECT name, device, stamped, nominal_hz, delay_ns, delay_sd_ns, "
 		    "rows, lost, late, rate_hz, drift_ppm, drift_sd_ppm, jitter_ns, "
-		    "jitter_max_ns, offset_ns, offset_sd_ns, ended, grain_ns FROM "
-		    "streams ORDER BY rowid",
+		    "jitter_max_ns, offset_ns, offset_sd_ns, ended, grain_ns, (SELECT "
+		    "value FROM meta WHERE key = name || '_note') FROM streams ORDER BY "
+		    "rowid",
 		    -1, &stmt, NULL) != SQLITE_OK)
 		return incise_schema_fail(rec->db, rec->path, err);
 	while ((rc = sqlite3_step(stmt)) == SQLITE_ROW && n < INCISE_STREAMS_MAX) {

@@ -241,6 +241,18 @@ static void check_clock(struct capture *capture)
 				: "'timedatectl timesync-status'");
 }
 
+/* Warn of settings of the devices, when they can still be mended. */
+static void warn_of_devices(struct capture *capture)
+{
+	struct incise_stream streams[INCISE_STREAMS_MAX];
+	int n = incise_recorder_describe_streams(capture->state.recorder, streams);
+
+	for (int i = 0; i < n; i++)
+		if (*streams[i].note)
+			put_warning(capture->options, "%s: %s", streams[i].device,
+				    streams[i].note);
+}
+
 /* Whether more than 1 % of the poses are flagged, usable or not. */
 static bool poses_are_doubtful(const struct incise_pose_counts *poses)
 {
@@ -304,6 +316,7 @@ static void begin_capture(struct capture *capture, int64_t now_ns)
 	const struct incise_capture_options *options = capture->options;
 	struct incise_sim *sim = incise_rig_sim(capture->rig);
 
+	warn_of_devices(capture);
 	capture->start_ns = capture->armed_ns = now_ns;
 	capture->state.armed = has_trigger(options);
 	if (!capture->state.armed)

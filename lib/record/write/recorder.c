@@ -104,6 +104,7 @@ static void count_recorder(struct incise_recorder *rec,
 			   struct incise_frame_pump_stats *stats)
 {
 	incise_frame_pump_stats(rec->camera.pump, stats);
+	incise_camera_info(incise_rig_camera(rec->rig), &rec->camera_info);
 	rec->streams[INCISE_LEDGER_CAMERA].device_lost =
 		stats->lost + stats->dropped + stats->unwritten + stats->unrecorded;
 	rec->stats.frames_unlooked = stats->unlooked;

@@ -277,6 +277,8 @@ int incise_recorder_open_database(struct incise_recorder *rec,
 void incise_recorder_close_database(struct incise_recorder *rec);
 
 /* Set a value in table meta; NaN becomes NULL: not known. Returns an SQLite code. */
+int incise_recorder_set_text(struct incise_recorder *rec, const char *key,
+			     const char *value);
 int incise_recorder_set_integer(struct incise_recorder *rec, const char *key,
 				int64_t value);
 int incise_recorder_set_real(struct incise_recorder *rec, const char *key, double value);

@@ -69,7 +69,8 @@ int incise_recorder_check(struct incise_recorder *rec, int code, struct incise_e
 
 /* --- rows of tables meta and events -------------------------------------------------- */
 
-static int set_text(struct incise_recorder *rec, const char *key, const char *value)
+int incise_recorder_set_text(struct incise_recorder *rec, const char *key,
+			     const char *value)
 {
 	sqlite3_stmt *stmt = rec->stmt[SET_META];
 
@@ -172,7 +173,7 @@ static int set_file(struct incise_recorder *rec, const char *key, const char *pa
 
 	if (text) {
 		text[fread(text, 1, max, file)] = 0;
-		rc = set_text(rec, key, text);
+		rc = incise_recorder_set_text(rec, key, text);
 	}
 	free(text);
 	if (file)
@@ -208,7 +209,7 @@ static int set_boot(struct incise_recorder *rec)
 	if (!boot[0] || n <= 0 || !incise_clock_is_real(incise_rig_clock(rec->rig)))
 		return SQLITE_OK;
 	snprintf(text, sizeof(text), "%s %s", boot, space);
-	return set_text(rec, "boot", text);
+	return incise_recorder_set_text(rec, "boot", text);
 }
 
 /* No two recordings have the same one. */
@@ -221,7 +222,7 @@ static int set_identity(struct incise_recorder *rec)
 		return SQLITE_IOERR;
 	for (size_t i = 0; i < sizeof(bytes); i++)
 		snprintf(text + 2 * i, 3, "%02x", bytes[i]);
-	return set_text(rec, "identity", text);
+	return incise_recorder_set_text(rec, "identity", text);
 }
 
 static int write_meta(struct incise_recorder *rec, const char *calibration_path)
@@ -242,21 +243,21 @@ static int write_meta(struct incise_recorder *rec, const char *calibration_path)
 	uname(&host);
 	bad |= incise_recorder_set_integer(rec, "complete", 0);
 	bad |= set_identity(rec);
-	bad |= set_text(rec, "incise", incise_version());
-	bad |= set_text(rec, "host", host.nodename);
-	bad |= set_text(rec, "kernel", host.release);
+	bad |= incise_recorder_set_text(rec, "incise", incise_version());
+	bad |= incise_recorder_set_text(rec, "host", host.nodename);
+	bad |= incise_recorder_set_text(rec, "kernel", host.release);
 	bad |= set_boot(rec);
-	bad |= set_text(rec, "started", started);
-	bad |= set_text(rec, "rig", incise_rig_spec(rec->rig));
+	bad |= incise_recorder_set_text(rec, "started", started);
+	bad |= incise_recorder_set_text(rec, "rig", incise_rig_spec(rec->rig));
 	bad |= set_settings(rec, calibration_path);
-	bad |= set_text(rec, "clock",
-			incise_clock_is_real(incise_rig_clock(rec->rig)) ? "real"
-									 : "simulated");
-	bad |= set_text(rec, "tracker_name", tracker->name);
+	bad |= incise_recorder_set_text(
+		rec, "clock",
+		incise_clock_is_real(incise_rig_clock(rec->rig)) ? "real" : "simulated");
+	bad |= incise_recorder_set_text(rec, "tracker_name", tracker->name);
 	bad |= incise_recorder_set_real(rec, "tracker_hz", tracker->rate_hz);
 	bad |= incise_recorder_set_integer(rec, "tracker_latency_ns",
 					   tracker->latency_ns);
-	bad |= set_text(rec, "force_name", force->name);
+	bad |= incise_recorder_set_text(rec, "force_name", force->name);
 	bad |= incise_recorder_set_real(rec, "force_hz", force->rate_hz);
 	bad |= incise_recorder_set_integer(rec, "force_bits", force->bits);
 	bad |= incise_recorder_set_real(rec, "force_full_scale_V", force->full_scale_V);
@@ -266,7 +267,7 @@ static int write_meta(struct incise_recorder *rec, const char *calibration_path)
 	bad |= incise_recorder_set_real(rec, "force_zero_mV", rec->stats.zero_mV);
 	bad |= incise_recorder_set_real(rec, "depth_mm_px", rec->calibration.depth_mm_px);
 	if (rec->streams[INCISE_LEDGER_CAMERA].exists) {
-		bad |= set_text(rec, "camera_name", camera->name);
+		bad |= incise_recorder_set_text(rec, "camera_name", camera->name);
 		bad |= incise_recorder_set_real(rec, "camera_hz", camera->rate_hz);
 		bad |= incise_recorder_set_integer(rec, "camera_width", camera->width);
 		bad |= incise_recorder_set_integer(rec, "camera_height", camera->height);

@@ -218,12 +218,19 @@ static void describe_recorder_rows(const struct incise_recorder *rec, int i,
 	    stream->ledger.last_ns > stream->first_ns)
 		out->rate_hz = (double)(stream->rows - 1 + stream->gaps) /
 			       (double)(stream->ledger.last_ns - stream->first_ns) * 1e9;
+	if (i == INCISE_LEDGER_CAMERA && rec->camera_info.clock_ns)
+		out->offset_sd_ms = hypot(out->offset_sd_ms,
+					  (double)rec->camera_info.clock_ns * 1e-6);
 	/* Only the delay of a timestamp is uncertain, and it is not known. */
 	if (out->timestamped && isnan(out->delay_sd_ms))
 		out->offset_sd_ms = NAN;
 	snprintf(out->name, sizeof(out->name), "%s", stream->name);
 	snprintf(out->device, sizeof(out->device), "%s", stream->device);
 	snprintf(out->ended, sizeof(out->ended), "%s", stream->ended);
+	snprintf(out->note, sizeof(out->note), "%s",
+		 i == INCISE_LEDGER_FORCE     ? rec->force_info.note
+		 : i == INCISE_LEDGER_TRACKER ? rec->tracker_info.note
+					      : rec->camera_info.note);
 }
 
 int incise_recorder_describe_streams(const struct incise_recorder *rec,
@@ -880,8 +887,16 @@ static int write_stream(struct incise_recorder *rec, int i)
 	const struct incise_recorder_stream *stream = &rec->streams[i];
 	sqlite3_stmt *stmt = rec->stmt[SET_STREAM];
 	struct incise_stream now;
+	char key[32];
 
 	describe_recorder_rows(rec, i, &now);
+	snprintf(key, sizeof(key), "%s_note", now.name);
+	if (*now.note) {
+		int rc = incise_recorder_set_text(rec, key, now.note);
+
+		if (rc != SQLITE_OK)
+			return rc;
+	}
 	sqlite3_bind_text(stmt, 1, now.name, -1, SQLITE_TRANSIENT);
 	sqlite3_bind_text(stmt, 2, now.device, -1, SQLITE_TRANSIENT);
 	sqlite3_bind_int(stmt, 3, now.timestamped);

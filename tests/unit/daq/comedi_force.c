@@ -104,6 +104,40 @@ TEST(the_rest_of_a_card, card_setup)
 	card_close(&c);
 }
 
+TEST(what_an_input_is_compared_with, card_setup)
+{
+	static const struct {
+		int flags;
+		enum incise_force_reference asked;
+		int is; /* -1: refused */
+		const char *note;
+	} cases[] = {
+		{SDF_GROUND, INCISE_FORCE_ANY, AREF_GROUND, ""},
+		{SDF_GROUND | SDF_DIFF, INCISE_FORCE_ANY, AREF_GROUND,
+		 "ground, differential"},
+		{SDF_COMMON | SDF_DIFF, INCISE_FORCE_ANY, AREF_COMMON,
+		 "common, differential"},
+		{SDF_GROUND | SDF_DIFF, INCISE_FORCE_DIFFERENTIAL, AREF_DIFF, ""},
+		{SDF_GROUND | SDF_DIFF, INCISE_FORCE_GROUND, AREF_GROUND, ""},
+		{SDF_GROUND | SDF_DIFF, INCISE_FORCE_COMMON, -1, "ground, differential"},
+		{SDF_OTHER, INCISE_FORCE_ANY, AREF_OTHER, ""},
+		{SDF_OTHER, INCISE_FORCE_DIFFERENTIAL, -1, "none"},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct card c = {.where = "rig.conf:3: force",
+				 .path = "/dev/comedi0",
+				 .setup.reference = cases[i].asked};
+		struct incise_error err = {0};
+		int rc = take_reference(&c, cases[i].flags, &err);
+
+		assert_int_equal(rc, cases[i].is < 0 ? -EINVAL : 0);
+		assert_says(rc ? err.text : c.note, cases[i].note);
+		assert_true(rc || (!*c.note == !*cases[i].note &&
+				   (int)c.reference == cases[i].is));
+	}
+}
+
 TEST(refusals, card_setup)
 {
 	static const struct {

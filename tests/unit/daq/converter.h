@@ -34,7 +34,7 @@ struct iio_device {
 	const char *id, *name;
 	bool trigger;
 	int n_channels;
-	struct iio_channel channels[4];
+	struct iio_channel channels[9];
 	struct attribute attributes[ATTRIBUTES];
 };
 

@@ -479,6 +479,23 @@ TEST(volts, setup)
 	}
 }
 
+TEST(a_scale_that_is_changed, setup)
+{
+	struct attribute *scale = the_voltage()->attributes;
+
+	assert_int_equal(open_source(&s, "adc", 10000, "", &err), 0);
+	assert_false(iio_source_changed(&s));
+	snprintf(scale->text, sizeof(scale->text), "0.3");
+	/* It was read just now. */
+	assert_false(iio_source_changed(&s));
+	s.checked_ns = 0;
+	assert_true(iio_source_changed(&s));
+	s.checked_ns = 0;
+	scale->key = "else";
+	assert_false(iio_source_changed(&s));
+	iio_source_close(&s);
+}
+
 /* Without a scale the set-up's is taken; a rate may be the channel's. */
 TEST(what_the_driver_does_not_say, setup)
 {
@@ -512,6 +529,73 @@ TEST(channels, setup)
 		assert_ptr_equal(find_voltage(adc(), cases[i].channel),
 				 cases[i].found ? the_voltage() : NULL);
 	}
+}
+
+/* Of drivers of Linux; in the last two, names are not enough or are needed. */
+TEST(several_channels, setup)
+{
+	static const char *const ads1115[] = {
+		"voltage0-voltage1", "voltage0-voltage3", "voltage1-voltage3",
+		"voltage2-voltage3", "voltage0",	  "voltage1",
+		"voltage2",	     "voltage3",	  NULL};
+	static const char *const bridges[] = {"voltage0-voltage1", "voltage2-voltage3",
+					      "voltage2-voltage1", NULL};
+	static const char *const twins[] = {"voltage0", "voltage0", "voltage0-voltage1",
+					    NULL};
+	static const struct {
+		const char *const *ids;
+		const char *name; /* of the second */
+		const char *asked;
+		int found; /* -1: none */
+	} cases[] = {
+		{ads1115, NULL, "0", 4},
+		{ads1115, NULL, "3", 7},
+		{ads1115, NULL, "4", -1},
+		{ads1115, NULL, "voltage0-voltage3", 1},
+		{ads1115, NULL, "voltage2", 6},
+		{ads1115, NULL, "voltage", -1},
+		{ads1115, NULL, "voltage3-voltage0", -1},
+		{bridges, NULL, "0", 0},
+		{bridges, NULL, "1", -1},
+		{bridges, NULL, "2", -1},
+		{bridges, NULL, "voltage2-voltage1", 2},
+		{twins, "grip", "0", 0},
+		{twins, "grip", "voltage0_grip", 1},
+		{twins, "grip", "voltage0_blade", -1},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct iio_device *d = adc();
+		const char *asked = cases[i].asked;
+		char known[200];
+
+		for (d->n_channels = 0; cases[i].ids[d->n_channels]; d->n_channels++)
+			d->channels[d->n_channels] =
+				(struct iio_channel){.id = cases[i].ids[d->n_channels]};
+		d->channels[1].name = cases[i].name;
+		assert_ptr_equal(*asked <= '9' ? find_voltage(d, atoi(asked))
+					       : find_named(d, asked),
+				 cases[i].found < 0 ? NULL
+						    : &d->channels[cases[i].found]);
+		iio_source_list_channels(d, known, sizeof(known));
+		assert_says(known, d->channels[d->n_channels - 1].id);
+		assert_true(!cases[i].name || strstr(known, "voltage0, voltage0_grip, "));
+		iio_source_list_channels(d, known, 12);
+		assert_true(strlen(known) < 12);
+	}
+}
+
+TEST(names_in_the_setup, setup)
+{
+	s = (struct iio_source){.where = "rig.conf:3: force", .device = adc()};
+	strcpy(s.setup.channel_name, "voltage0-voltage1");
+	assert_error(take_channels(&s, &err), ENODEV, &err, "voltage0-voltage1",
+		     "in quotes: voltage0");
+	strcpy(s.setup.channel_name, "voltage0");
+	assert_int_equal(take_channels(&s, &err), 0);
+	assert_ptr_equal(s.voltage, the_voltage());
+	s.setup.reference = INCISE_FORCE_DIFFERENTIAL;
+	assert_error(take_channels(&s, &err), EINVAL, &err, "force_setup.reference");
 }
 
 static void broken(int what)
@@ -583,7 +667,7 @@ TEST(refusals, setup)
 		{0, "timer", "", ENODEV, "\"timer\""},
 		{2, "adc", "", EBUSY, "program"},
 		{3, "adc", "", EACCES, "group"},
-		{4, "adc", "", ENODEV, "voltage0"},
+		{4, "adc", "", ENODEV, "quotes: none"},
 		{5, "adc", "", EOPNOTSUPP, "timestamps"},
 		{6, "adc", "", EOPNOTSUPP, "32 bits"},
 		{7, "adc", "", EINVAL, "force_setup.full_scale_V"},

@@ -21,6 +21,7 @@ struct test_line {
 	char slow_from;	 /* 0: from the beginning */
 	int gone;	 /* what all calls return */
 	bool mute;	 /* nothing comes through */
+	int64_t late_ns; /* nor before this time: then all that waited */
 	int reopened;
 	char said[2000]; /* all commands */
 	size_t n_said;
@@ -55,6 +56,10 @@ static ssize_t test_line_read(struct polhemus_line *line, void *bytes, size_t si
 	if (!l->slow_from || memchr(l->said, l->slow_from, l->n_said))
 		l->now_ns += l->read_ns;
 	emulator_advance(l->emulator, l->now_ns);
+	if (l->now_ns < l->late_ns) {
+		*t_ns = l->now_ns = end_ns;
+		return 0;
+	}
 	n = emulator_take(l->emulator, bytes, size);
 	if (!n) {
 		next_ns = emulator_next_ns(l->emulator);

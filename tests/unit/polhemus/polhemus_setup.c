@@ -99,6 +99,57 @@ TEST(all_is_set, NULL, end)
 	}
 }
 
+/* What another program left is read, of each station that is used, and nothing is set. */
+TEST(settings_that_alter_poses, NULL, end)
+{
+	static const struct {
+		enum emulator_kind kind;
+		double origin, along_x, roll, tip; /* of station 2 */
+		const char *note;
+	} cases[] = {
+		{EMULATOR_FASTRAK, 0, 200, 0, 0, ""},
+		{EMULATOR_FASTRAK, 0, 1, 0, 0, ""},
+		{EMULATOR_FASTRAK, 0, -200, 0, 0, "poses: A2 0 0 0 -200 0 0 0 200 0"},
+		{EMULATOR_FASTRAK, -100.25, 200, 0, 0, "A2 -100.25 0 0 200 "},
+		{EMULATOR_FASTRAK, 0, 200, -180, 1.25, "poses: r2 0 0 -180; N2 1.25 0 0"},
+		{EMULATOR_LIBERTY, 0, 200, 180, 0, ""},
+		{EMULATOR_LIBERTY, 3, 200, 0, -1.5,
+		 "A2 3 0 0 200 0 0 0 200 0; N2 -1.5 0 0"},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		begin(cases[i].kind, -1);
+		e.present[1] = true;
+		e.alignment[1][0] = cases[i].origin;
+		e.alignment[1][3] = cases[i].along_x;
+		e.mounting[1][2] = cases[i].roll;
+		e.tip[1][0] = cases[i].tip;
+		e.tip[2][0] = 7; /* of a station that is not used */
+		if (set_up(&two))
+			fail_msg("case %zu: %s", i, err.text);
+		if (!strstr(identity.note, cases[i].note) ||
+		    !*identity.note != !*cases[i].note)
+			fail_msg("case %zu: %s", i, identity.note);
+		assert_int_equal(e.boresights, 0);
+		assert_string_equal(err.text, "");
+	}
+}
+
+/* The line of an adapter that wakes up: all that came before is given out at once. */
+TEST(stale_bytes_at_the_start, NULL, end)
+{
+	static const enum emulator_kind kinds[] = {EMULATOR_FASTRAK, EMULATOR_LIBERTY,
+						   EMULATOR_PATRIOT};
+
+	for (int k = 0; k < 3; k++)
+		for (int late_ms = 0; late_ms < 1000; late_ms += 20) {
+			begin(kinds[k], -1);
+			line.late_ns = line.now_ns + late_ms * INT64_C(1000000);
+			if (set_up(&first))
+				fail_msg("kind %d, %d ms: %s", k, late_ms, err.text);
+		}
+}
+
 TEST(sync_from_outside, NULL, end)
 {
 	struct incise_tracker_setup s = first;

@@ -19,10 +19,10 @@ static const char everything[] =
 	"surface = { point_mm = [1.5, 2.0, -3.0]; normal = [0, 0, 2]; };\n"
 	"tracker_setup = { stations = [1, 3]; tube_station = 3; hemisphere = [0, 0, -1];\n"
 	"	sync = \"video\"; offset_mm = [1, 2, 3]; repeat_ms = 50; };\n"
-	"force_setup = { rate_hz = 12500.5; channel = 3; full_scale_V = 2.5;\n"
-	"	trigger = \"incise\"; };\n"
+	"force_setup = { rate_hz = 12500.5; channel = \"voltage3\"; full_scale_V = 2.5;\n"
+	"	trigger = \"incise\"; reference = \"common\"; };\n"
 	"camera_setup = { width = 640; height = 480; rate_hz = 60; format = \"mjpeg\";\n"
-	"	exposure_ms = 4; gain = 2; white_balance_K = 4600; focus = 30; };\n"
+	"	exposure_ms = 4; gain = 2; white_balance_K = 4600; focus = 30; age_ms = 900; };\n"
 	"vision = { hue = [170, 10]; saturation = [1, 2]; value = [3, 4]; full_px = 400.25;\n"
 	"	roi = [200, 0, 240, 480]; };\n"
 	"sign_key = \"/etc/incise/rig_ed25519\"; "
@@ -260,6 +260,8 @@ TEST(values_are_those_of_the_file)
 		{"surface.normal", "[0, 0, 1]", 3}, /* of length 1 */
 		{"tracker_setup.stations", "[1, 3]", 4},
 		{"force_setup.rate_hz", "12500.5", 6},
+		{"force_setup.channel", "\"voltage3\"", 6},
+		{"force_setup.reference", "\"common\"", 7},
 		{"vision.roi", "[200, 0, 240, 480]", 11},
 		{"foot_switch.key", "\"b\"", 12},
 		{"sign_key", "\"/etc/incise/rig_ed25519\"", 12},

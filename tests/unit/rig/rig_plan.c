@@ -417,10 +417,10 @@ TEST(all_keys_are_read)
 		    "tracker_setup = { stations = [2, 4]; tube_station = 4; hemisphere = [0.0, 0.0, -2.0];"
 		    " sync = \"external\"; offset_mm = [1.0, 2.0, 3.5]; repeat_ms = 0; };"
 		    "force_setup = { rate_hz = 5000; channel = 3; full_scale_V = 5.0;"
-		    " trigger = \"my trigger\"; };"
+		    " trigger = \"my trigger\"; reference = \"differential\"; };"
 		    "camera_setup = { width = 640; height = 480; rate_hz = 59.94;"
 		    " format = \"grey\"; exposure_ms = 4.5; gain = 10;"
-		    " white_balance_K = 5000; focus = 7; };"
+		    " white_balance_K = 5000; focus = 7; age_ms = 950; };"
 		    "vision = { hue = [170, 10]; saturation = [80, 255]; value = [9, 9];"
 		    " full_px = 400.5; roi = [8192, 0, 16, 8192]; };"
 		    "foot_switch = { device = \"/dev/input/by-id/x-event-kbd\"; key = \"f2\"; };",
@@ -435,10 +435,12 @@ TEST(all_keys_are_read)
 	assert_true(all.force.rate_hz == 5000 && all.force.channel == 3 &&
 		    all.force.full_scale_V == 5);
 	assert_string_equal(all.force.trigger, "my trigger");
+	assert_string_equal(all.force.channel_name, "");
+	assert_int_equal(all.force.reference, INCISE_FORCE_DIFFERENTIAL);
 	assert_true(all.camera.width == 640 && all.camera.height == 480 &&
 		    all.camera.rate_hz == 59.94 && all.camera.exposure_ms == 4.5 &&
 		    all.camera.gain == 10 && all.camera.white_balance_K == 5000 &&
-		    all.camera.focus == 7);
+		    all.camera.focus == 7 && all.camera.age_ms == 950);
 	assert_int_equal(all.camera.pixels, INCISE_PIXELS_GREY);
 	assert_true(all.has_vision);
 	assert_true(all.vision.hue[0] == 170 && all.vision.hue[1] == 10);
@@ -450,6 +452,11 @@ TEST(all_keys_are_read)
 	assert_int_equal(all.foot_switch.key, 60); /* KEY_F2 */
 	assert_true(all.vision.roi.x == 8192 && all.vision.roi.y == 0 &&
 		    all.vision.roi.width == 16 && all.vision.roi.height == 8192);
+	assert_int_equal(read_all("force_setup = { channel = \"voltage0-voltage1\"; };",
+				  &all, &err),
+			 0);
+	assert_string_equal(all.force.channel_name, "voltage0-voltage1");
+	assert_int_equal(all.force.reference, INCISE_FORCE_ANY);
 }
 
 TEST(what_is_wrong_is_said)
@@ -483,6 +490,11 @@ TEST(what_is_wrong_is_said)
 		{"\nforce_setup = { rate_hz = 0.5; };", "rig.conf:2: "},
 		{"force_setup = { rate_hz = 100001; };", "rate_hz"},
 		{"force_setup = { channel = -1; };", "channel"},
+		{"force_setup = { channel = 1.5; };", "force_setup.channel"},
+		{"force_setup = { channel = \"\"; };", "\"voltage0-voltage1\""},
+		{"force_setup = { channel = \"../voltage0\"; };", "force_setup.channel"},
+		{"force_setup = { channel = [0]; };", "force_setup.channel"},
+		{"force_setup = { reference = \"earth\"; };", "one of any, ground"},
 		{"force_setup = { full_scale_V = 0.0; };", "full_scale_V"},
 		{"force_setup = { trigger = \"../../etc\"; };", "force_setup.trigger"},
 		{"force_setup = { trigger = \"0123456789012345678901234567890123456789"

@@ -94,6 +94,28 @@ TEST(frames_come_through_the_interface)
 	close_camera(camera);
 }
 
+TEST(a_count_of_fields_is_noted)
+{
+	struct incise_camera_frame frame;
+	struct incise_camera_info info;
+	struct incise_camera *camera;
+
+	reset();
+	camera = open_camera("/dev/video7", NULL);
+	assert_non_null(camera);
+	incise_camera_info(camera, &info);
+	assert_string_equal(info.note, "");
+	for (uint32_t i = 0; i < 2; i++) {
+		driver_shoot(2 * i);
+		assert_int_equal(await(camera, &frame), 1);
+		assert_int_equal(frame.seq, i);
+	}
+	incise_camera_info(camera, &info);
+	assert_says(info.note, "counts 2 for each frame");
+	assert_int_equal(incise_camera_lost(camera), 0);
+	close_camera(camera);
+}
+
 TEST(an_unplugged_camera_says_so)
 {
 	struct incise_camera_frame frame;

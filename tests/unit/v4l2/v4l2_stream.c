@@ -301,7 +301,10 @@ TEST(stamps_that_cannot_be_are_damage)
 		bool good;
 	} cases[] = {
 		{0, 0, true},
-		{0, 1000, true},	  /* a microsecond is what it counts in */
+		{0, 20000000, true},
+		{-10000000, 0, true},
+		{0, 1000, false},	  /* within a period */
+		{40000000, 0, false},	  /* to come, before the end of the frame too */
 		{1000000000, 0, false},	  /* to come */
 		{-20000000000, 0, false}, /* long ago, and before the last one */
 		{0, -1, false},		  /* the same as before */
@@ -367,6 +370,14 @@ TEST(a_jpeg_is_whole_from_first_to_last_marker)
 		{{0, 0xd8, 1, 2, 0xff, 0xd9}, 6, false},
 		{{0xff, 0xd8, 0xff}, 3, false},
 		{{0xff, 0xd8, 0xd9, 0}, 4, false},
+		{{0xff, 0xd8, 1, 0xff, 0xd8, 0xff, 0xd9}, 7, false}, /* two in one */
+		{{0xff, 0xd8, 0xff, 0xd0, 0xff, 0xd1, 0xff, 0xd9}, 8, true},
+		{{0xff, 0xd8, 0xff, 0xd0, 0xff, 0xd2, 0xff, 0xd9},
+		 8,
+		 false}, /* restart */
+		{{0xff, 0xd8, 0xff, 0xe0, 0, 2, 0xff, 0xd9}, 8, true},
+		{{0xff, 0xd8, 0xff, 0xe0, 0, 9, 0xff, 0xd9}, 8, false},
+		{{0xff, 0xd8, 0xff, 0xe0, 0xff, 0xd9}, 6, false},
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
@@ -380,6 +391,53 @@ TEST(a_jpeg_is_whole_from_first_to_last_marker)
 		if (cases[i].good)
 			assert_true(frame.size == cases[i].size && !frame.stride);
 		losses(!cases[i].good, !cases[i].good);
+		end();
+	}
+}
+
+/* Coded data of zeros are a hole, unless the frame's own table has a block's end as its shortest code. */
+TEST(a_hole_in_a_jpeg)
+{
+	static const struct {
+		uint8_t table[2]; /* number, first symbol; 0xff: no table */
+		uint8_t scan[4];  /* components, first one, its tables … */
+		size_t zeros;
+		bool good;
+	} cases[] = {
+		{{0xff, 0}, {1, 1, 0x00}, 200, true},
+		{{0xff, 0}, {1, 1, 0x00}, 300, false},
+		{{0xff, 0}, {1, 2, 0x11}, 300, true},
+		{{0x10, 1}, {1, 1, 0x00}, 300, false},
+		{{0x10, 0}, {1, 1, 0x00}, 300, true},
+		{{0x11, 0}, {1, 1, 0x00}, 300, false},
+		{{0x11, 1}, {1, 2, 0x11}, 300, false},
+		{{0x00, 0}, {1, 1, 0x00}, 300, false},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		uint8_t bytes[1024] = {0xff, 0xd8}, *at = bytes + 2;
+
+		if (cases[i].table[0] != 0xff) {
+			uint8_t table[22] = {0xff, 0xc4, 0, 20, cases[i].table[0], 1};
+
+			table[21] = cases[i].table[1];
+			memcpy(at, table, sizeof(table));
+			at += sizeof(table);
+		}
+		memcpy(at, "\xff\xda\0\x08", 4);
+		memcpy(at + 4, cases[i].scan, 3);
+		memcpy(at + 7, "\0\x3f\0", 3);
+		at += 10;
+		*at++ = 0x55;
+		at += cases[i].zeros;
+		memcpy(at, "\x55\xff\xd9", 3);
+		driver_reset();
+		assert_int_equal(start(INCISE_PIXELS_MJPEG, 0), 0);
+		memcpy(driver.memory, bytes, sizeof(bytes));
+		driver_shoot(0)->bytesused = (uint32_t)(at + 3 - bytes);
+		assert_int_equal(step(), 1);
+		if (v4l2_stream_read(&stream, &frame) != cases[i].good)
+			fail_msg("case %zu", i);
 		end();
 	}
 }
@@ -575,6 +633,153 @@ static uint32_t draw(uint32_t below)
 
 	incise_random_step(&state);
 	return (uint32_t)(state >> 33) % below;
+}
+
+/* --- the clock of a camera that is played --- */
+
+enum trouble { HONEST, OFFSET, DRIFT, STEP, OUTLIERS, TROUBLES };
+
+/* A camera: frames of @period_ns arrive @age_ns later, and a thread that sometimes waits. */
+struct camera {
+	enum trouble trouble;
+	int64_t period_ns, age_ns, jitter_ns, wrong_ns;
+	bool known; /* its rate */
+	uint32_t stride;
+	/* what was done */
+	uint64_t lost, outliers;
+	int64_t least_ns, most_ns; /* errors of the times that were delivered */
+	int64_t last_age_ns;
+	int rc, shot;
+};
+
+static int64_t ms(double from, double to)
+{
+	return (int64_t)((from + (to - from) * draw(1000001) * 1e-6) * 1e6);
+}
+
+#define CAMERA_FRAMES 600
+
+/* The error of the clock at frame @i. */
+static int64_t clock_error(const struct camera *c, int i)
+{
+	switch (c->trouble) {
+	case OFFSET:
+		return c->wrong_ns;
+	case DRIFT:
+		return c->wrong_ns * i / CAMERA_FRAMES;
+	case STEP:
+		return i < 200 ? 0 : c->wrong_ns;
+	case OUTLIERS:
+		return i % 25 == 20 ? (i % 50 == 20 ? c->wrong_ns : -c->wrong_ns) : 0;
+	default:
+		return 0;
+	}
+}
+
+static void play_camera(struct camera *c)
+{
+	struct v4l2_shape shape;
+	int64_t began_ns, stalled_ns = 0, timestamp = 0;
+	uint32_t sequence = draw(UINT32_MAX);
+
+	driver_reset();
+	shape = shape_of(INCISE_PIXELS_YUYV);
+	shape.rate_hz = c->known ? 1e9 / (double)c->period_ns : 0;
+	driver.stands = true;
+	err = (struct incise_error){0};
+	assert_int_equal(v4l2_stream_start(&stream, DRIVER_FD, &shape, 0, WHERE, &err),
+			 0);
+	began_ns = driver.now_ns;
+	c->least_ns = INT64_MAX;
+	c->most_ns = INT64_MIN;
+	for (int i = 0; i < CAMERA_FRAMES && c->rc >= 0; i++) {
+		int64_t true_ns = began_ns + i * c->period_ns, now_ns;
+		int64_t jitter_ns = ms(0, (double)c->jitter_ns / 1e6);
+		struct driver_frame *shot;
+
+		sequence += c->stride;
+		if (i > 1 && i < CAMERA_FRAMES - 1 && !draw(60) &&
+		    clock_error(c, i) == clock_error(c, i - 1)) {
+			c->lost++;
+			continue;
+		}
+		/* In 28 periods a driver of 32 buffers loses nothing. */
+		if (c->trouble == HONEST && i % 80 == 40)
+			stalled_ns = true_ns + ms(0, 28e-6 * (double)c->period_ns);
+		now_ns = true_ns + c->age_ns + jitter_ns;
+		now_ns = now_ns > stalled_ns ? now_ns : stalled_ns;
+		driver.now_ns = now_ns > driver.now_ns ? now_ns : driver.now_ns;
+		now_ns = driver.now_ns;
+		shot = driver_shoot(sequence);
+		shot->flags |= V4L2_BUF_FLAG_TSTAMP_SRC_SOE;
+		timestamp = shot->t_ns = true_ns + clock_error(c, i);
+		driver.now_ns = now_ns;
+		c->outliers += c->trouble == OUTLIERS && clock_error(c, i);
+		c->last_age_ns = now_ns - timestamp;
+		c->rc = step();
+		c->shot = i;
+		if (c->rc < 0 || v4l2_stream_read(&stream, &frame) != 1)
+			continue;
+		c->least_ns = frame.t_ns - true_ns < c->least_ns ? frame.t_ns - true_ns
+								 : c->least_ns;
+		c->most_ns = frame.t_ns - true_ns > c->most_ns ? frame.t_ns - true_ns
+							       : c->most_ns;
+	}
+}
+
+/* Lateness is no loss, a real loss is one, and a wrong time is found, stated or refused. */
+TEST(clocks_of_1000_cameras)
+{
+	unsigned int refused = 0;
+
+	for (int i = 0; i < 1000; i++) {
+		struct camera c = {.trouble = (enum trouble)(i % TROUBLES),
+				   .period_ns = ms(5, 60),
+				   .known = draw(4),
+				   .stride = 1};
+		int64_t half_ns = c.period_ns / 2, clock_ns, limit_ns, spread_ns;
+
+		half_ns = half_ns > 5000000 ? half_ns : 5000000;
+		c.age_ns = ms(1, 60);
+		c.jitter_ns = ms(0, 3);
+		c.wrong_ns = ms(-400, 400);
+		if (c.known && draw(3) == 0)
+			c.stride = 2;
+		if (c.trouble == OUTLIERS)
+			c.wrong_ns = half_ns + 5000000 + ms(0, 300);
+		/* Without a rate none is known before a window has passed. */
+		c.known |= c.trouble == OUTLIERS;
+		play_camera(&c);
+		clock_ns = atomic_load(&stream.clock_ns);
+		limit_ns = (c.known ? 3 * c.period_ns : 300000000) + 100000000;
+		spread_ns = c.most_ns - c.least_ns;
+		if (c.trouble == HONEST || c.trouble == OUTLIERS) {
+			if (c.rc != 1)
+				fail_msg("camera %d, frame %d: %s", i, c.shot, err.text);
+			losses(c.lost + c.outliers, c.outliers);
+			assert_true(spread_ns <= 1000 && clock_ns < 5000000);
+		} else if (c.rc < 0) {
+			/* Only what is wrong is refused. */
+			assert_true(c.last_age_ns > limit_ns ||
+				    c.last_age_ns < -5000000 ||
+				    (c.trouble == STEP && c.wrong_ns < 0));
+			assert_non_null(strstr(err.text, "age")
+						? err.text
+						: strstr(err.text, " old "));
+			refused++;
+		} else {
+			/* The first and the last window hide a part of a drift. */
+			if (c.trouble == DRIFT)
+				clock_ns += llabs(c.wrong_ns) * 80 / CAMERA_FRAMES;
+			assert_true(spread_ns <= clock_ns + half_ns + c.jitter_ns);
+			assert_true(c.trouble != OFFSET ||
+				    c.last_age_ns - c.jitter_ns <= limit_ns);
+			assert_true(c.least_ns >= -limit_ns &&
+				    c.most_ns <= c.age_ns + c.jitter_ns + 5000000);
+		}
+		end();
+	}
+	assert_in_range(refused, 100, 500);
 }
 
 TEST(a_driver_that_lies_at_random_does_no_harm)
