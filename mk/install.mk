@@ -5,6 +5,7 @@ headers := $(wildcard lib/include/incise/*.h)
 scenes := $(wildcard scenes/*.scene scenes/*.fis)
 report_files := $(addprefix tools/report/,report.py compare.py measure.py bench.j2 assess.j2 document.css)
 examples := $(wildcard doc/*.example)
+unit_scripts := udev/stepper-setup
 # All but the main page of the headers' reference, which is in that.
 documents := README.md CHANGELOG.md $(O)/doc/options.md \
 	$(filter-out doc/reference.md,$(wildcard doc/*.md doc/*.svg doc/*.png))
@@ -31,7 +32,7 @@ installed = $(addprefix $(bindir)/,$(notdir $(programs))) \
 	$(addprefix $(datadir)/incise/scenes/,$(notdir $(scenes))) \
 	$(addprefix $(datadir)/incise/schema/,$(notdir $(schemas))) \
 	$(addprefix $(datadir)/incise/report/,$(notdir $(report_files))) \
-	$(addprefix $(datadir)/incise/,$(notdir $(examples))) \
+	$(addprefix $(datadir)/incise/,$(notdir $(examples) $(unit_scripts))) \
 	$(addprefix $(docdir)/,$(notdir $(documents)) $(example_files) $(example_scripts)) \
 	$(addprefix $(pythondir)/incise/,$(notdir $(python_files)) $(python_installed)) \
 	$(completiondir)/incise $(zshcompletiondir)/_incise \
@@ -83,6 +84,7 @@ install: all ## install below $(DESTDIR)$(prefix)
 	$(INSTALL) -m 644 $(schemas) "$(DESTDIR)$(datadir)/incise/schema"
 	$(INSTALL) -m 644 $(report_files) "$(DESTDIR)$(datadir)/incise/report"
 	$(INSTALL) -m 644 $(examples) "$(DESTDIR)$(datadir)/incise"
+	$(INSTALL) -m 755 $(unit_scripts) "$(DESTDIR)$(datadir)/incise"
 	$(INSTALL) -m 644 $(documents) "$(DESTDIR)$(docdir)"
 	$(INSTALL) -m 644 $(example_files) "$(DESTDIR)$(docdir)/examples"
 	$(INSTALL) -m 755 $(example_scripts) "$(DESTDIR)$(docdir)/examples"
@@ -101,7 +103,7 @@ install: all ## install below $(DESTDIR)$(prefix)
 			"$(DESTDIR)$(tmpfilesdir)/$$(basename $$file .tmpfiles).conf" || exit 1; \
 	done
 	for file in $(units); do \
-		sed 's|@bindir@|$(bindir)|' $$file \
+		sed 's|@bindir@|$(bindir)|; s|@datadir@|$(datadir)|' $$file \
 			>"$(DESTDIR)$(unitdir)/$$(basename $$file .in)" || exit 1; \
 	done
 	sed -f udev/incise-feed@.service.sed "$(DESTDIR)$(unitdir)/incise-haptic@.service" \

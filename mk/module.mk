@@ -43,11 +43,25 @@ module_uninstall: module_headers ## remove what module_install installed
 	rm -f "$(module_installed)"/incise_stepper.ko*
 	$(depmod)
 
+# The name of a Raspberry Pi's chip, and of the node of its GPIO lines where that is not gpio.
+soc_rpi3 := bcm2837
+soc_rpi4 := bcm2711
+soc_rpi5 := bcm2712
+pins_rpi5 := rp1_gpio
+
+overlays: $(patsubst soc_%,$(O)/overlays/incise-stepper-%.dtbo,$(filter soc_%,$(.VARIABLES))) ## device-tree overlays for Raspberry Pi 3, 4 and 5
+
+# The phandles are those of the tree that it is laid over.
+$(O)/overlays/incise-stepper-%.dtbo: driver/overlays/incise-stepper.dts
+	@mkdir -p $(@D)
+	$(Q)$(CPP) -P -undef -x assembler-with-cpp -DBOARD='"brcm,$(soc_$*)"' -DPINS=$(or $(pins_$*),gpio) $< | \
+		dtc -@ -W no-gpios_property -I dts -O dtb -o $@ -
+
 # A source tree for dkms, which then builds the module for each kernel that is installed.
 # Without the simulator, which is for tests.
 srcdir ?= $(prefix)/src
 dkms_dir = $(srcdir)/incise-$(version)
-dkms_sources = $(addprefix driver/,Kbuild Makefile compat/probe) \
+dkms_sources = $(addprefix driver/,Kbuild Makefile compat/probe overlays/incise-stepper.dts) \
 	$(filter-out %.mod.c,$(wildcard $(addprefix driver/,*.[ch] uapi/*.h compat/*.c))) \
 	$(wildcard lib/fixed/*.[ch] lib/tissue/*.proto.[ch] lib/tissue/*.def) \
 	$(addprefix lib/number/,both.h fixed.h fixed_kind.h no_kind.h) \
@@ -71,7 +85,7 @@ dkms_uninstall: ## remove what was recorded as installed there
 	$(call remove_recorded,$(dkms_record)); \
 	find "$(DESTDIR)$(dkms_dir)" -depth -type d -empty -delete
 
-.PHONY: module module_headers module_install module_uninstall dkms_install dkms_uninstall
+.PHONY: module module_headers module_install module_uninstall overlays dkms_install dkms_uninstall
 
 module_kernels := main second
 check-module: ## the modules for each kernel: W=1, sparse, checkpatch, dkms

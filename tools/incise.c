@@ -155,6 +155,7 @@ static const struct {
 	const char *name, *page;
 } topics[] = {
 	{"rig.conf", "rig.conf.5"},
+	{"stepper.conf", "stepper.conf.5"},
 	{"calibration.conf", "calibration.conf.5"},
 	{"calibration", "calibration.conf.5"},
 	{"scene", "incise-scene.5"},

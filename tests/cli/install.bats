@@ -47,7 +47,7 @@ setup() {
 		cmp "$header" "$dest/usr/include/incise/${header##*/}"
 	done
 	for example in rig.conf.example rig-can.conf.example rig-sources.conf.example \
-		haptic.env.example; do
+		haptic.env.example stepper.conf.example; do
 		cmp "$root/doc/$example" "$dest/usr/share/incise/$example"
 	done
 	for document in doc/tutorial.md doc/device-backend.md CHANGELOG.md; do

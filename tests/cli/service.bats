@@ -21,11 +21,12 @@ systemd_analyze() {
 
 @test "units are where systemd looks for them, with the folder of the programs" {
 	[ "$(cd "$units" && ls)" = \
-		"$(printf '%s\n' incise-devices.service incise-feed@.service incise-haptic@.service incise-serve.service incise-stepper-off@.service)" ]
+		"$(printf '%s\n' incise-devices.service incise-feed@.service incise-haptic@.service incise-serve.service incise-stepper-off@.service incise-stepper.service)" ]
 	run ! grep -r '@[a-z]*@' "$units"
 	grep -q '^ExecStart=/usr/bin/incise haptic ' "$haptic"
 	grep -q '^ExecStart=/usr/bin/incise feed ' "$feed"
 	grep -q '^ExecStart=/usr/bin/incise stepper disable ' "$off"
+	[ -x "$dest$(sed -n 's/^ExecStart=\([^ ]*\).*/\1/p' "$units/incise-stepper.service")" ]
 }
 
 # verify wants the programs to be there: those of the build are. Instances stand for templates;
@@ -33,9 +34,10 @@ systemd_analyze() {
 @test "systemd understands the units without a line" {
 	mkdir try
 	for unit in "$units"/*.service; do
-		sed "s|/usr/bin/incise |$INCISE_BUILD/bin/incise |" "$unit" >"try/${unit##*/}"
+		sed "s|/usr/bin/incise |$INCISE_BUILD/bin/incise |; s|/usr/share/incise/stepper-setup |$root/udev/stepper-setup |" \
+			"$unit" >"try/${unit##*/}"
 	done
-	for unit in incise-devices incise-feed@neck incise-haptic@neck incise-haptic@neck_2.a incise-serve incise-stepper-off@neck; do
+	for unit in incise-devices incise-feed@neck incise-haptic@neck incise-haptic@neck_2.a incise-serve incise-stepper incise-stepper-off@neck; do
 		SYSTEMD_UNIT_PATH="$PWD/try:" run -0 systemd_analyze verify --man=no "$unit.service"
 		[ -z "$output" ]
 	done

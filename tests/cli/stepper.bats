@@ -198,9 +198,9 @@ until_it_says() {
 @test "info of a controller that is not there, or is none" {
 	compgen -G '/dev/incise-stepper*' >/dev/null && skip "this machine has a controller"
 	run --separate-stderr incise info stepper
-	failed_with "modprobe incise_stepper"
+	failed_with "systemctl start incise-stepper"
 	run --separate-stderr incise info stepper --json
-	failed_with "modprobe incise_stepper"
+	failed_with "systemctl start incise-stepper"
 	run --separate-stderr incise info /dev/incise-stepper0
 	failed_with /dev/incise-stepper0 "No such file"
 	echo text >stepper

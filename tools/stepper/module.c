@@ -469,9 +469,9 @@ void stepper_module_show(const char *what, bool json)
 	bool all = !strcmp(what, "stepper");
 
 	if (all && glob(DEVICES, 0, NULL, &found))
-		cli_fail("there is no " DEVICES ": load the module with 'modprobe "
-			 "incise_stepper', and bind a controller "
-			 "as in incise-stepper(1)");
+		cli_fail("there is no " DEVICES ": name the lines of a controller in "
+			 "/etc/incise/stepper.conf and run 'systemctl start "
+			 "incise-stepper'");
 	for (size_t i = 0; i < (all ? found.gl_pathc : 1); i++) {
 		read_controller(&controller, all ? found.gl_pathv[i] : what);
 		if (json)

@@ -397,8 +397,8 @@ static int open_device(struct kernel_stepper *k,
 	case ENOENT:
 	case ENXIO:
 	case ENODEV:
-		todo = "no such device: load the module (modprobe incise_stepper) and "
-		       "bind its lines, or name another";
+		todo = "no such device: name its lines in /etc/incise/stepper.conf and "
+		       "run 'systemctl start incise-stepper', or name another";
 		break;
 	case EACCES:
 	case EPERM:

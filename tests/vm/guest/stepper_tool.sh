@@ -190,7 +190,7 @@ check "info: of one device" says 0 "bench, 1 motor" info "/dev/$(cat $config/cde
 sed 's/^/# /' info
 
 echo 0 >$config/live
-check "info without a controller" says 1 "modprobe incise_stepper" info stepper
+check "info without a controller" says 1 "systemctl start incise-stepper" info stepper
 check "stepper without one" says 1 "/dev/incise-stepper" stepper status
 rmdir $config/motor0 $config
 check "the modules go" rmmod incise_stepper incise_sim
