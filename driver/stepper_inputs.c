@@ -7,7 +7,8 @@
  *   e-stop, driver   a motor with power halts
  *   limit            it halts if it has a way to go towards it; away from there it may move,
  *                    and the step that arrives at it may be the last
- *   home             the position at its leading edge is kept
+ *   home             the position at its leading edge is kept, and with power compared with that
+ *                    at homing. Without a home input, the lower limit is the home
  *
  * All under motor->lock. A line that cannot be read counts as active, except home, which
  * keeps its state.
@@ -52,6 +53,15 @@ static void stepper_inputs_act(struct stepper_motor *motor, enum stepper_input i
 	}
 }
 
+static void stepper_inputs_passed(struct stepper_motor *motor, s64 now)
+{
+	if (motor->powered && motor->direction &&
+	    incise_home_edge_passed(
+		    &motor->edge, motor->flags & INCISE_STEPPER_FLAG_HOMED,
+		    motor->position, motor->direction, motor->config.lost_steps_max))
+		stepper_stop_fault(motor, INCISE_STEPPER_FAULT_STEPS, now);
+}
+
 static void stepper_inputs_changed(struct stepper_motor *motor, enum stepper_input input,
 				   bool active, s64 now)
 {
@@ -69,6 +79,10 @@ static void stepper_inputs_changed(struct stepper_motor *motor, enum stepper_inp
 		motor->home_position = motor->position;
 		motor->flags |= INCISE_STEPPER_FLAG_HOME_SEEN;
 	}
+	if (input == (motor->lines.input[STEPPER_HOME] ? STEPPER_HOME
+						       : STEPPER_LIMIT_MIN) &&
+	    active)
+		stepper_inputs_passed(motor, now);
 }
 
 /**
@@ -115,4 +129,8 @@ void stepper_inputs_sample(struct stepper_motor *motor, s64 now)
 
 	for (input = 0; input < STEPPER_INPUTS; input++)
 		stepper_inputs_one(motor, input, now, false);
+	if (motor->powered && motor->flags & INCISE_STEPPER_FLAG_HOMED &&
+	    incise_home_edge_missed(&motor->edge, motor->position,
+				    motor->config.lost_steps_max))
+		stepper_stop_fault(motor, INCISE_STEPPER_FAULT_STEPS, now);
 }

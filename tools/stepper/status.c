@@ -38,6 +38,7 @@ static const struct {
 	{INCISE_STEPPER_FAULT_LOST, "lost"},
 	{INCISE_STEPPER_FAULT_FOLLOWING, "following"},
 	{INCISE_STEPPER_FAULT_PLAN, "plan"},
+	{INCISE_STEPPER_FAULT_STEPS, "lost_steps"},
 };
 #define FAULTS (sizeof(fault_keys) / sizeof(*fault_keys))
 _Static_assert(FAULTS == INCISE_STEPPER_FAULTS, "a key for each fault");

@@ -482,14 +482,6 @@ static int configure(struct kernel_stepper *k,
 	}
 	if (!rc)
 		return 0;
-	if (rc == -ERANGE)
-		return incise_error_set(
-			err, ERANGE,
-			"%s: %.200s: %u steps/s with pulses of %u and %u ns exceed the "
-			"limits of this machine: %u steps/s, %u ns; give a smaller "
-			"velocity_mm_s, fewer microsteps or longer pulses",
-			asked->where, k->path, config.velocity, config.high_ns,
-			config.low_ns, info->rate_max, info->pulse_ns);
 	return incise_error_set(
 		err, -rc,
 		rc == -EBUSY
