@@ -11,8 +11,8 @@
  *   READY/MOVING ──▶ STOPPING ──▶ FAULT ──(clear)──▶ DISABLED
  *        └───────── at once ───────▲
  *
- * HOMED goes with e-stop, driver, suspend and lost steps, with or without power before, and with each power
- * off where the config says so.
+ * HOMED goes with e-stop, driver and suspend, with or without power before, with lost steps, and
+ * with each power off where the config says so.
  *
  * All under motor->lock, in any context.
  */

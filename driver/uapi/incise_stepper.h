@@ -123,8 +123,8 @@ struct incise_stepper_setpoint {
 
 /* incise_stepper_motor_status.flags */
 /*
- * Position is the machine's. A stop at once while moving takes it away, and so do e-stop, ALARM, suspend, STEPS and,
- * with INCISE_STEPPER_CONFIG_VOLATILE_HOME, each power off.
+ * Position is the machine's. A stop at once while moving takes it away, and so do e-stop, ALARM,
+ * suspend, STEPS and, with INCISE_STEPPER_CONFIG_VOLATILE_HOME, each power off.
  */
 #define INCISE_STEPPER_FLAG_HOMED (1U << 0)
 #define INCISE_STEPPER_FLAG_HELD (1U << 1)	/* the last set-point was clamped */

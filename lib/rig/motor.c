@@ -153,8 +153,7 @@ static int look_motor(struct incise_motor *motor)
 	return 0;
 }
 
-/* 0 if a target would move it. */
-static int drivable(struct incise_motor *motor)
+INCISE_REALTIME int incise_motor_drivable(struct incise_motor *motor)
 {
 	int rc = motor->watches ? -EPERM : look_motor(motor);
 
@@ -175,7 +174,7 @@ static INCISE_REALTIME int motor_set(struct incise_stepper *stepper, double posi
 
 	if (!isfinite(position_mm))
 		return -EDOM;
-	rc = drivable(motor);
+	rc = incise_motor_drivable(motor);
 	if (rc)
 		return rc;
 	motor->beyond = position_mm < 0 || position_mm > motor->actuator.travel_mm;
@@ -192,7 +191,7 @@ static int motor_jog(struct incise_stepper *stepper, double velocity_mm_s)
 
 	if (!isfinite(velocity_mm_s))
 		return -EDOM;
-	rc = drivable(motor);
+	rc = incise_motor_drivable(motor);
 	if (rc)
 		return rc;
 	motor->beyond = false;
@@ -457,7 +456,7 @@ static int motor_origin(struct incise_stepper *stepper, double position_mm, bool
 {
 	struct incise_motor *motor = motor_of(stepper);
 	int32_t steps = incise_actuator_steps(&motor->actuator, position_mm);
-	int rc = drivable(motor);
+	int rc = incise_motor_drivable(motor);
 
 	return rc ? rc : motor->ops->origin(motor, steps, homed);
 }

@@ -88,6 +88,9 @@ int incise_motor_fit(struct incise_actuator *actuator, const char *where,
 		     uint32_t rate_max, uint32_t pulse_ns, uint32_t step_ns,
 		     struct incise_error *err);
 
+/* 0 if a target would move it; -EPERM, -EIO or -ENODEV. */
+int incise_motor_drivable(struct incise_motor *motor) INCISE_REALTIME;
+
 /* The INCISE_STEPPER_LINE_… bit of the input whose edge is the home, or 0. */
 unsigned int incise_motor_home_line(const struct incise_motor *motor);
 
