@@ -53,12 +53,13 @@ static void stepper_inputs_act(struct stepper_motor *motor, enum stepper_input i
 	}
 }
 
-static void stepper_inputs_passed(struct stepper_motor *motor, s64 now)
+/* The place of the home edge, as it is passed or where it is due. */
+static void stepper_inputs_compare(struct stepper_motor *motor, bool passed, s64 now)
 {
-	if (motor->powered && motor->direction &&
-	    incise_home_edge_passed(
-		    &motor->edge, motor->flags & INCISE_STEPPER_FLAG_HOMED,
-		    motor->position, motor->direction, motor->config.lost_steps_max))
+	if (motor->powered &&
+	    incise_home_edge_look(&motor->edge, motor->flags & INCISE_STEPPER_FLAG_HOMED,
+				  passed && motor->direction, motor->position,
+				  motor->direction, motor->config.lost_steps_max))
 		stepper_stop_fault(motor, INCISE_STEPPER_FAULT_STEPS, now);
 }
 
@@ -82,7 +83,7 @@ static void stepper_inputs_changed(struct stepper_motor *motor, enum stepper_inp
 	if (input == (motor->lines.input[STEPPER_HOME] ? STEPPER_HOME
 						       : STEPPER_LIMIT_MIN) &&
 	    active)
-		stepper_inputs_passed(motor, now);
+		stepper_inputs_compare(motor, true, now);
 }
 
 /**
@@ -129,8 +130,5 @@ void stepper_inputs_sample(struct stepper_motor *motor, s64 now)
 
 	for (input = 0; input < STEPPER_INPUTS; input++)
 		stepper_inputs_one(motor, input, now, false);
-	if (motor->powered && motor->flags & INCISE_STEPPER_FLAG_HOMED &&
-	    incise_home_edge_missed(&motor->edge, motor->position,
-				    motor->config.lost_steps_max))
-		stepper_stop_fault(motor, INCISE_STEPPER_FAULT_STEPS, now);
+	stepper_inputs_compare(motor, false, now);
 }

@@ -28,38 +28,30 @@ struct incise_home_edge {
 	bool due;	   /* the motor comes from before it */
 };
 
-/* Whether more are lost than @max; 0: any number may be. */
-static inline bool incise_home_edge_lost(struct incise_home_edge *edge, int64_t position,
+/*
+ * Whether more steps are lost than @max; 0: any number may be. @passed: the input became active, while
+ * the motor went in @direction, +1 or -1.
+ */
+static inline bool incise_home_edge_look(struct incise_home_edge *edge, bool homed,
+					 bool passed, int64_t position, int32_t direction,
 					 int64_t max)
-{
-	edge->due = false;
-	edge->lost = position - edge->at;
-	return max && (edge->lost > max || edge->lost < -max);
-}
-
-/* The input became active while the motor went in a direction, +1 or -1. Returns as above. */
-static inline bool incise_home_edge_passed(struct incise_home_edge *edge, bool homed,
-					   int64_t position, int32_t direction,
-					   int64_t max)
-{
-	if (homed && edge->direction)
-		return direction == edge->direction &&
-		       incise_home_edge_lost(edge, position, max);
-	edge->at = position;
-	edge->direction = direction;
-	edge->fresh = !homed;
-	return false;
-}
-
-/* The motor stands there, homed. Returns as above. */
-static inline bool incise_home_edge_missed(struct incise_home_edge *edge,
-					   int64_t position, int64_t max)
 {
 	int64_t beyond = (position - edge->at) * edge->direction;
 
+	if (passed && !(homed && edge->direction)) {
+		edge->at = position;
+		edge->direction = direction;
+		edge->fresh = !homed;
+		return false;
+	}
 	if (beyond < -max)
 		edge->due = max;
-	return edge->due && beyond > max && incise_home_edge_lost(edge, position, max);
+	if (!homed ||
+	    (passed ? direction != edge->direction : !edge->due || beyond <= max))
+		return false;
+	edge->due = false;
+	edge->lost = position - edge->at;
+	return max && (edge->lost > max || edge->lost < -max);
 }
 
 /* The place has another number, and is homed or not. */

@@ -150,16 +150,12 @@ uint32_t incise_motion_listen(struct incise_motion *m, int64_t now_ns)
 
 uint32_t incise_motion_compare(struct incise_motion *m, bool passed, int32_t direction)
 {
-	bool homed = m->status.flags & INCISE_STEPPER_FLAG_HOMED, lost;
-	int64_t max = (int64_t)m->config.lost_steps_max;
+	bool lost = m->powered &&
+		    incise_home_edge_look(&m->edge,
+					  m->status.flags & INCISE_STEPPER_FLAG_HOMED,
+					  passed && direction, m->status.position,
+					  direction, (int64_t)m->config.lost_steps_max);
 
-	if (!m->powered)
-		return 0;
-	lost = passed && direction &&
-	       incise_home_edge_passed(&m->edge, homed, m->status.position, direction,
-				       max);
-	if (!lost && homed)
-		lost = incise_home_edge_missed(&m->edge, m->status.position, max);
 	m->status.lost_steps = m->edge.lost;
 	return lost ? INCISE_STEPPER_FAULT_STEPS : 0;
 }

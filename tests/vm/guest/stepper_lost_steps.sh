@@ -90,6 +90,35 @@ check "not homed" status ", not homed"
 check "clear" says 0 cleared stepper clear --rig /tmp/rig.conf
 session "in user space"
 check "not homed" status ", not homed"
+
+# An encoder at the carriage: its count is written here, in place of a counter's driver.
+count=/sys/bus/counter/devices/counter0/count0/count
+check "a folder for it" mount -t tmpfs none /sys/bus
+mkdir -p ${count%/*}
+encodes()
+{
+	while read -r line <$sim/carriage; do
+		line=${line#* position=}
+		printf '%020d\n' $((100000 - ${line%% *})) 1<>$count
+	done
+}
+check "clear" says 0 cleared stepper clear --rig /tmp/rig.conf
+rig 'encoder = "counter0/count0"; encoder_counts_per_mm = -400.0;'
+check "a count that is not there" says 1 "counter0/count0: No such file" stepper home --rig /tmp/rig.conf
+encodes &
+pid=$!
+while [ ! -s $count ]; do :; done
+homed "with the encoder"
+check "up" move 8
+check "down" move 2
+ignores 200
+check "200 steps are missing at no edge" \
+	says 1 "encoder: " stepper move 8mm --rig /tmp/rig.conf
+echo "# $said"
+check "not homed" status ", not homed"
+kill $pid
+umount /sys/bus
+
 echo 0 >$config/bench/live
 rmdir $config/bench/motor0 $config/bench
 check "the modules go" rmmod incise_stepper incise_sim
