@@ -488,7 +488,7 @@ static int motor_counter(struct incise_stepper *stepper, int i,
 	}
 	i -= !!incise_motor_home_line(motor);
 	for (struct incise_driver *d = motor->driver; d; d = d->next)
-		for (int k = 0; !d->ops->counter(d, k, counter); k++)
+		for (int k = 0; d->ops->counter && !d->ops->counter(d, k, counter); k++)
 			if (!i--)
 				return 0;
 	return -ENOENT;

@@ -121,7 +121,7 @@ struct incise_driver_ops {
 	int (*cause)(struct incise_driver *driver, char *text, size_t size);
 	/** Set it up again, without faults. 0; -EBUSY (a cause persists), -EIO, -ENODEV. */
 	int (*clear)(struct incise_driver *driver, struct incise_error *err);
-	/** See incise_stepper_chip(), incise_stepper_counter(). @read: NULL for an encoder. */
+	/** See incise_stepper_chip(), incise_stepper_counter(). NULL for an encoder. */
 	int (*read)(struct incise_driver *driver, struct incise_stepper_chip *chip);
 	int (*counter)(struct incise_driver *driver, int i,
 		       struct incise_stepper_counter *counter);

@@ -148,8 +148,10 @@ TEST(a_difference_stops_the_motor_with_its_number)
 {
 	struct incise_driver *encoder = open_encoder("7");
 	struct incise_stepper_status read;
+	struct incise_stepper_counter counter;
 	char text[240];
 
+	assert_int_equal(incise_stepper_counter(&motor.stepper, 0, &counter), -ENOENT);
 	/* Without power a hand may turn it, unless its place is known. */
 	assert_int_equal(look(encoder, 0, false, OFF, "7"), 0);
 	assert_int_equal(look(encoder, 0, false, OFF, "9000"), 0);

@@ -114,7 +114,6 @@ check "down" move 2
 ignores 200
 check "200 steps are missing at no edge" \
 	says 1 "encoder: " stepper move 8mm --rig /tmp/rig.conf
-echo "# $said"
 check "not homed" status ", not homed"
 kill $pid
 umount /sys/bus
