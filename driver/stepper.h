@@ -27,6 +27,7 @@
 #include <linux/wait.h>
 #include <linux/workqueue.h>
 
+#include "../lib/fixed/home_edge.h"
 #include "../lib/fixed/profile.h"
 
 #include "stepper_page.h"
@@ -114,6 +115,7 @@ struct stepper_motor {
 	bool disabling; /* comes to rest to be disabled */
 	s64 position;	/* sum of steps, and the origin */
 	s64 home_position;
+	struct incise_home_edge edge;
 	u64 steps_up, steps_down, late, shifted_ns;
 	u64 shifted_then_ns; /* at the begin of a window, see stepper_motor_lag() */
 	s64 window_ns;	     /* … which was then */

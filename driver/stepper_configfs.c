@@ -9,6 +9,7 @@
  *   echo 1 >bench/live                  binds; cdev says which node it is
  *   echo 0 >bench/live                  unbinds
  *
+ * lost_steps_max of a motor is that of its config until a program sets another.
  * A line is LABEL:OFFSET[:active-low][:pull-up|:pull-down], or nothing where it is not wired.
  * While live nothing can be changed (EBUSY) and nothing removed.
  */
@@ -197,11 +198,45 @@ STEPPER_MOTOR_LINE(limit_max, LIMIT_MAX);
 STEPPER_MOTOR_LINE(home, HOME);
 STEPPER_MOTOR_LINE(fault, FAULT);
 
+static ssize_t stepper_motor_lost_steps_max_show(struct config_item *item, char *page)
+{
+	struct stepper_motor_folder *motor = to_motor_folder(item);
+
+	return sysfs_emit(page, "%u\n",
+			  READ_ONCE(motor->folder->wires.lost_steps_max[motor->motor]));
+}
+
+static ssize_t stepper_motor_lost_steps_max_store(struct config_item *item,
+						  const char *page, size_t n)
+{
+	struct stepper_motor_folder *motor = to_motor_folder(item);
+	struct stepper_folder *folder = motor->folder;
+	u32 value;
+	int ret;
+
+	ret = kstrtou32(page, 10, &value);
+	if (ret)
+		return ret;
+	mutex_lock(&folder->mutex);
+	if (folder->live)
+		ret = -EBUSY;
+	else
+		WRITE_ONCE(folder->wires.lost_steps_max[motor->motor], value);
+	mutex_unlock(&folder->mutex);
+	return ret ? ret : (ssize_t)n;
+}
+CONFIGFS_ATTR(stepper_motor_, lost_steps_max);
+
 static struct configfs_attribute *stepper_motor_attrs[] = {
-	&stepper_motor_attr_step,      &stepper_motor_attr_dir,
-	&stepper_motor_attr_enable,    &stepper_motor_attr_limit_min,
-	&stepper_motor_attr_limit_max, &stepper_motor_attr_home,
-	&stepper_motor_attr_fault,     NULL,
+	&stepper_motor_attr_step,
+	&stepper_motor_attr_dir,
+	&stepper_motor_attr_enable,
+	&stepper_motor_attr_limit_min,
+	&stepper_motor_attr_limit_max,
+	&stepper_motor_attr_home,
+	&stepper_motor_attr_fault,
+	&stepper_motor_attr_lost_steps_max,
+	NULL,
 };
 
 static void stepper_motor_folder_release(struct config_item *item)
@@ -264,6 +299,7 @@ static void stepper_motor_folder_drop(struct config_group *group,
 
 	mutex_lock(&folder->mutex);
 	folder->motor[motor->motor] = NULL;
+	folder->wires.lost_steps_max[motor->motor] = 0;
 	for (i = 0; i < STEPPER_MOTOR_WIRES; i++) {
 		kfree(folder->wires.motor[motor->motor][i].label);
 		folder->wires.motor[motor->motor][i] = (struct stepper_wire){};

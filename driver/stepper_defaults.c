@@ -91,6 +91,8 @@ static int stepper_defaults_of(struct stepper_defaults *from,
 	c->acceleration = stepper_defaults_u32(from, "incise,acceleration", 100000);
 	c->jerk = stepper_defaults_u64(from, "incise,jerk", 0);
 	c->late_max = stepper_defaults_u32(from, "incise,late-max", 100);
+	c->lost_steps_max =
+		stepper_defaults_u32(from, "incise,lost-steps-max", c->lost_steps_max);
 	c->position_min = stepper_defaults_s32(from, "incise,position-min", -far);
 	c->position_max = stepper_defaults_s32(from, "incise,position-max", far);
 	c->safe_position =
@@ -141,11 +143,18 @@ static void stepper_defaults_fit(struct stepper_motor *motor,
 /* Configs of all motors; errors are reported. */
 int stepper_defaults(struct stepper *stepper, struct device *dev)
 {
+	u32 lost_steps_max[INCISE_STEPPER_MOTORS_MAX] = {};
 	unsigned int i;
 	int ret;
 
+	/* configfs makes no nodes of motors. */
+	device_property_read_u32_array(dev, "incise,lost-steps-max", lost_steps_max,
+				       stepper->n_motors);
 	for (i = 0; i < stepper->n_motors; i++) {
-		struct incise_stepper_config config = {.motor = i};
+		struct incise_stepper_config config = {
+			.motor = i,
+			.lost_steps_max = lost_steps_max[i],
+		};
 		struct stepper_defaults from = {.dev = dev, .motor = i};
 		struct fwnode_handle *node;
 

@@ -7,7 +7,8 @@
  *   e-stop, driver   a motor with power halts
  *   limit            it halts if it has a way to go towards it; away from there it may move,
  *                    and the step that arrives at it may be the last
- *   home             the position at its leading edge is kept
+ *   home             the position at its leading edge is kept, and with power compared with that
+ *                    at homing. Without a home input, the lower limit is the home
  *
  * All under motor->lock. A line that cannot be read counts as active, except home, which
  * keeps its state.
@@ -52,6 +53,16 @@ static void stepper_inputs_act(struct stepper_motor *motor, enum stepper_input i
 	}
 }
 
+/* The place of the home edge, as it is passed or where it is due. */
+static void stepper_inputs_compare(struct stepper_motor *motor, bool passed, s64 now)
+{
+	if (motor->powered &&
+	    incise_home_edge_look(&motor->edge, motor->flags & INCISE_STEPPER_FLAG_HOMED,
+				  passed && motor->direction, motor->position,
+				  motor->direction, motor->config.lost_steps_max))
+		stepper_stop_fault(motor, INCISE_STEPPER_FAULT_STEPS, now);
+}
+
 static void stepper_inputs_changed(struct stepper_motor *motor, enum stepper_input input,
 				   bool active, s64 now)
 {
@@ -69,6 +80,10 @@ static void stepper_inputs_changed(struct stepper_motor *motor, enum stepper_inp
 		motor->home_position = motor->position;
 		motor->flags |= INCISE_STEPPER_FLAG_HOME_SEEN;
 	}
+	if (input == (motor->lines.input[STEPPER_HOME] ? STEPPER_HOME
+						       : STEPPER_LIMIT_MIN) &&
+	    active)
+		stepper_inputs_compare(motor, true, now);
 }
 
 /**
@@ -115,4 +130,5 @@ void stepper_inputs_sample(struct stepper_motor *motor, s64 now)
 
 	for (input = 0; input < STEPPER_INPUTS; input++)
 		stepper_inputs_one(motor, input, now, false);
+	stepper_inputs_compare(motor, false, now);
 }

@@ -156,8 +156,8 @@ int stepper_page_config(const struct incise_stepper_config *config,
 	    config->setup_ns > 1000000 || config->hold_ns > 1000000 ||
 	    config->enable_ns > 1000000000)
 		return -EINVAL;
-	if (config->position_min < -most || config->position_max > most ||
-	    config->position_min > config->position_max ||
+	if (config->lost_steps_max > most || config->position_min < -most ||
+	    config->position_max > most || config->position_min > config->position_max ||
 	    config->safe_position < config->position_min ||
 	    config->safe_position > config->position_max)
 		return -EINVAL;

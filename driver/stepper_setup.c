@@ -233,6 +233,8 @@ int stepper_setup_position(struct stepper_motor *motor,
 		ret = -EBUSY;
 	} else {
 		motor->home_position += origin->position - motor->position;
+		incise_home_edge_rename(&motor->edge, origin->position - motor->position,
+					origin->homed);
 		motor->position = origin->position;
 		motor->target = origin->position;
 		motor->asked = false;
@@ -253,7 +255,6 @@ void stepper_setup_fault(struct stepper_motor *motor, u32 fault)
 
 	raw_spin_lock_irqsave(&motor->lock, flags);
 	stepper_stop_fault(motor, fault, ktime_get_ns());
-	stepper_status_publish(motor, ktime_get_ns());
 	raw_spin_unlock_irqrestore(&motor->lock, flags);
 }
 

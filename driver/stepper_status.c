@@ -50,6 +50,7 @@ void stepper_status_publish(struct stepper_motor *motor, s64 now)
 	WRITE_ONCE(status->steps_down, motor->steps_down);
 	WRITE_ONCE(status->late, motor->late);
 	WRITE_ONCE(status->shifted_ns, motor->shifted_ns);
+	WRITE_ONCE(status->lost_steps, motor->edge.lost);
 	smp_wmb(); /* the fields before seq */
 	WRITE_ONCE(status->seq, seq + 2);
 }

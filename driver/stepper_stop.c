@@ -4,15 +4,15 @@
  * cause; what it does depends on the fault:
  *
  *   at once    limit, e-stop, driver, late, line     no further step, power off
- *   brake      set-point, suspend, gone              within the limits, then power off
+ *   brake      set-point, suspend, gone, steps       within the limits, then power off
  *   retract    deadman, owner, plan                  to safe_position if it is homed and
  *                                                    the config says so, else brake
  *
  *   READY/MOVING ──▶ STOPPING ──▶ FAULT ──(clear)──▶ DISABLED
  *        └───────── at once ───────▲
  *
- * HOMED goes with e-stop, driver and suspend, with or without power before, and with each power
- * off where the config says so.
+ * HOMED goes with e-stop, driver and suspend, with or without power before, with lost steps, and
+ * with each power off where the config says so.
  *
  * All under motor->lock, in any context.
  */
@@ -24,10 +24,10 @@
 	(INCISE_STEPPER_FAULT_LIMIT_MIN | INCISE_STEPPER_FAULT_LIMIT_MAX | \
 	 INCISE_STEPPER_FAULT_ESTOP | INCISE_STEPPER_FAULT_ALARM |         \
 	 INCISE_STEPPER_FAULT_LATE | INCISE_STEPPER_FAULT_LINE)
-/* With these the power stage loses its supply, and the rotor may turn unseen. */
+/* The power stage loses its supply, and the rotor may turn unseen; or it is elsewhere already. */
 #define UNHOME                                                     \
 	(INCISE_STEPPER_FAULT_ESTOP | INCISE_STEPPER_FAULT_ALARM | \
-	 INCISE_STEPPER_FAULT_SUSPEND)
+	 INCISE_STEPPER_FAULT_SUSPEND | INCISE_STEPPER_FAULT_STEPS)
 #define RETRACT                                                      \
 	(INCISE_STEPPER_FAULT_DEADMAN | INCISE_STEPPER_FAULT_OWNER | \
 	 INCISE_STEPPER_FAULT_PLAN)
@@ -90,7 +90,8 @@ void stepper_stop_fault(struct stepper_motor *motor, u32 fault, s64 now)
 {
 	if (fault & UNHOME && motor->flags & INCISE_STEPPER_FLAG_HOMED) {
 		motor->flags &= ~INCISE_STEPPER_FLAG_HOMED;
-		stepper_status_publish(motor, now);
+		if (!motor->powered)
+			stepper_status_publish(motor, now);
 	}
 	if (!motor->powered)
 		return;

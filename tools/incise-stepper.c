@@ -34,9 +34,9 @@ struct subcommand {
 	const struct cli_unit *units; /* of it */
 	/* On an open drive; failure ends the program. */
 	void (*run)(const struct stepper_job *job, struct stepper_drive *drive);
-	bool watch;	   /* does not become the owner */
-	bool list;	   /* its operand is one or more, with commas */
-	const char *takes; /* letters of options, see check_options() */
+	unsigned int devices; /* of stepper_drive_open() */
+	bool list;	      /* its operand is one or more, with commas */
+	const char *takes;    /* letters of options, see check_options() */
 };
 
 static const struct cli_option options[] = {
@@ -494,14 +494,14 @@ static const struct cli_unit lengths[] = {{"mm", 1}, {"um", 1e-3}, {0}};
 static const struct cli_unit speeds[] = {{"mm/s", 1}, {"um/s", 1e-3}, {0}};
 
 static const struct subcommand subcommands[] = {
-	{"status", NULL, NULL, run_status, true, false, "ft"},
-	{"enable", NULL, NULL, run_enable, false, false, "t"},
-	{"disable", NULL, NULL, run_disable, false, false, ""},
-	{"move", "MM", lengths, run_move, false, false, "buht"},
-	{"jog", "MM_S", speeds, run_jog, false, false, "t"},
-	{"home", NULL, NULL, run_home, false, false, "htn"},
-	{"clear", NULL, NULL, run_clear, false, false, ""},
-	{"tune", "MM_S", speeds, run_tune, false, true, "u"},
+	{"status", NULL, NULL, run_status, INCISE_RIG_WATCH, false, "ft"},
+	{"enable", NULL, NULL, run_enable, 0, false, "t"},
+	{"disable", NULL, NULL, run_disable, STEPPER_DRIVE_OR_WATCH, false, ""},
+	{"move", "MM", lengths, run_move, 0, false, "buht"},
+	{"jog", "MM_S", speeds, run_jog, 0, false, "t"},
+	{"home", NULL, NULL, run_home, 0, false, "htn"},
+	{"clear", NULL, NULL, run_clear, 0, false, ""},
+	{"tune", "MM_S", speeds, run_tune, 0, true, "u"},
 };
 #define SUBCOMMANDS (sizeof(subcommands) / sizeof(*subcommands))
 
@@ -594,8 +594,7 @@ int main(int argc, char **argv)
 	struct stepper_job job = {.axis = 1};
 
 	parse_stepper(&job, argc, argv);
-	stepper_drive_open(&drive, job.rig, job.axis,
-			   job.subcommand->watch ? INCISE_RIG_WATCH : 0,
+	stepper_drive_open(&drive, job.rig, job.axis, job.subcommand->devices,
 			   job.subcommand->name);
 	job.subcommand->run(&job, &drive);
 	/* Status prints all counters; a motion only those of trouble on the way. */

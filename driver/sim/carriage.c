@@ -68,7 +68,8 @@ void sim_carriage_step_locked(struct sim *sim, unsigned int line, bool value)
 
 		if (value == sim_carriage_inverts(carriage, SIM_STEP))
 			continue;
-		if (!sim_carriage_active(sim, carriage, SIM_ENABLE)) {
+		if (carriage->ignore || !sim_carriage_active(sim, carriage, SIM_ENABLE)) {
+			carriage->ignore -= !!carriage->ignore;
 			carriage->ignored++;
 			continue;
 		}
@@ -123,6 +124,8 @@ static int sim_carriage_word(const struct sim *sim, char *word,
 
 	if (sim_text_key(word, "number", &value))
 		return kstrtouint(value, 10, number);
+	if (sim_text_key(word, "ignore", &value))
+		return kstrtou64(value, 10, &carriage->ignore);
 	if (sim_text_key(word, "min_at", &value))
 		return kstrtos64(value, 10, &carriage->min_at);
 	if (sim_text_key(word, "max_at", &value))

@@ -19,6 +19,7 @@
  *                    inverted=step,min": mechanics behind a step and a
  *                    direction line. All but step and dir may be left out;
  *                    number is 0 to 7. "number=0 off" removes one, "off" all.
+ *                    "ignore=100": it stands still for the next 100 steps
  *            read    one line per carriage, the same words and
  *                    steps= up= down= ignored= lowest= highest=
  *  scripts   write   "after=K line=L set=M value=V": after K more edges of

@@ -73,6 +73,7 @@ enum sim_carriage_line {
  * @up:		steps up
  * @down:	steps down
  * @ignored:	steps while the enable line was inactive
+ * @ignore:	so many of the next steps are ignored too
  */
 struct sim_carriage {
 	bool used;
@@ -88,6 +89,7 @@ struct sim_carriage {
 	u64 up;
 	u64 down;
 	u64 ignored;
+	u64 ignore;
 };
 
 /**

@@ -123,8 +123,8 @@ struct incise_stepper_setpoint {
 
 /* incise_stepper_motor_status.flags */
 /*
- * Position is the machine's. A stop at once while moving takes it away, and so do e-stop, ALARM, suspend and,
- * with INCISE_STEPPER_CONFIG_VOLATILE_HOME, each power off.
+ * Position is the machine's. A stop at once while moving takes it away, and so do e-stop, ALARM,
+ * suspend, STEPS and, with INCISE_STEPPER_CONFIG_VOLATILE_HOME, each power off.
  */
 #define INCISE_STEPPER_FLAG_HOMED (1U << 0)
 #define INCISE_STEPPER_FLAG_HELD (1U << 1)	/* the last set-point was clamped */
@@ -150,6 +150,9 @@ struct incise_stepper_setpoint {
  * @steps_down: since bind
  * @late: edges that came more than their shortest time too late, since bind
  * @shifted_ns: by how much the time line of the motion was put off by late edges, since bind
+ * @lost_steps: where the home edge was passed last since homing, less where it was at homing; where
+ *              it was due and did not come, how far the motor went beyond. Of the home input's leading
+ *              edge, without one of the lower limit's; with power, in the direction of homing only
  * @reserved: zero
  */
 struct incise_stepper_motor_status {
@@ -169,7 +172,8 @@ struct incise_stepper_motor_status {
 	__u64 steps_down;
 	__u64 late;
 	__u64 shifted_ns;
-	__u64 reserved[3];
+	__s64 lost_steps;
+	__u64 reserved[2];
 };
 
 /* In page 1: the slot of the plan's status, in 128 bytes; it is longer. */
@@ -355,6 +359,7 @@ struct incise_stepper_controller {
  *            motion that is put off by more than 1/64 of its time for a second is the same fault. Of
  *            a plan's first motor also ticks of the plan in a row, each late by its tick_ns, or
  *            taking more than half of it
+ * @lost_steps_max: more |lost_steps| of the status are the fault STEPS, which brakes; 0: never
  * @reserved: zero
  *
  * SET_CONFIG gives EBUSY while the motor is enabled, EINVAL for a value out of its range
@@ -380,7 +385,8 @@ struct incise_stepper_config {
 	__u32 setup_ns;
 	__u32 hold_ns;
 	__u64 enable_ns;
-	__u64 reserved[5];
+	__u64 lost_steps_max;
+	__u64 reserved[4];
 };
 
 /**

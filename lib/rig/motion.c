@@ -7,8 +7,10 @@
 #include "page.h"
 
 #define RETRACTS (INCISE_STEPPER_FAULT_DEADMAN | INCISE_STEPPER_FAULT_OWNER)
-/* With these the power stage loses its supply, and the rotor may turn unseen. */
-#define UNHOME (INCISE_STEPPER_FAULT_ESTOP | INCISE_STEPPER_FAULT_ALARM)
+/* The power stage loses its supply, and the rotor may turn unseen; or it is elsewhere already. */
+#define UNHOME                                                     \
+	(INCISE_STEPPER_FAULT_ESTOP | INCISE_STEPPER_FAULT_ALARM | \
+	 INCISE_STEPPER_FAULT_STEPS)
 #define FORBIDS (INCISE_STEPPER_LINE_ESTOP | INCISE_STEPPER_LINE_ALARM)
 
 int incise_motion_init(struct incise_motion *m,
@@ -146,6 +148,18 @@ uint32_t incise_motion_listen(struct incise_motion *m, int64_t now_ns)
 		       : 0;
 }
 
+uint32_t incise_motion_compare(struct incise_motion *m, bool passed, int32_t direction)
+{
+	bool lost = m->powered &&
+		    incise_home_edge_look(&m->edge,
+					  m->status.flags & INCISE_STEPPER_FLAG_HOMED,
+					  passed && direction, m->status.position,
+					  direction, (int64_t)m->config.lost_steps_max);
+
+	m->status.lost_steps = m->edge.lost;
+	return lost ? INCISE_STEPPER_FAULT_STEPS : 0;
+}
+
 void incise_motion_ticked(struct incise_motion *m)
 {
 	m->resting = incise_profile_resting(&m->profile);
@@ -171,6 +185,8 @@ int incise_motion_origin(struct incise_motion *m, int32_t steps, bool homed)
 		return -EBUSY;
 	if (steps < m->config.position_min || steps > m->config.position_max)
 		return -EINVAL;
+	incise_home_edge_rename(&m->edge, steps - m->status.position, homed);
+	m->status.lost_steps = m->edge.lost;
 	m->status.position = steps;
 	incise_motion_halt(m, true);
 	if (homed)

@@ -15,6 +15,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 #include "../../driver/uapi/incise_stepper.h"
+#include "../fixed/home_edge.h"
 #include "../fixed/profile.h"
 
 /* Faults after which it may not brake by its profile, but stops at once. */
@@ -40,6 +41,7 @@ struct incise_motion {
 	int64_t seen_ns; /* time of the last set-point */
 	int64_t ran_ns;	 /* when its owner last ran it */
 	uint32_t seq;	 /* of the last set-point */
+	struct incise_home_edge edge;
 };
 
 /* Without power, at 0. 0, -EINVAL or -ERANGE as of incise_profile_init(). */
@@ -83,6 +85,13 @@ uint32_t incise_motion_awake(struct incise_motion *motion, int64_t now_ns);
 
 /* Read a new set-point. 0, or the fault of an invalid or a missing one. */
 uint32_t incise_motion_listen(struct incise_motion *motion, int64_t now_ns);
+
+/*
+ * Compare the place of the home edge with that at homing. @passed: its input just became active, in
+ * @direction, +1 or -1. 0, or the fault of lost steps.
+ */
+uint32_t incise_motion_compare(struct incise_motion *motion, bool passed,
+			       int32_t direction);
 
 /* Update `resting` and the state after a tick of the profile. */
 void incise_motion_ticked(struct incise_motion *motion);

@@ -5,6 +5,7 @@
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <time.h>
 #include <incise/clock.h>
@@ -102,10 +103,19 @@ static int64_t stood_still(struct incise_motor *motor)
 	return (double)age_ns > most_ns ? age_ns : 0;
 }
 
-/* Faults of the driver chip are in no status: the writer of it cannot ask the chip. */
+static INCISE_REALTIME uint32_t driver_faults(const struct incise_motor *motor)
+{
+	uint32_t faults = 0;
+
+	for (struct incise_driver *d = motor->driver; d; d = d->next)
+		faults |= d->ops->faults(d);
+	return faults;
+}
+
+/* Faults of chip and encoder are in no status: the writer of it cannot ask them. */
 static void add_driver_faults(struct incise_motor *motor)
 {
-	uint32_t faults = motor->driver ? motor->driver->ops->faults(motor->driver) : 0;
+	uint32_t faults = driver_faults(motor);
 
 	if (!faults)
 		return;
@@ -143,8 +153,7 @@ static int look_motor(struct incise_motor *motor)
 	return 0;
 }
 
-/* 0 if a target would move it. */
-static int drivable(struct incise_motor *motor)
+INCISE_REALTIME int incise_motor_drivable(struct incise_motor *motor)
 {
 	int rc = motor->watches ? -EPERM : look_motor(motor);
 
@@ -165,7 +174,7 @@ static INCISE_REALTIME int motor_set(struct incise_stepper *stepper, double posi
 
 	if (!isfinite(position_mm))
 		return -EDOM;
-	rc = drivable(motor);
+	rc = incise_motor_drivable(motor);
 	if (rc)
 		return rc;
 	motor->beyond = position_mm < 0 || position_mm > motor->actuator.travel_mm;
@@ -182,7 +191,7 @@ static int motor_jog(struct incise_stepper *stepper, double velocity_mm_s)
 
 	if (!isfinite(velocity_mm_s))
 		return -EDOM;
-	rc = drivable(motor);
+	rc = incise_motor_drivable(motor);
 	if (rc)
 		return rc;
 	motor->beyond = false;
@@ -237,7 +246,7 @@ static int reported(struct incise_motor *motor, int rc, const char *what,
 	if (said->code)
 		return incise_error_set(err, -rc, "%s", said->text);
 	look_motor(motor);
-	if (motor->watches)
+	if (rc == -EPERM && motor->watches)
 		why = "it was opened only to watch; use the program that drives it";
 	else if (motor->last.faults & INCISE_STEPPER_FAULT_GONE || rc == -ENODEV)
 		why = incise_stepper_fault_text(INCISE_STEPPER_FAULT_GONE);
@@ -262,13 +271,21 @@ static int forget_home(struct incise_motor *motor)
 	return rc ? rc : motor->ops->origin(motor, motor->last.position, false);
 }
 
-/* -EPERM with a latched fault of the driver chip. */
+static int driver_cause(const struct incise_motor *motor, char *text, size_t size)
+{
+	int length = 0;
+
+	for (struct incise_driver *d = motor->driver; d && length <= 0; d = d->next)
+		length = d->ops->cause(d, text, size);
+	return length;
+}
+
+/* -EPERM with a latched fault of chip or encoder. */
 static int refuse_by_driver(const struct incise_motor *motor, struct incise_error *why)
 {
 	char cause[240];
 
-	if (!motor->driver ||
-	    motor->driver->ops->cause(motor->driver, cause, sizeof(cause)) <= 0)
+	if (driver_cause(motor, cause, sizeof(cause)) <= 0)
 		return 0;
 	return incise_error_set(why, EPERM, "%s: cannot be enabled: %s", motor->name,
 				cause);
@@ -290,12 +307,15 @@ static int clear_driver(struct incise_motor *motor, struct incise_error *why)
 {
 	int rc = look_motor(motor);
 
-	if (rc || !motor->driver->ops->faults(motor->driver))
+	if (rc || !driver_faults(motor))
 		return rc;
 	if (motor->last.state != INCISE_STEPPER_STATE_FAULT)
 		return -EBUSY;
 	rc = forget_home(motor);
-	return rc ? rc : motor->driver->ops->clear(motor->driver, why);
+	for (struct incise_driver *d = motor->driver; d && !rc; d = d->next)
+		if (d->ops->faults(d))
+			rc = d->ops->clear(d, why);
+	return rc;
 }
 
 static int motor_clear(struct incise_stepper *stepper, struct incise_error *err)
@@ -304,7 +324,7 @@ static int motor_clear(struct incise_stepper *stepper, struct incise_error *err)
 	struct incise_error why = {0};
 	int rc = motor->watches ? -EPERM : motor->ops->clear(motor, &why);
 
-	if (!rc && motor->driver)
+	if (!rc)
 		rc = clear_driver(motor, &why);
 	return reported(motor, rc, "cannot be cleared", &why, err);
 }
@@ -324,7 +344,7 @@ static int motor_wait(struct incise_stepper *stepper, int64_t ns)
 static int motor_disable(struct incise_stepper *stepper, struct incise_error *err)
 {
 	struct incise_motor *motor = motor_of(stepper);
-	int rc = motor->watches ? -EPERM : motor->ops->disable(motor);
+	int rc = motor->ops->disable(motor);
 	struct incise_profile_limits limits;
 	int64_t left_ns;
 
@@ -350,7 +370,7 @@ static int motor_disable(struct incise_stepper *stepper, struct incise_error *er
 						motor->name);
 	}
 	/* The module would keep it for the next program. */
-	if (!rc && motor->driver && motor->driver->ops->faults(motor->driver))
+	if (!rc && !motor->watches && driver_faults(motor))
 		rc = forget_home(motor);
 	return reported(motor, rc, "cannot be disabled", &(struct incise_error){0}, err);
 }
@@ -372,8 +392,7 @@ static void motor_info(const struct incise_stepper *stepper,
 		.rate_max_hz = motor->rate_max_hz,
 		/* The count of steps is exact. */
 		.within_mm = incise_actuator_step_mm(actuator) / 2,
-		.can_home = motor->lines &
-			    (INCISE_STEPPER_LINE_HOME | INCISE_STEPPER_LINE_LIMIT_MIN),
+		.can_home = incise_motor_home_line(motor),
 		.origin_mm = actuator->origin_mm,
 		.rest_mm = actuator->rest_mm,
 		.late_s = actuator->late_s,
@@ -385,6 +404,13 @@ static void motor_info(const struct incise_stepper *stepper,
 static void motor_close(struct incise_stepper *stepper)
 {
 	motor_of(stepper)->ops->close(motor_of(stepper));
+}
+
+unsigned int incise_motor_home_line(const struct incise_motor *motor)
+{
+	return motor->lines & INCISE_STEPPER_LINE_HOME
+		       ? INCISE_STEPPER_LINE_HOME
+		       : motor->lines & INCISE_STEPPER_LINE_LIMIT_MIN;
 }
 
 static int motor_homing(struct incise_stepper *stepper,
@@ -405,11 +431,8 @@ static int motor_homing(struct incise_stepper *stepper,
 			STALL_STEPS * actuator->lead_mm / actuator->steps_per_turn;
 	}
 	homing->home_mm = motor->actuator.home_mm;
-	if (motor->lines & INCISE_STEPPER_LINE_HOME)
-		homing->home_at = INCISE_STEPPER_LINE_HOME;
-	else if (motor->lines & INCISE_STEPPER_LINE_LIMIT_MIN)
-		homing->home_at = INCISE_STEPPER_LINE_LIMIT_MIN;
-	else
+	homing->home_at = incise_motor_home_line(motor);
+	if (!homing->home_at)
 		return -EOPNOTSUPP;
 	/* Rest beside the switch, not on it. */
 	if (homing->home_at == INCISE_STEPPER_LINE_LIMIT_MIN && !motor->actuator.has_home)
@@ -433,39 +456,59 @@ static int motor_origin(struct incise_stepper *stepper, double position_mm, bool
 {
 	struct incise_motor *motor = motor_of(stepper);
 	int32_t steps = incise_actuator_steps(&motor->actuator, position_mm);
-	int rc = drivable(motor);
+	int rc = incise_motor_drivable(motor);
 
 	return rc ? rc : motor->ops->origin(motor, steps, homed);
 }
 
 static int motor_cause(struct incise_stepper *stepper, char *text, size_t size)
 {
-	struct incise_driver *driver = motor_of(stepper)->driver;
+	struct incise_motor *motor = motor_of(stepper);
+	int length = driver_cause(motor, text, size);
 
-	return driver ? driver->ops->cause(driver, text, size) : 0;
+	if (length <= 0 && !look_motor(motor) &&
+	    motor->last.faults & INCISE_STEPPER_FAULT_STEPS)
+		length = snprintf(text, size, "%s: %lld %s", motor->name,
+				  llabs(motor->last.lost_steps),
+				  incise_stepper_fault_text(INCISE_STEPPER_FAULT_STEPS));
+	return length;
 }
 
 static int motor_counter(struct incise_stepper *stepper, int i,
 			 struct incise_stepper_counter *counter)
 {
-	struct incise_driver *driver = motor_of(stepper)->driver;
+	struct incise_motor *motor = motor_of(stepper);
 
-	return driver ? driver->ops->counter(driver, i, counter) : -ENOENT;
+	if (!i && incise_motor_home_line(motor)) {
+		look_motor(motor);
+		*counter = (struct incise_stepper_counter){
+			"lost_steps", "steps missing at the last pass of the home edge",
+			(uint64_t)llabs(motor->last.lost_steps), false};
+		return 0;
+	}
+	i -= !!incise_motor_home_line(motor);
+	for (struct incise_driver *d = motor->driver; d; d = d->next)
+		for (int k = 0; d->ops->counter && !d->ops->counter(d, k, counter); k++)
+			if (!i--)
+				return 0;
+	return -ENOENT;
 }
 
 static int motor_attach(struct incise_stepper *stepper, struct incise_driver *driver)
 {
 	struct incise_motor *motor = motor_of(stepper);
 
+	driver->next = motor->driver;
 	motor->driver = driver;
 	return driver->restarted && !motor->watches ? forget_home(motor) : 0;
 }
 
 static int motor_chip(struct incise_stepper *stepper, struct incise_stepper_chip *chip)
 {
-	struct incise_driver *driver = motor_of(stepper)->driver;
-
-	return driver ? driver->ops->read(driver, chip) : -EOPNOTSUPP;
+	for (struct incise_driver *d = motor_of(stepper)->driver; d; d = d->next)
+		if (d->ops->read)
+			return d->ops->read(d, chip);
+	return -EOPNOTSUPP;
 }
 
 void incise_motor_init(struct incise_motor *motor)
@@ -508,6 +551,7 @@ void incise_motor_config(const struct incise_actuator *actuator, unsigned int in
 		.velocity = limits.velocity,
 		.acceleration = limits.acceleration,
 		.late_max = LATE_MAX,
+		.lost_steps_max = (__u64)actuator->lost_steps_max,
 		.jerk = limits.jerk,
 		.position_max = limits.position_max,
 		.safe_position = incise_actuator_steps(actuator, actuator->rest_mm),

@@ -59,7 +59,7 @@ struct incise_motor {
 	char name[64];
 	double rate_max_hz;
 	unsigned int lines;	      /* INCISE_STEPPER_LINE_… bits it has */
-	struct incise_driver *driver; /* its chip, or NULL */
+	struct incise_driver *driver; /* the first of its chip and encoder, or NULL */
 	bool watches;		      /* opened to watch, not to drive */
 	bool in_process; /* a thread of this program writes the status, and stops with it */
 	struct incise_stepper_setpoint *setpoint; /* NULL where it watches */
@@ -81,11 +81,17 @@ void incise_motor_config(const struct incise_actuator *actuator, unsigned int in
 
 /*
  * Set pulse times that rig.conf leaves open to the shortest that the machine holds, and
- * check the rate. @where starts the message; @pulse_ns: for an edge and its lateness. 0
+ * check the rate: a step takes high, low and @step_ns. @where starts the message; @pulse_ns: for an edge and its lateness. 0
  * or -ERANGE.
  */
 int incise_motor_fit(struct incise_actuator *actuator, const char *where,
 		     uint32_t rate_max, uint32_t pulse_ns, uint32_t step_ns,
 		     struct incise_error *err);
+
+/* 0 if a target would move it; -EPERM, -EIO or -ENODEV. */
+int incise_motor_drivable(struct incise_motor *motor) INCISE_REALTIME;
+
+/* The INCISE_STEPPER_LINE_… bit of the input whose edge is the home, or 0. */
+unsigned int incise_motor_home_line(const struct incise_motor *motor);
 
 #endif

@@ -10,6 +10,7 @@
 #include <incise/rig.h>
 #include "../sim/sim.h"
 #include "backends.h"
+#include "encoder.h"
 #include "rig_plan.h"
 
 #define SIM_START_NS INCISE_NS_PER_S /* of a simulated clock: 0 would pass for unset */
@@ -24,7 +25,8 @@ struct incise_rig {
 	struct incise_camera *camera;
 	struct incise_stepper *stepper[INCISE_RIG_AXES_MAX];
 	struct incise_loaded driver_loaded[INCISE_RIG_AXES_MAX];
-	struct incise_driver *driver[INCISE_RIG_AXES_MAX]; /* NULL: none */
+	/* NULL: none */
+	struct incise_driver *driver[INCISE_RIG_AXES_MAX], *encoder[INCISE_RIG_AXES_MAX];
 	double direction[INCISE_RIG_AXES_MAX][3];
 	int n_axes; /* that are open */
 	double point_mm[3], normal[3];
@@ -60,6 +62,34 @@ static int siblings(const struct incise_rig *rig, int slot, struct incise_steppe
 		if (rig->loaded[i].backend == rig->loaded[slot].backend)
 			to[n++] = rig->stepper[i - KIND_STEPPER];
 	return n;
+}
+
+/* The encoder of the stepper that was opened last. A program that watches leaves it to the other. */
+static int open_encoder(struct incise_rig *rig,
+			const struct incise_backend_request *request,
+			struct incise_error *err)
+{
+	struct incise_stepper *stepper = rig->stepper[rig->n_axes - 1];
+	struct incise_driver **encoder = &rig->encoder[rig->n_axes - 1];
+	int rc;
+
+	if (!*request->actuator->encoder || request->watch)
+		return 0;
+	if (!stepper->ops->attach)
+		return incise_error_set(err, EOPNOTSUPP,
+					"%s: this stepper has an encoder of its own; "
+					"remove the key encoder",
+					request->where);
+	*encoder = incise_encoder_open((struct incise_motor *)stepper,
+				       "/sys/bus/counter/devices", request->where, err);
+	if (!*encoder)
+		return -errno;
+	rc = stepper->ops->attach(stepper, *encoder);
+	if (!rc)
+		rc = incise_encoder_start(*encoder);
+	return rc ? incise_error_set(err, -rc, "%s: encoder: %s", request->where,
+				     strerror(-rc))
+		  : 0;
 }
 
 /* The driver chip of the stepper that was opened last. */
@@ -136,7 +166,10 @@ static int rig_open_real(struct incise_rig *rig, const struct incise_rig_plan *p
 		rig->camera = device;
 	else
 		rig->stepper[rig->n_axes++] = device;
-	return kind == KIND_STEPPER ? open_driver(rig, &request, err) : 0;
+	if (kind != KIND_STEPPER)
+		return 0;
+	rc = open_encoder(rig, &request, err);
+	return rc ? rc : open_driver(rig, &request, err);
 }
 
 static int rig_devices(struct incise_rig *rig, const struct incise_rig_plan *plan,
@@ -228,6 +261,9 @@ void incise_rig_close(struct incise_rig *rig)
 		rig->force->ops->close(rig->force);
 	if (rig->camera)
 		rig->camera->ops->close(rig->camera);
+	for (int i = 0; i < rig->n_axes; i++)
+		if (rig->encoder[i])
+			rig->encoder[i]->ops->close(rig->encoder[i]);
 	for (int i = 0; i < rig->n_axes; i++)
 		rig->stepper[i]->ops->close(rig->stepper[i]);
 	/* The first on a line has opened it. */

@@ -506,6 +506,10 @@ const char *incise_stepper_fault_text(enum incise_stepper_fault fault)
 	case INCISE_STEPPER_FAULT_PLAN:
 		return "another motor of the same plan was stopped: check that one, "
 		       "then clear both";
+	case INCISE_STEPPER_FAULT_STEPS:
+		return "steps are missing: check that nothing blocks it, or give a "
+		       "smaller velocity_mm_s or acceleration_mm_s2, then clear, enable "
+		       "and home";
 	}
 	return "unknown fault: see incise/stepper.h of the version in use";
 }

@@ -23,8 +23,15 @@
 void stepper_drive_open(struct stepper_drive *drive, const char *rig, int axis,
 			unsigned int devices, const char *doing)
 {
+	struct incise_error err = {0};
+
 	*drive = (struct stepper_drive){.doing = doing};
-	drive->rig = cli_open_rig(rig, INCISE_RIG_STEPPER | devices);
+	if (devices == STEPPER_DRIVE_OR_WATCH) {
+		drive->rig = incise_rig_open(cli_rig(rig), INCISE_RIG_STEPPER, &err);
+		devices = err.code == EBUSY ? INCISE_RIG_WATCH : 0;
+	}
+	if (!drive->rig)
+		drive->rig = cli_open_rig(rig, INCISE_RIG_STEPPER | devices);
 	drive->clock = incise_rig_clock(drive->rig);
 	drive->stepper = incise_rig_axis(drive->rig, axis - 1, NULL);
 	if (!drive->stepper)

@@ -33,8 +33,9 @@ struct stepper_drive {
 
 /*
  * Open the rig's stepper. @axis: its number in rig.conf, from 1 on; @devices: others of the rig,
- * or INCISE_RIG_WATCH.
+ * INCISE_RIG_WATCH, or STEPPER_DRIVE_OR_WATCH: watch it while another program drives it.
  */
+#define STEPPER_DRIVE_OR_WATCH ~0U
 void stepper_drive_open(struct stepper_drive *drive, const char *rig, int axis,
 			unsigned int devices, const char *doing);
 

@@ -21,6 +21,7 @@
 #include "../cli/cli.h"
 #include "../cli/json.h"
 #include "module.h"
+#include "status.h"
 
 #define DEVICES "/dev/incise-stepper*"
 #define DEBUGFS "/sys/kernel/debug/incise_stepper"
@@ -221,26 +222,6 @@ static void read_controller(struct controller *controller, const char *path)
 	close(fd);
 }
 
-/* --- names --------------------------------------------------------------------------- */
-
-/* By bit, as the library and rig.conf name them. */
-static const char *const lines[] = {"limit_min", "limit_max", "home", "estop",
-				    "alarm",	 "enable",    "dir"};
-#define LINES (sizeof(lines) / sizeof(*lines))
-
-static const char *const faults[] = {"deadman", "limit_min", "limit_max", "estop",
-				     "alarm",	"late",	     "setpoint",  "owner",
-				     "suspend", "gone",	     "line"};
-#define FAULTS (sizeof(faults) / sizeof(*faults))
-
-static const char *state_name(uint32_t state)
-{
-	static const char *const names[] = {"disabled", "ready", "moving", "stopping",
-					    "fault"};
-
-	return state < sizeof(names) / sizeof(*names) ? names[state] : "unknown";
-}
-
 /* --- the report ---------------------------------------------------------------------- */
 
 bool stepper_module_is(const char *what)
@@ -311,14 +292,15 @@ static void put_motor(const struct controller *controller, uint32_t i)
 	const struct incise_stepper_motor_status *s = &motor->status;
 
 	printf("motor %u: %s at step %" PRId64 ", target %" PRId64 ", %.0f steps/s, %s\n",
-	       i, state_name(s->state), (int64_t)s->position, (int64_t)s->target,
-	       velocity_steps_s(motor),
+	       i, incise_stepper_state_name(s->state), (int64_t)s->position,
+	       (int64_t)s->target, velocity_steps_s(motor),
 	       s->flags & INCISE_STEPPER_FLAG_HOMED ? "homed" : "not homed");
-	put_bits("lines", controller->info.lines[i], lines, LINES);
+	put_bits("lines", controller->info.lines[i], stepper_line_keys, STEPPER_LINES);
 	if (controller->info.polled[i])
-		put_bits("polled", controller->info.polled[i], lines, LINES);
-	put_bits("active", s->inputs, lines, LINES);
-	put_bits("faults", s->faults, faults, FAULTS);
+		put_bits("polled", controller->info.polled[i], stepper_line_keys,
+			 STEPPER_LINES);
+	put_bits("active", s->inputs, stepper_line_keys, STEPPER_LINES);
+	put_bits("faults", s->faults, stepper_fault_keys, INCISE_STEPPER_FAULTS);
 	put_config(&motor->config);
 	printf("  steps      %" PRIu64 " up, %" PRIu64 " down; %" PRIu64
 	       " edges late, the motion delayed by %g us\n",
@@ -404,23 +386,25 @@ static json_t *motor_json(const struct controller *controller, uint32_t i)
 	const struct motor *motor = &controller->motor[i];
 	const struct incise_stepper_motor_status *s = &motor->status;
 
-	return json_pack("{ss sI sI sf sb so so so so so sI sI sI sI so so so}", "state",
-			 state_name(s->state), "position_steps", (json_int_t)s->position,
-			 "target_steps", (json_int_t)s->target, "velocity_steps_s",
-			 velocity_steps_s(motor), "homed",
-			 (int)!!(s->flags & INCISE_STEPPER_FLAG_HOMED), "lines",
-			 json_bits(controller->info.lines[i], lines, LINES), "polled",
-			 json_bits(controller->info.polled[i], lines, LINES), "inputs",
-			 json_bits(s->inputs, lines, LINES), "faults",
-			 json_bits(s->faults, faults, FAULTS), "config",
-			 config_json(&motor->config), "steps_up", (json_int_t)s->steps_up,
-			 "steps_down", (json_int_t)s->steps_down, "late_edges",
-			 (json_int_t)s->late, "shifted_ns", (json_int_t)s->shifted_ns,
-			 "edges",
-			 controller->has_debugfs ? json_integer((json_int_t)motor->edges)
-						 : json_null(),
-			 "lateness", histogram_json(controller, &motor->lateness),
-			 "callback", histogram_json(controller, &motor->cost));
+	return json_pack(
+		"{ss sI sI sf sb so so so so so sI sI sI sI so so so}", "state",
+		incise_stepper_state_name(s->state), "position_steps",
+		(json_int_t)s->position, "target_steps", (json_int_t)s->target,
+		"velocity_steps_s", velocity_steps_s(motor), "homed",
+		(int)!!(s->flags & INCISE_STEPPER_FLAG_HOMED), "lines",
+		json_bits(controller->info.lines[i], stepper_line_keys, STEPPER_LINES),
+		"polled",
+		json_bits(controller->info.polled[i], stepper_line_keys, STEPPER_LINES),
+		"inputs", json_bits(s->inputs, stepper_line_keys, STEPPER_LINES),
+		"faults", json_bits(s->faults, stepper_fault_keys, INCISE_STEPPER_FAULTS),
+		"config", config_json(&motor->config), "steps_up",
+		(json_int_t)s->steps_up, "steps_down", (json_int_t)s->steps_down,
+		"late_edges", (json_int_t)s->late, "shifted_ns",
+		(json_int_t)s->shifted_ns, "edges",
+		controller->has_debugfs ? json_integer((json_int_t)motor->edges)
+					: json_null(),
+		"lateness", histogram_json(controller, &motor->lateness), "callback",
+		histogram_json(controller, &motor->cost));
 }
 
 static json_t *sync_json(const struct controller *controller)

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * Controllers of the kernel module, as incise info prints them. A part of its own, as the
- * kernel's names (uapi) and the names of incise/stepper.h exclude each other.
+ * Controllers of the kernel module, as incise info prints them.
  */
 #ifndef INCISE_STEPPER_MODULE_TOOL_H
 #define INCISE_STEPPER_MODULE_TOOL_H

@@ -10,37 +10,22 @@
 #include "../cli/json.h"
 #include "status.h"
 
-/* From the lowest bit on: in text, and in JSON. */
 static const char *const inputs[] = {"limit at 0", "limit at the end", "home", "e-stop",
 				     "alarm"};
-static const char *const input_keys[] = {"limit_min", "limit_max", "home", "estop",
-					 "alarm"};
 #define INPUTS (sizeof(inputs) / sizeof(*inputs))
 
-/* In the order of their report. */
-static const struct {
-	enum incise_stepper_fault fault;
-	const char *key;
-} fault_keys[] = {
-	{INCISE_STEPPER_FAULT_DEADMAN, "deadman"},
-	{INCISE_STEPPER_FAULT_TRAVEL, "travel"},
-	{INCISE_STEPPER_FAULT_LIMIT_MIN, "limit_min"},
-	{INCISE_STEPPER_FAULT_LIMIT_MAX, "limit_max"},
-	{INCISE_STEPPER_FAULT_ESTOP, "estop"},
-	{INCISE_STEPPER_FAULT_ALARM, "alarm"},
-	{INCISE_STEPPER_FAULT_LATE, "late"},
-	{INCISE_STEPPER_FAULT_SETPOINT, "setpoint"},
-	{INCISE_STEPPER_FAULT_OWNER, "owner"},
-	{INCISE_STEPPER_FAULT_SUSPEND, "suspend"},
-	{INCISE_STEPPER_FAULT_GONE, "gone"},
-	{INCISE_STEPPER_FAULT_LINE, "line"},
-	{INCISE_STEPPER_FAULT_BUS, "bus"},
-	{INCISE_STEPPER_FAULT_LOST, "lost"},
-	{INCISE_STEPPER_FAULT_FOLLOWING, "following"},
-	{INCISE_STEPPER_FAULT_PLAN, "plan"},
-};
-#define FAULTS (sizeof(fault_keys) / sizeof(*fault_keys))
-_Static_assert(FAULTS == INCISE_STEPPER_FAULTS, "a key for each fault");
+const char *const stepper_line_keys[STEPPER_LINES] = {
+	"limit_min", "limit_max", "home", "estop", "alarm", "enable", "dir"};
+
+const char *const stepper_fault_keys[INCISE_STEPPER_FAULTS] = {
+	"deadman",  "limit_min", "limit_max", "estop", "alarm",	    "late",
+	"setpoint", "owner",	 "suspend",   "gone",  "line",	    "bus",
+	"lost",	    "following", "travel",    "plan",  "lost_steps"};
+
+static const char *fault_text(int bit)
+{
+	return incise_stepper_fault_text((enum incise_stepper_fault)(1U << bit));
+}
 
 json_t *stepper_counters_json(struct incise_stepper *stepper)
 {
@@ -88,11 +73,10 @@ static const char *faults_text(unsigned int faults, char *text, size_t size)
 	size_t used = 0;
 
 	text[0] = 0;
-	for (size_t i = 0; i < FAULTS && used < size; i++)
-		if (faults & fault_keys[i].fault)
+	for (int i = 0; i < INCISE_STEPPER_FAULTS && used < size; i++)
+		if (faults & 1U << i)
 			used += snprintf(text + used, size - used, "%s%s",
-					 used ? "; " : "",
-					 incise_stepper_fault_text(fault_keys[i].fault));
+					 used ? "; " : "", fault_text(i));
 	return text;
 }
 
@@ -114,8 +98,8 @@ static bool own_cause(struct incise_stepper *stepper, unsigned int faults, char 
 {
 	if (!faults || incise_stepper_cause(stepper, text, size) <= 0)
 		return false;
-	for (size_t i = 0; i < FAULTS; i++)
-		if (!strcmp(text, incise_stepper_fault_text(fault_keys[i].fault)))
+	for (int i = 0; i < INCISE_STEPPER_FAULTS; i++)
+		if (!strcmp(text, fault_text(i)))
 			return false;
 	drop_name(stepper, text);
 	return true;
@@ -214,10 +198,9 @@ void stepper_status_text(struct incise_stepper *stepper,
 		putchar(')');
 	}
 	putchar('\n');
-	for (size_t i = 0; i < FAULTS; i++)
-		if (status->faults & fault_keys[i].fault)
-			printf("fault      %s\n",
-			       incise_stepper_fault_text(fault_keys[i].fault));
+	for (int i = 0; i < INCISE_STEPPER_FAULTS; i++)
+		if (status->faults & 1U << i)
+			printf("fault      %s\n", fault_text(i));
 	if (!status->faults)
 		puts("faults     none");
 	if (own_cause(stepper, status->faults, cause, sizeof(cause)))
@@ -247,13 +230,11 @@ static json_t *faults_json(unsigned int faults)
 {
 	json_t *list = json_array();
 
-	for (size_t i = 0; i < FAULTS; i++)
-		if (faults & fault_keys[i].fault)
-			json_array_append_new(list,
-					      json_pack("{ss ss}", "fault",
-							fault_keys[i].key, "text",
-							incise_stepper_fault_text(
-								fault_keys[i].fault)));
+	for (int i = 0; i < INCISE_STEPPER_FAULTS; i++)
+		if (faults & 1U << i)
+			json_array_append_new(list, json_pack("{ss ss}", "fault",
+							      stepper_fault_keys[i],
+							      "text", fault_text(i)));
 	return list;
 }
 
@@ -286,8 +267,8 @@ json_t *stepper_status_json(struct incise_stepper *stepper,
 		json_number(status->velocity_mm_s), "homed", status->homed, "handle_mm",
 		measured(info, status->handle_mm), "force_N",
 		measured(info, status->force_N), "inputs",
-		json_bits(status->inputs, input_keys, INPUTS), "inputs_wired",
-		json_bits(info->inputs, input_keys, INPUTS), "faults",
+		json_bits(status->inputs, stepper_line_keys, INPUTS), "inputs_wired",
+		json_bits(info->inputs, stepper_line_keys, INPUTS), "faults",
 		faults_json(status->faults), "cause", cause_json(stepper, status->faults),
 		"late_steps", (json_int_t)status->late, "travel_mm",
 		json_number(info->travel_mm), "step_mm", json_number(info->step_mm),

@@ -9,6 +9,11 @@
 #include <jansson.h>
 #include <incise/stepper.h>
 
+/* By bit, in JSON and as rig.conf names them. */
+#define STEPPER_LINES 7
+extern const char *const stepper_line_keys[STEPPER_LINES],
+	*const stepper_fault_keys[INCISE_STEPPER_FAULTS];
+
 /* Whole microsteps. */
 long long stepper_steps(const struct incise_stepper_info *info, double mm);
 

@@ -82,6 +82,8 @@ static void look_pulser(struct incise_pulser *p, int64_t now)
 		p->motion.status.home_position = p->motion.status.position;
 		p->motion.status.flags |= INCISE_STEPPER_FLAG_HOME_SEEN;
 	}
+	fault_at(p, incise_motion_compare(&p->motion, rising & p->home, p->direction),
+		 now);
 	if (inputs & INCISE_STEPPER_LINE_ESTOP)
 		fault_at(p, INCISE_STEPPER_FAULT_ESTOP, now);
 	if (inputs & INCISE_STEPPER_LINE_ALARM)

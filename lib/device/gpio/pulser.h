@@ -37,6 +37,7 @@ struct incise_pulser {
 	const struct incise_pulser_ops *ops;
 	void *world;
 	struct incise_motion motion; /* its setpoint and slot are to be set */
+	uint32_t home; /* INCISE_STEPPER_LINE_… bit of the home edge, or 0 */
 
 	/* private */
 	struct incise_profile_slot steps;  /* of this tick */

@@ -338,8 +338,8 @@ static int set_up_stepper_gpio(struct gpio_stepper *g,
 		return incise_error_set(
 			err, -rc, "%s: gpio chip %.60s: its lines cannot be used: %s",
 			request->where, request->arguments, strerror(-rc));
-	rc = incise_motor_fit(&g->motor.actuator, request->where, rate_max, pulse_ns, 0,
-			      err);
+	rc = incise_motor_fit(&g->motor.actuator, request->where, rate_max, pulse_ns,
+			      2 * pulse_ns, err);
 	if (rc)
 		return rc;
 	g->motor.rate_max_hz = rate_max;
@@ -385,6 +385,7 @@ static void *gpio_open(const struct incise_backend_request *request,
 	snprintf(g->motor.name, sizeof(g->motor.name), "gpio chip %.24s",
 		 request->arguments);
 	incise_motor_init(&g->motor);
+	g->pulser.home = incise_motor_home_line(&g->motor);
 	g->pulser.ops = &world_ops;
 	g->pulser.world = g;
 	g->pulser.motion.setpoint = &g->setpoint;

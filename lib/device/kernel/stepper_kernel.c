@@ -195,24 +195,10 @@ static int plan_load(struct incise_stepper *const *steppers, int n, const void *
 	}
 }
 
-static INCISE_REALTIME int plan_drivable(struct incise_stepper *stepper)
-{
-	struct incise_stepper_status status;
-	int rc = stepper->ops->status(stepper, &status);
-
-	if (!rc && ((struct incise_motor *)stepper)->watches)
-		rc = -EPERM;
-	if (!rc && (status.faults & ~INCISE_STEPPER_FAULT_TRAVEL ||
-		    (status.state != INCISE_STEPPER_STATE_READY &&
-		     status.state != INCISE_STEPPER_STATE_MOVING)))
-		rc = -EIO;
-	return rc;
-}
-
 static INCISE_REALTIME int plan_follow(struct incise_stepper *stepper)
 {
 	struct incise_motor *motor = (struct incise_motor *)stepper;
-	int rc = plan_drivable(stepper);
+	int rc = incise_motor_drivable(motor);
 
 	if (!rc)
 		incise_page_put_setpoint(motor->setpoint, INCISE_STEPPER_MODE_POSE, 0,
@@ -236,7 +222,7 @@ static INCISE_REALTIME int plan_pose(struct incise_stepper *first,
 	struct kernel_stepper *k = (struct kernel_stepper *)first;
 	const struct incise_tracker_sample *sample = given->sample;
 	struct incise_stepper_pose pose = {0};
-	int rc = plan_drivable(first);
+	int rc = incise_motor_drivable(&k->motor);
 
 	if (rc)
 		return rc;
@@ -482,14 +468,6 @@ static int configure(struct kernel_stepper *k,
 	}
 	if (!rc)
 		return 0;
-	if (rc == -ERANGE)
-		return incise_error_set(
-			err, ERANGE,
-			"%s: %.200s: %u steps/s with pulses of %u and %u ns exceed the "
-			"limits of this machine: %u steps/s, %u ns; give a smaller "
-			"velocity_mm_s, fewer microsteps or longer pulses",
-			asked->where, k->path, config.velocity, config.high_ns,
-			config.low_ns, info->rate_max, info->pulse_ns);
 	return incise_error_set(
 		err, -rc,
 		rc == -EBUSY

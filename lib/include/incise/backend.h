@@ -121,7 +121,7 @@ struct incise_driver_ops {
 	int (*cause)(struct incise_driver *driver, char *text, size_t size);
 	/** Set it up again, without faults. 0; -EBUSY (a cause persists), -EIO, -ENODEV. */
 	int (*clear)(struct incise_driver *driver, struct incise_error *err);
-	/** See incise_stepper_chip(), incise_stepper_counter(). */
+	/** See incise_stepper_chip(), incise_stepper_counter(). NULL for an encoder. */
 	int (*read)(struct incise_driver *driver, struct incise_stepper_chip *chip);
 	int (*counter)(struct incise_driver *driver, int i,
 		       struct incise_stepper_counter *counter);
@@ -133,6 +133,7 @@ struct incise_driver {
 	const struct incise_driver_ops *ops;
 	/** When it was opened it had been without supply, or off: the position is lost. */
 	bool restarted;
+	struct incise_driver *next; /**< the stepper's: another of the same motor */
 };
 
 /**
@@ -173,7 +174,7 @@ struct incise_stepper_ops {
 	int (*wait)(struct incise_stepper *stepper, int64_t ns);
 
 	/**
-	 * Take a driver chip, which lives longer; 0 or a negative errno. NULL: it has a power
+	 * Take a driver chip or an encoder, which lives longer; 0 or a negative errno. NULL: it has a power
 	 * stage of its own.
 	 */
 	int (*attach)(struct incise_stepper *stepper, struct incise_driver *driver);
@@ -285,6 +286,9 @@ struct incise_actuator {
 	double deadman_s;
 	bool retract; /**< after the deadman, move to rest_mm before power goes off */
 	bool volatile_home; /**< not homed any more after each power off */
+	int lost_steps_max; /**< steps that may be missing; 0: any number */
+	char encoder[64];   /**< counterN/countM of its count; "": none */
+	double encoder_counts_per_mm;
 	uint32_t tick_ns;
 	uint32_t high_ns, low_ns; /**< 0: not given: the shortest of the machine */
 	uint32_t setup_ns, hold_ns;
@@ -303,7 +307,7 @@ struct incise_actuator {
 };
 
 /** Version of the structs and values that backends use. */
-#define INCISE_BACKEND_ABI 10
+#define INCISE_BACKEND_ABI 11
 
 /** Settings of rig.conf for a backend. */
 struct incise_backend_request {

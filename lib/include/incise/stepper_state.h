@@ -18,7 +18,7 @@ enum incise_stepper_state {
 
 /**
  * Faults; bits. All are latched except TRAVEL, and DEADMAN on the simulated rig, which ends
- * with the next target. The kernel module has those up to LINE, and PLAN.
+ * with the next target. The kernel module has those up to LINE, PLAN and STEPS.
  */
 enum incise_stepper_fault {
 	INCISE_STEPPER_FAULT_DEADMAN = 1 << 0, /**< no new target for the deadman time */
@@ -40,8 +40,9 @@ enum incise_stepper_fault {
 	INCISE_STEPPER_FAULT_FOLLOWING = 1 << 13, /**< does not follow its targets */
 	INCISE_STEPPER_FAULT_TRAVEL = 1 << 14, /**< target outside the travel, clamped */
 	INCISE_STEPPER_FAULT_PLAN = 1 << 15, /**< another motor of its plan was stopped */
+	INCISE_STEPPER_FAULT_STEPS = 1 << 16, /**< steps were lost */
 };
-#define INCISE_STEPPER_FAULTS 16 /**< bits of incise_stepper_fault */
+#define INCISE_STEPPER_FAULTS 17 /**< bits of incise_stepper_fault */
 
 /** Lines; bits. The inputs come first. */
 enum incise_stepper_line {

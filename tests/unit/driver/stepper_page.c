@@ -286,7 +286,9 @@ TEST(test_config)
 		{FIELD(enable_ns), 1000000000, 0},
 		{FIELD(enable_ns), -1, -EINVAL},
 		{FIELD(reserved[0]), 1, -EINVAL},
-		{FIELD(reserved[4]), 1, -EINVAL},
+		{FIELD(reserved[3]), 1, -EINVAL},
+		{FIELD(lost_steps_max), 1000000000, 0},
+		{FIELD(lost_steps_max), 1000000001, -EINVAL},
 	};
 
 	struct incise_stepper_config brief = good;

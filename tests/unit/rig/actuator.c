@@ -69,8 +69,11 @@ TEST(what_does_not_fit_is_refused_with_its_line)
 		{NEEDED "\ntick_us = 20;", "r:3: actuator.tick_us:"},
 		/* 200 000 microsteps/s of 0.625 µm. */
 		{NEEDED "\nvelocity_mm_s = 126;", "0.000625 to 125 mm/s"},
-		/* A step each 62.5 µs, of 40 + 30 µs: 14285.7 steps/s. */
-		{NEEDED "\nhigh_us = 40; low_us = 30;", "8.9285 mm/s"},
+		{NEEDED "\nencoder = \"counter0/count0\";",
+		 "actuator.encoder_counts_per_mm"},
+		{NEEDED "\nencoder = \"counter0/count0\"; encoder_counts_per_mm = -400.0;"
+			"lost_steps_max = 0;",
+		 "actuator.lost_steps_max"},
 		{NEEDED "\nacceleration_mm_s2 = 2e6;",
 		 "r:3: actuator.acceleration_mm_s2:"},
 		/* An average of 256 ticks of 250 µs: 2·500/0.064. */

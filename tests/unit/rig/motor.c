@@ -168,6 +168,7 @@ static void bench_start(struct bench *b, bool home, bool limits, bool invert,
 		.world = &b->machine,
 		.motion.setpoint = &b->setpoint,
 		.motion.slot = &b->status,
+		.home = incise_motor_home_line(&b->motor),
 	};
 	assert_int_equal(incise_pulser_init(&b->pulser, &b->config), 0);
 }
@@ -296,12 +297,16 @@ TEST(a_fault_of_the_driver_chip_stops_the_motor)
 
 	bench_start(&b, true, false, false, 0);
 	assert_int_equal(incise_stepper_chip(stepper, &read), -EOPNOTSUPP);
-	assert_int_equal(incise_stepper_counter(stepper, 0, &counter), -ENOENT);
+	assert_int_equal(incise_stepper_counter(stepper, 0, &counter), 0);
+	assert_string_equal(counter.key, "lost_steps");
+	assert_int_equal(incise_stepper_counter(stepper, 1, &counter), -ENOENT);
 	chip.driver.ops = &chip_ops;
 	assert_int_equal(stepper->ops->attach(stepper, &chip.driver), 0);
 	assert_int_equal(incise_stepper_chip(stepper, &read), 0);
 	assert_int_equal(read.load, 77);
-	assert_int_equal(incise_stepper_counter(stepper, 0, &counter), 0);
+	assert_int_equal(incise_stepper_counter(stepper, 1, &counter), 0);
+	assert_string_equal(counter.key, "warm");
+	assert_int_equal(incise_stepper_counter(stepper, 2, &counter), -ENOENT);
 
 	succeeds(!incise_stepper_enable(stepper, &err));
 	bench_advance(&b, 2000000);
@@ -340,6 +345,7 @@ TEST(a_fault_of_the_driver_chip_stops_the_motor)
 	b.pulser.motion.status.flags |= INCISE_STEPPER_FLAG_HOMED;
 	chip.driver.restarted = true;
 	bench_advance(&b, 2000000);
+	b.motor.driver = NULL;
 	assert_int_equal(stepper->ops->attach(stepper, &chip.driver), 0);
 	assert_false(b.pulser.motion.status.flags & INCISE_STEPPER_FLAG_HOMED);
 	chip.driver.restarted = false;
@@ -420,6 +426,100 @@ TEST(a_stall_homes)
 		first = b.machine.at;
 		assert_int_equal(b.pulser.motion.status.position, 0);
 	}
+}
+
+/* To a position, or until it stops. */
+static void go_to(struct bench *b, double mm)
+{
+	for (int i = 0; i < 200 && !incise_stepper_set(&b->motor.stepper, mm); i++)
+		bench_advance(b, 10000000);
+	bench_advance(b, 60000000);
+}
+
+static unsigned long long lost_steps(struct bench *b)
+{
+	struct incise_stepper_counter counter;
+
+	assert_int_equal(incise_stepper_counter(&b->motor.stepper, 0, &counter), 0);
+	return counter.value;
+}
+
+/* Homed, with its edge 1 mm up the travel, and then at 3 mm. */
+static void bench_home(struct bench *b, bool home, double home_mm, int max)
+{
+	bench_start(b, home, !home, false, 0);
+	b->motor.actuator.home_mm = home_mm;
+	b->motor.actuator.has_home = true;
+	b->motor.actuator.lost_steps_max = b->pulser.motion.config.lost_steps_max = max;
+	succeeds(!incise_stepper_enable(&b->motor.stepper, &err));
+	bench_advance(b, 2000000);
+	succeeds(!incise_stepper_home(&b->motor.stepper, NULL, NULL, &err));
+	go_to(b, 3);
+	assert_int_equal(status_of(b).faults, 0);
+}
+
+static void lost(struct bench *b, const char *steps)
+{
+	char text[200];
+
+	assert_int_equal(status_of(b).faults, INCISE_STEPPER_FAULT_STEPS);
+	assert_false(status_of(b).homed);
+	assert_true(incise_stepper_cause(&b->motor.stepper, text, sizeof(text)) > 0);
+	assert_non_null(strstr(text, steps));
+	succeeds(!incise_stepper_clear(&b->motor.stepper, &err));
+	assert_int_equal(status_of(b).state, INCISE_STEPPER_STATE_DISABLED);
+}
+
+TEST(lost_steps_are_found_where_the_home_edge_is_passed)
+{
+	static struct bench b;
+
+	/* As often as one likes, at full speed: no step is missing. */
+	bench_home(&b, true, 1, 1);
+	for (int i = 0; i < 5; i++) {
+		go_to(&b, 0);
+		go_to(&b, 3);
+	}
+	assert_int_equal(lost_steps(&b), 0);
+
+	/* Few on the way up are counted; with more of them it stops. */
+	bench_home(&b, true, 1, 40);
+	b.machine.at -= 40;
+	go_to(&b, 0);
+	assert_int_equal(status_of(&b).faults, 0);
+	assert_int_equal(lost_steps(&b), 40);
+	go_to(&b, 3);
+	b.machine.at -= 1;
+	go_to(&b, 0);
+	lost(&b, "bench: 41 steps are missing: ");
+
+	/* On the way down: the edge is behind where it is due. */
+	bench_home(&b, true, 1, 40);
+	b.machine.at += 40;
+	go_to(&b, 0);
+	assert_int_equal(status_of(&b).faults, 0);
+	assert_int_equal(lost_steps(&b), 40);
+	go_to(&b, 3);
+	b.machine.at += 90;
+	go_to(&b, 0);
+	/* Found in the tick after the 40th, so not all of them. */
+	lost(&b, "bench: 4");
+
+	/* Any number may be. */
+	bench_home(&b, true, 1, 0);
+	b.machine.at -= 300;
+	go_to(&b, 0);
+	assert_int_equal(status_of(&b).faults, 0);
+	assert_int_equal(lost_steps(&b), 300);
+
+	/* The limit as home, 0.5 mm below 0. */
+	bench_home(&b, false, -0.5, 40);
+	go_to(&b, 0);
+	go_to(&b, 3);
+	b.machine.at -= 500;
+	go_to(&b, 0);
+	assert_true(status_of(&b).faults & INCISE_STEPPER_FAULT_STEPS);
+	assert_false(status_of(&b).homed);
 }
 
 struct virtual_rig {

@@ -41,7 +41,7 @@ static const char everything[] =
 	"		homing_method = -3; absolute = true; position_gain_1_s = 10;\n"
 	"		stiffness_permille_mm = 5; damping_permille_s_mm = 6;\n"
 	"		torque_max_permille = 700; master = 126; };\n"
-	"	driver = \"tmc2209:/dev/serial0:1\"; tmc = { sense_ohm = 0.1; run_A = 0.8;\n"
+	"	encoder = \"counter0/count0\"; encoder_counts_per_mm = -500; driver = \"tmc2209:/dev/serial0:1\"; tmc = { sense_ohm = 0.1; run_A = 0.8;\n"
 	"		hold_A = 0.2; interpolate = false; stealthchop = false;\n"
 	"		stealthchop_mm_s = 5; stall_mm_s = 0.5; stall_threshold = 60;\n"
 	"		stall_home = true; }; },\n"

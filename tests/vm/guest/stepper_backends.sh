@@ -7,6 +7,7 @@ with_modules "stepper backends" incise_stepper
 stepper=$module
 with_modules "stepper backends" incise_sim
 in_virtual_time "stepper backends"
+export INCISE_MODULE_PATH="$INCISE_BUILD/lib/incise"
 
 config=/sys/kernel/config/incise-stepper
 modprobe -a industrialio kfifo_buf industrialio-triggered-buffer configfs libcrc32c crc32c_generic 2>/dev/null
@@ -38,8 +39,7 @@ actuator = {$actuator
 		alarm = 6; estop = 7; }; };
 END
 if [ -e "$INCISE_BUILD/lib/incise/stepper_gpio.so" ]; then
-	INCISE_MODULE_PATH=$INCISE_BUILD/lib/incise \
-		"$INCISE_BUILD/tests/vm/stepper_backends" gpio /tmp/gpio.conf $1
+	"$INCISE_BUILD/tests/vm/stepper_backends" gpio /tmp/gpio.conf $1
 else
 	echo "ok gpio # skip libgpiod is not installed"
 fi

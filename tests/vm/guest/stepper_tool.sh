@@ -118,6 +118,11 @@ check "jog ends at the end of the travel" says 0 "end of the travel" stepper jog
 begin powered enable
 check "there is one owner" says 1 "another program drives it" stepper move 1
 check "who only looks is welcome" says 0 ": ready at 0.0000 mm" stepper status
+check "whoever looks may stop" says 0 ": disabled at 0.0000 mm" stepper disable
+wait $!
+code=$?
+check "the owner says so" ended 1 "power was switched off"
+begin powered enable
 kill -INT $!
 wait $!
 code=$?

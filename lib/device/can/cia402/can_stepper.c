@@ -81,8 +81,7 @@ static void obey(struct can_stepper *c)
 	case NONE:
 		return;
 	case DISABLE:
-		if (!c->motor.watches)
-			can_axis_disable(&c->session.axis);
+		can_axis_disable(&c->session.axis);
 		break;
 	case LEND:
 		c->lent = true;
@@ -314,7 +313,7 @@ static int can_enable(struct incise_motor *motor, struct incise_error *err)
 
 static int can_disable(struct incise_motor *motor)
 {
-	return post(can_stepper_of(motor), DISABLE);
+	return motor->watches ? -EPERM : post(can_stepper_of(motor), DISABLE);
 }
 
 static int can_clear(struct incise_motor *motor, struct incise_error *err)
