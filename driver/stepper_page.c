@@ -30,7 +30,7 @@
 
 #define SLOT_WORDS (sizeof(struct incise_stepper_setpoint) / sizeof(__u64))
 
-/* A slot as words that are read whole, and as the struct. */
+/* A slot as words and as the struct. A word that is torn, on 32 bits, has another seq behind it. */
 union slot_copy {
 	__u64 word[SLOT_WORDS];
 	struct incise_stepper_setpoint setpoint;

@@ -132,7 +132,8 @@ struct incise_stepper_setpoint {
 
 /**
  * struct incise_stepper_motor_status - where a motor stands; one slot, 128 bytes
- * @seq: odd while the kernel writes; a reader tries again when it changed meanwhile
+ * @seq: odd while the kernel writes; a reader tries again when it changed meanwhile: on 32 bits a
+ *       field of 64 is read in two parts, and belongs together only then
  * @state: INCISE_STEPPER_STATE_…
  * @faults: INCISE_STEPPER_FAULT_… bits, latched
  * @inputs: INCISE_STEPPER_LINE_… bits that are active now; while disabled, and on a chip
