@@ -606,7 +606,7 @@ int iio_source_open(struct iio_source *s, const char *name, struct incise_error 
 	trigger = *s->trigger_used ? iio_context_find_device(s->context, s->trigger_used)
 				   : NULL;
 	rc = set_rate(s, trigger, err);
-	/* Of some converters the scale follows the rate. */
+	/* The scale of some converters follows the rate. */
 	return rc ? rc : set_volts(s, err);
 }
 
