@@ -324,7 +324,7 @@ static int motor_clear(struct incise_stepper *stepper, struct incise_error *err)
 	struct incise_error why = {0};
 	int rc = motor->watches ? -EPERM : motor->ops->clear(motor, &why);
 
-	if (!rc)
+	if (!rc && motor->driver)
 		rc = clear_driver(motor, &why);
 	return reported(motor, rc, "cannot be cleared", &why, err);
 }

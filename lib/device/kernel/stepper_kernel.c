@@ -56,8 +56,11 @@ static int on_mask(struct incise_motor *motor, unsigned long number)
 
 static int kernel_enable(struct incise_motor *motor, struct incise_error *err)
 {
+	int rc = on_mask(motor, INCISE_STEPPER_ENABLE);
+
 	(void)err;
-	return on_mask(motor, INCISE_STEPPER_ENABLE);
+	/* A latched fault, as incise_stepper_enable() names it. */
+	return rc == -ENOTRECOVERABLE ? -EPERM : rc;
 }
 
 static int kernel_disable(struct incise_motor *motor)

@@ -107,8 +107,10 @@ INCISE_API int incise_stepper_enable(struct incise_stepper *stepper,
 				     struct incise_error *err);
 
 /**
- * Bring it to rest, then switch it off; waits until that is done.
- * @return 0, -EIO, -ENODEV, -ETIMEDOUT (not done after 1 s plus the time to stop)
+ * Bring it to rest, then switch it off; waits until that is done. A motor of the kernel module may also be
+ * opened with INCISE_RIG_WATCH.
+ * @return 0, -EIO, -ENODEV, -EPERM (opened with INCISE_RIG_WATCH), -ETIMEDOUT (not done after 1 s plus the
+ *         time to stop)
  */
 INCISE_API int incise_stepper_disable(struct incise_stepper *stepper,
 				      struct incise_error *err);

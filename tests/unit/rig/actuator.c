@@ -151,6 +151,10 @@ TEST(the_machine_must_hold_the_rate)
 	assert_true(config.motor == 3 && config.velocity == 16000 &&
 		    config.high_ns == 8000);
 	assert_true(config.deadman_ns == 100000000 && config.position_max == 32000);
+	/* 0.2 mm of 0.625 µm; with a steep screw four whole steps of 16. */
+	assert_int_equal(config.lost_steps_max, 320);
+	a = actuator_good("", "spring_N_mm = 2.0; travel_mm = 20.0; lead_mm = 40.0;");
+	assert_int_equal(a.lost_steps_max, 64);
 	a = actuator_good("", NEEDED);
 	assert_int_equal(incise_motor_fit(&a, "m", 20000, 100, 0, &err), 0);
 	assert_true(a.high_ns == 5000 && a.low_ns == 5000);
@@ -161,6 +165,10 @@ TEST(the_machine_must_hold_the_rate)
 	a = actuator_good("", NEEDED);
 	assert_error(incise_motor_fit(&a, "m", 20000, 40000, 0, &err), ERANGE, &err,
 		     "12500");
+	/* 10 µs of pulse and pause, and 60 of writes: 14285.7 steps/s. */
+	a = actuator_good("", NEEDED);
+	assert_error(incise_motor_fit(&a, "m", 20000, 100, 60000, &err), ERANGE, &err,
+		     "14285", "8.9285 mm/s");
 	a = actuator_good("", NEEDED "high_us = 7.0;");
 	assert_error(incise_motor_fit(&a, "m", 20000, 8000, 0, &err), ERANGE, &err, "8");
 }
