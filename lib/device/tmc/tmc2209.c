@@ -29,7 +29,6 @@
 #define SYNC 0x05 /* the upper four bits are free */
 #define TO_MASTER 0xff
 #define TRIES 3
-#define ANSWER_NS 50000000 /* 12 bytes at 115200 bit/s take 1 ms */
 #define ANSWER_BYTES 8
 
 /* x^8 + x^2 + x + 1, the lowest bit of each byte first. */
@@ -44,6 +43,8 @@ static uint8_t crc8(const uint8_t *bytes, int n)
 	}
 	return crc;
 }
+
+int64_t tmc2209_answer_ns = 50000000; /* 12 bytes at 115200 bit/s take 1 ms */
 
 static int send_datagram(const struct tmc_driver *d, uint8_t *bytes, int n)
 {
@@ -65,7 +66,7 @@ static bool parse_answer(const uint8_t *a, uint8_t reg, uint32_t *value)
 
 static int receive_answer(const struct tmc_driver *d, uint8_t reg, uint32_t *value)
 {
-	int64_t end_ns = incise_monotonic_ns() + ANSWER_NS, left_ns;
+	int64_t end_ns = incise_monotonic_ns() + tmc2209_answer_ns, left_ns;
 	struct pollfd wait = {.fd = d->line->fd, .events = POLLIN};
 	uint8_t bytes[64];
 

@@ -19,6 +19,7 @@ static int begin(void **state)
 {
 	(void)state;
 	memset(&line, 0, sizeof(line));
+	tmc2209_answer_ns = 500000000;
 	return chip_begin(&line);
 }
 
