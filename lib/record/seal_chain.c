@@ -20,10 +20,10 @@
 #define START "'boot', 'host', 'identity', 'incise', 'kernel', 'started'"
 #define CALIBRATION \
 	"'calibration_conf', 'depth_mm_px', 'force_mV_N', 'tip_x_mm', 'tip_y_mm', 'tip_z_mm'"
-#define REWRITTEN                                                                            \
-	"'complete', 'cut_ends_ns', 'cuts', 'depth_max_mm', 'depth_rows', 'force_clipped', " \
-	"'force_lost', 'force_max_N', 'force_rows', "                                        \
-	"'force_zero_mV', 'force_zero_samples', 'force_zero_sd_mV', 'frames_lost', "         \
+#define REWRITTEN                                                                                           \
+	"'camera_note', 'complete', 'cut_ends_ns', 'cuts', 'depth_max_mm', 'depth_rows', 'force_clipped', " \
+	"'force_lost', 'force_max_N', 'force_rows', "                                                       \
+	"'force_zero_mV', 'force_zero_samples', 'force_zero_sd_mV', 'frames_lost', "                        \
 	"'frames_rows', 'frames_unlooked', 'tracker_lost', 'tracker_rows', 'wall_rows'"
 #define KEYS(which) "SELECT key, value FROM meta WHERE key " which " ORDER BY key"
 

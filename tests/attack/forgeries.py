@@ -27,7 +27,7 @@ from read_blocks import COLUMNS, column, crc32c
 STREAMS = ("force", "tracker", "camera", "wall")
 START = {"boot", "host", "identity", "incise", "kernel", "started"}
 CALIBRATION = {"calibration_conf", "depth_mm_px", "force_mV_N", "tip_x_mm", "tip_y_mm", "tip_z_mm"}
-REWRITTEN = {"complete", "cut_ends_ns", "cuts", "depth_max_mm", "depth_rows", "force_clipped", "force_lost",
+REWRITTEN = {"camera_note", "complete", "cut_ends_ns", "cuts", "depth_max_mm", "depth_rows", "force_clipped", "force_lost",
              "force_max_N", "force_rows", "force_zero_mV",
              "force_zero_samples", "force_zero_sd_mV", "frames_lost", "frames_rows",
              "frames_unlooked", "tracker_lost", "tracker_rows", "wall_rows"}

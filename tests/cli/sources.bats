@@ -65,6 +65,8 @@ until_records() {
 		"settings of the tracker alter its poses: N1 5.25 0 0" ]
 	incise info a.rec --json >info.json
 	grep -q 'N1 5.25 0 0' info.json
+	incise verify a.rec >verified || true
+	! grep -q 'seal:' verified
 }
 
 # bats test_tags=check

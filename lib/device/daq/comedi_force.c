@@ -246,20 +246,36 @@ static int take_subdevice(struct card *card, int asked, struct incise_error *err
 	return 0;
 }
 
-static int no_range(const struct card *card, const comedi_range *ranges, int n,
-		    struct incise_error *err)
+/* "-5 to 5, 0 to 5": ranges in V of a channel. */
+static void list_ranges(comedi_t *device, unsigned int subdevice, unsigned int channel,
+			char *text, size_t size)
 {
-	char known[200] = "none";
+	int n = comedi_get_n_ranges(device, subdevice, channel);
 	size_t used = 0;
 
-	for (int i = 0; i < n && used < sizeof(known); i++)
-		used += (size_t)snprintf(known + used, sizeof(known) - used,
-					 "%s%.6g to %.6g", i ? ", " : "", ranges[i].min,
-					 ranges[i].max);
+	*text = '\0';
+	for (int i = 0; i < n && used < size; i++) {
+		const comedi_range *range =
+			comedi_get_range(device, subdevice, channel, (unsigned int)i);
+
+		if (range && range->unit == UNIT_volt)
+			used += (size_t)snprintf(text + used, size - used,
+						 "%s%.6g to %.6g", used ? ", " : "",
+						 range->min, range->max);
+	}
+}
+
+static int no_range(const struct card *card, struct incise_error *err)
+{
+	char known[200];
+
+	list_ranges(card->device, card->subdevice, (unsigned int)card->setup.channel,
+		    known, sizeof(known));
 	return incise_error_set(err, ERANGE,
 				"%s: %s has no range of %.6g V; set "
 				"force_setup.full_scale_V (ranges in V: %s)",
-				card->where, card->path, card->setup.full_scale_V, known);
+				card->where, card->path, card->setup.full_scale_V,
+				*known ? known : "none");
 }
 
 static int take_channel(struct card *card, struct incise_error *err)
@@ -293,7 +309,7 @@ static int take_channel(struct card *card, struct incise_error *err)
 	range = choose_range(ranges, n, card->setup.full_scale_V);
 	if (range < 0 || ranges[range].unit != UNIT_volt ||
 	    !(ranges[range].max > ranges[range].min))
-		return no_range(card, ranges, n, err);
+		return no_range(card, err);
 	card->range = (unsigned int)range;
 	/* Its highest code is the top of the range; a full scale is one code more. */
 	card->full_scale_V =
@@ -646,25 +662,6 @@ static void *force_open(const struct incise_backend_request *request,
 
 #define SECOND_NS 1000000000U
 
-static void add_ranges(struct incise_scan_device *device, comedi_t *card,
-		       unsigned int subdevice)
-{
-	int n = comedi_get_n_ranges(card, subdevice, 0);
-	char text[100] = "";
-	size_t used = 0;
-
-	for (int i = 0; i < n && used < sizeof(text); i++) {
-		const comedi_range *range =
-			comedi_get_range(card, subdevice, 0, (unsigned int)i);
-
-		if (range && range->unit == UNIT_volt)
-			used += (size_t)snprintf(text + used, sizeof(text) - used,
-						 "%s%.6g to %.6g", used ? ", " : "",
-						 range->min, range->max);
-	}
-	incise_scan_tell(device, "ranges_V", "%s", text);
-}
-
 static void describe_comedi_force(const char *path, comedi_t *card,
 				  unsigned int subdevice,
 				  struct incise_scan_device *device)
@@ -675,7 +672,7 @@ static void describe_comedi_force(const char *path, comedi_t *card,
 	unsigned int chanlist[1] = {CR_PACK(0, 0, AREF_GROUND)};
 	double period_ns;
 	comedi_cmd command;
-	char stable[80], known[40];
+	char stable[80], text[100];
 
 	*device = (struct incise_scan_device){0};
 	/* /dev/comediN depends on the order of probing; the link names slot or socket. */
@@ -691,9 +688,10 @@ static void describe_comedi_force(const char *path, comedi_t *card,
 	incise_scan_tell(device, "driver", "%.90s", comedi_get_driver_name(card));
 	incise_scan_tell(device, "channels", "%d", n);
 	incise_scan_tell(device, "bits", "%d", bits);
-	add_ranges(device, card, subdevice);
-	list_references(flags, known, sizeof(known));
-	incise_scan_tell(device, "references", "%s", known);
+	list_ranges(card, subdevice, 0, text, sizeof(text));
+	incise_scan_tell(device, "ranges_V", "%s", text);
+	list_references(flags, text, sizeof(text));
+	incise_scan_tell(device, "references", "%s", text);
 	/* The shortest accepted period; tests do not disturb a running command. */
 	period_ns = command_period(card, subdevice, chanlist, 1, &command);
 	device->usable = bits && period_ns > 0;

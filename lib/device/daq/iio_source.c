@@ -262,52 +262,37 @@ void iio_source_list_channels(const struct iio_device *device, char *text, size_
 	}
 }
 
-/* A name is a channel's id, the id of the first input of its difference, or as printed. */
-enum fit { FITS_ID, FITS_INPUT, FITS_PRINTED };
-
-static bool fits_channel(const struct iio_channel *channel, const char *name,
-			 enum fit how)
-{
-	const char *id = iio_channel_get_id(channel);
-	size_t length = strlen(name);
-	char printed[130];
-
-	if (how != FITS_PRINTED)
-		return !strncmp(id, name, length) &&
-		       id[length] == (how == FITS_INPUT ? '-' : '\0');
-	print_channel(channel, printed, sizeof(printed));
-	return !strcmp(printed, name);
-}
-
-/* Count the channels that fit; *found is the last one. */
-static int count_fits(const struct iio_device *device, const char *name, enum fit how,
-		      struct iio_channel **found)
+/*
+ * The channel whose id is @name, else the only difference of that input and another one, else the
+ * one that is printed so; NULL: none, or several.
+ */
+static struct iio_channel *find_named(const struct iio_device *device, const char *name)
 {
 	unsigned int n = iio_device_get_channels_count(device);
-	int count = 0;
+	size_t length = strlen(name);
+	struct iio_channel *found = NULL;
+	int best = 0, count = 0;
+	char printed[130];
 
 	for (unsigned int i = 0; i < n; i++) {
 		struct iio_channel *c = iio_device_get_channel(device, i);
+		const char *id = iio_channel_get_id(c);
+		int fit = !iio_source_can_sample(c) || strncmp(id, name, length) ? 0
+			  : id[length] ? id[length] == '-'
+				       : 2;
 
-		if (!iio_source_can_sample(c) || !fits_channel(c, name, how))
+		if (!fit || fit < best)
 			continue;
-		*found = c;
-		count++;
+		count = fit > best ? 1 : count + 1;
+		best = fit;
+		found = c;
 	}
-	return count;
-}
-
-/* NULL: no channel has this name, or several do. */
-static struct iio_channel *find_named(const struct iio_device *device, const char *name)
-{
-	struct iio_channel *found = NULL;
-	int n = count_fits(device, name, FITS_ID, &found);
-
-	if (!n)
-		n = count_fits(device, name, FITS_INPUT, &found);
-	if (n != 1)
-		n = count_fits(device, name, FITS_PRINTED, &found);
-	return n == 1 ? found : NULL;
+	for (unsigned int i = 0; i < n && count != 1; i++) {
+		found = iio_device_get_channel(device, i);
+		print_channel(found, printed, sizeof(printed));
+		count = iio_source_can_sample(found) && !strcmp(printed, name) ? 1 : 0;
+	}
+	return count == 1 ? found : NULL;
 }
 
 static struct iio_channel *find_voltage(const struct iio_device *device, int channel)
@@ -606,7 +591,7 @@ int iio_source_open(struct iio_source *s, const char *name, struct incise_error 
 	trigger = *s->trigger_used ? iio_context_find_device(s->context, s->trigger_used)
 				   : NULL;
 	rc = set_rate(s, trigger, err);
-	/* The scale of some converters follows the rate. */
+	/* The rate sets the scale of some converters. */
 	return rc ? rc : set_volts(s, err);
 }
 

@@ -248,6 +248,9 @@ static int write_counts(struct incise_recorder *rec)
 		{"frames_unlooked", stats.frames_unlooked},
 	};
 
+	if (*rec->camera_info.note)
+		bad |= incise_recorder_set_text(rec, "camera_note",
+						rec->camera_info.note);
 	for (size_t i = 0; i < sizeof(counts) / sizeof(*counts) - (camera ? 0 : 3); i++)
 		bad |= incise_recorder_set_integer(rec, counts[i].key, counts[i].value);
 	return bad;

@@ -257,6 +257,11 @@ static int write_meta(struct incise_recorder *rec, const char *calibration_path)
 	bad |= incise_recorder_set_real(rec, "tracker_hz", tracker->rate_hz);
 	bad |= incise_recorder_set_integer(rec, "tracker_latency_ns",
 					   tracker->latency_ns);
+	/* The notes of these do not change. */
+	if (*tracker->note)
+		bad |= incise_recorder_set_text(rec, "tracker_note", tracker->note);
+	if (*force->note)
+		bad |= incise_recorder_set_text(rec, "force_note", force->note);
 	bad |= incise_recorder_set_text(rec, "force_name", force->name);
 	bad |= incise_recorder_set_real(rec, "force_hz", force->rate_hz);
 	bad |= incise_recorder_set_integer(rec, "force_bits", force->bits);

@@ -887,16 +887,8 @@ static int write_stream(struct incise_recorder *rec, int i)
 	const struct incise_recorder_stream *stream = &rec->streams[i];
 	sqlite3_stmt *stmt = rec->stmt[SET_STREAM];
 	struct incise_stream now;
-	char key[32];
 
 	describe_recorder_rows(rec, i, &now);
-	snprintf(key, sizeof(key), "%s_note", now.name);
-	if (*now.note) {
-		int rc = incise_recorder_set_text(rec, key, now.note);
-
-		if (rc != SQLITE_OK)
-			return rc;
-	}
 	sqlite3_bind_text(stmt, 1, now.name, -1, SQLITE_TRANSIENT);
 	sqlite3_bind_text(stmt, 2, now.device, -1, SQLITE_TRANSIENT);
 	sqlite3_bind_int(stmt, 3, now.timestamped);

@@ -302,6 +302,41 @@ TEST(frames_are_rows, WITH_MODULES)
 	verified(true);
 }
 
+static void doubt(const struct incise_camera *camera, struct incise_camera_info *info)
+{
+	real->info(camera, info);
+	info->clock_ns = 4 * MS;
+	strcpy(info->note, "its clock drifts");
+}
+
+/* What a camera's clock drifted by is part of the uncertainty, and its note is kept. */
+TEST(camera_with_a_doubtful_clock, WITH_MODULES)
+{
+	struct incise_rig *rig = open_camera(SIM);
+	struct incise_calibration calibration;
+	struct incise_stream streams[INCISE_STREAMS_MAX];
+	struct incise_recording *recording;
+	struct incise_recorder *recorder;
+
+	incise_calibration_nominal(&calibration);
+	calibration.camera_delay_sd_ms = 3;
+	ops.info = doubt;
+	recorder = start_recorder_by("a.rec", rig,
+				     (struct incise_recorder_setup){
+					     .armed = false,
+					     .calibration = &calibration,
+				     });
+	assert_int_equal(poll_for(recorder, rig, 500 * MS, NULL), 0);
+	end(recorder, rig, streams);
+	recording = incise_recording_open("a.rec", &err);
+	succeeds(recording && incise_recording_streams(recording, streams, &err) == 3);
+	incise_recording_close(recording);
+	assert_true(fabs(streams[2].offset_sd_ms - 5) < 1e-6);
+	assert_string_equal(streams[2].note, "its clock drifts");
+	assert_string_equal(streams[0].note, "");
+	verified(true);
+}
+
 /* The other streams continue; all earlier frames are there. */
 TEST(camera_that_dies, WITH_MODULES)
 {
