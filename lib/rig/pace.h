@@ -65,7 +65,7 @@ struct incise_pace {
 		double fresh_ns;	/* the last one */
 		double ahead_ns;
 	} window;
-	/* Of the windows before: lateness of the last one, or 0 where it was fitted, at fitted_ns. */
+	/* Lateness of the last window, or 0 where it was fitted, at fitted_ns. */
 	double rise_ns, fitted_ns;
 	unsigned int fresh;   /* of the last fitted one */
 	double behind;	      /* samples from its lowest to its end */
