@@ -9,9 +9,10 @@
 #define FRESH_MIN 8
 #define FRESH_PER_PERIOD 32 /* more, per period that the lateness scatters */
 #define FRESH_MAX 100
-#define STEPS 6		/* samples that show a step */
-#define NOISE 8.0	/* of the least of as many, in scatter */
-#define SCATTER_MAX 3	/* periods, by which a loss of one is seen */
+#define STEPS 6	      /* samples that show a step */
+#define NOISE 8.0     /* of the least of as many, in scatter */
+#define SCATTER_MAX 3 /* periods, by which a loss of one is seen */
+#define WRAPS 4
 #define WRAPS_WINDOWS 8 /* so many times as many, if they show the beat of blocks */
 #define FITS_MAX 1000	/* windows that the line remembers */
 #define FITS_MOVED 4	/* if the period has changed */
@@ -143,7 +144,7 @@ static void relearn(struct incise_pace *pace, double rise_ns)
 static bool is_wrap(const struct incise_pace *pace, double rise_ns)
 {
 	return pace->unit == 1 && fabs(round(rise_ns / pace->period_ns)) == 1 &&
-	       pace->blocks == 3 && pace->window.wraps < 2 && !pace->longer &&
+	       pace->blocks == 3 && pace->window.wraps < WRAPS && !pace->longer &&
 	       usual_scatter(pace) < pace->period_ns;
 }
 
@@ -227,8 +228,9 @@ static bool is_full(const struct incise_pace *pace)
 		fmin(usual_scatter(pace), window_scatter(pace)) / pace->period_ns;
 	double enough = fmin(FRESH_MIN + FRESH_PER_PERIOD * scatter, FRESH_MAX);
 
-	/* Two rises of a beat show all of it. */
-	if (pace->blocks == 3 && pace->window.wraps == 1 && scatter < 1)
+	/* Two of each show all of a beat. */
+	if (pace->blocks == 3 && pace->window.wraps && pace->window.wraps < WRAPS &&
+	    !(pace->longer & 1) && scatter < 1)
 		enough *= WRAPS_WINDOWS;
 	return pace->window.shown + pace->window.fresh / 32 >= enough &&
 	       pace->window.samples * pace->period_ns >= WINDOW_NS;
