@@ -16,7 +16,7 @@
 #define WRAPS_WINDOWS 8 /* so many times as many, if they show the beat of blocks */
 #define FITS_MAX 1000	/* windows that the line remembers */
 #define FITS_MOVED 4	/* if the period has changed */
-#define OFF 0.06	/* clock, of which nothing is known yet */
+#define OFF 0.06	/* period, seen in the first windows */
 #define SET_NS 20e6	/* a clock is not set by less */
 #define SET_DRIFT 1e-4	/* of it against arrivals */
 #define MISSING_MAX 1e9 /* more than any source sends in a day */
@@ -42,11 +42,13 @@ static void start_line(struct incise_pace *pace, int64_t t_ns)
 	start_window(pace);
 }
 
-void incise_pace_init(struct incise_pace *pace, double rate_hz, unsigned int unit)
+void incise_pace_init(struct incise_pace *pace, double rate_hz, double off,
+		      unsigned int unit)
 {
 	*pace = (struct incise_pace){
 		.nominal_ns = 1e9 / rate_hz,
 		.period_ns = 1e9 / rate_hz,
+		.off = off,
 		.unit = unit,
 		.blocks = 1,
 		.ahead_ns = INFINITY,
@@ -106,8 +108,8 @@ static void follow(struct incise_pace *pace, double rise_ns)
 	if (pace->fresh)
 		period_ns +=
 			6 / of_all * rise_ns / fmax(n - behind + pace->behind, n / 2);
-	period_ns =
-		fmax(fmin(period_ns, pace->nominal_ns * 1.25), pace->nominal_ns * 0.8);
+	period_ns = fmax(fmin(period_ns, pace->nominal_ns * (1 + pace->off)),
+			 pace->nominal_ns * (1 - pace->off));
 	/* The first window of a line says where it is. */
 	move_line(pace, (pace->fresh ? 2 * (2 * j + 1) / of_all : 1) * rise_ns +
 				behind * (period_ns - pace->period_ns));
@@ -210,7 +212,7 @@ static uint64_t end_window(struct incise_pace *pace)
 	noise_ns = NOISE * usual_scatter(pace) / (pace->fresh + 1.0);
 	limit_ns = pace->unit * T / 2 + noise_ns;
 	if (pace->fits < 3)
-		limit_ns += OFF * T * (double)pace->n;
+		limit_ns += fmin(OFF, pace->off) * T * (double)pace->n;
 	if (!pace->fresh || fabs(rise_ns) <= limit_ns)
 		follow(pace, rise_ns);
 	else

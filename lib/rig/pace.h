@@ -23,7 +23,7 @@
  * - a change back: the line was too late, or the clock was set.
  *
  * Limits:
- * - The rate may be off by 5 %; if samples come in blocks or late by more than T, by 200 ppm.
+ * - The period may be off by 5 %; if a host looks at times of its own, by 0.2 %, and the caller says so.
  * - In the first three windows, and in the last three, a loss may be missing in the count; a source
  *   that loses some in each of the first is slow.
  * - A host that looks at a multiple of T, or nearly, now and then finds a sample one look later;
@@ -37,8 +37,11 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#define INCISE_PACE_OFF 0.2 /* of a source of which nothing is known */
+
 struct incise_pace {
 	double nominal_ns, period_ns; /* as given, and as known so far */
+	double off;		      /* largest share by which these differ */
 	unsigned int unit;	      /* losses are multiples of it */
 	bool started, broken;
 	bool unsure; /* losses may be missing in the count, see above */
@@ -78,9 +81,11 @@ struct incise_pace {
 };
 
 /*
- * @rate_hz > 0: nominal. @unit: 1; more if the sequence shows all losses but multiples of it.
+ * @rate_hz > 0: nominal; the period is within a share of @off. @unit: 1; more if the sequence shows
+ * all losses but multiples of it.
  */
-void incise_pace_init(struct incise_pace *pace, double rate_hz, unsigned int unit);
+void incise_pace_init(struct incise_pace *pace, double rate_hz, double off,
+		      unsigned int unit);
 
 /*
  * A sample of any time, which arrived at @arrival_ns: how many count as missing before it, of this

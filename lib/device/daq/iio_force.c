@@ -130,7 +130,7 @@ static int start_iio_force(struct iio_force *f, struct incise_error *err)
 		 name ? name : iio_device_get_id(s->device),
 		 iio_channel_get_id(s->voltage), *s->trigger_used ? ", " : "",
 		 s->trigger_used);
-	incise_pace_init(&f->pace, s->rate_hz, 1);
+	incise_pace_init(&f->pace, s->rate_hz, INCISE_PACE_OFF, 1);
 	rc = daq_feed_init(&f->feed);
 	if (rc)
 		return incise_error_set(err, -rc, "%s: no memory for samples: %s",

@@ -61,7 +61,7 @@ void igtl_poses_start(struct igtl_poses *poses, double rate_hz)
 
 	while (incise_ring_take(&poses->ring, &sample, 1) == 1)
 		;
-	incise_pace_init(&poses->pace, rate_hz, 1);
+	incise_pace_init(&poses->pace, rate_hz, INCISE_PACE_OFF, 1);
 	/* Others that begin to send later are not taken for it. */
 	if (!*poses->device && poses->n_names)
 		memcpy(poses->device, poses->names[0], sizeof(poses->device));

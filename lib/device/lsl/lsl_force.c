@@ -432,7 +432,7 @@ static int start_lsl_force(struct lsl_force *f, const char *where,
 {
 	int rc = daq_feed_init(&f->feed);
 
-	incise_pace_init(&f->pace, f->feed.info.rate_hz, 1);
+	incise_pace_init(&f->pace, f->feed.info.rate_hz, INCISE_PACE_OFF, 1);
 	if (!rc)
 		rc = daq_feed_start(&f->feed, run_lsl_force, f);
 	return rc ? incise_error_set(err, -rc,

@@ -9,6 +9,7 @@
 
 /* --- gaps --- */
 
+#define OFF 2e-3    /* of its clock, a crystal */
 #define EARLY_MAX 8 /* three in ten records, or so */
 #define EARLY 4
 
@@ -23,7 +24,7 @@ void polhemus_gaps_init(struct polhemus_gaps *gaps, const uint8_t *stations, int
 	};
 	memcpy(gaps->order, stations, (size_t)n);
 	if (hz > 0)
-		incise_pace_init(&gaps->pace, counts ? hz / n : hz,
+		incise_pace_init(&gaps->pace, counts ? hz / n : hz, OFF,
 				 counts ? 1 : (unsigned int)n);
 }
 
@@ -107,7 +108,7 @@ static bool is_too_early(struct polhemus_gaps *gaps, double late_ns)
 	if (gaps->early <= EARLY_MAX)
 		return true;
 	gaps->early = 0;
-	incise_pace_init(&gaps->pace, 1e9 / gaps->pace.nominal_ns, gaps->pace.unit);
+	incise_pace_init(&gaps->pace, 1e9 / gaps->pace.nominal_ns, OFF, gaps->pace.unit);
 	return false;
 }
 

@@ -25,7 +25,7 @@ static int channel_setup(void **state)
 	memset(channel, 0, sizeof(*channel));
 	channel->feed.info.bits = 20;
 	channel->feed.info.rate_hz = 10000;
-	incise_pace_init(&channel->pace, 10000, 1);
+	incise_pace_init(&channel->pace, 10000, INCISE_PACE_OFF, 1);
 	return daq_feed_init(&channel->feed);
 }
 

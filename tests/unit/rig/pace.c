@@ -53,7 +53,7 @@ TEST(counts_what_is_missing)
 		int found = 0;
 
 		srand(1);
-		incise_pace_init(&pace, s->rate_hz, 1);
+		incise_pace_init(&pace, s->rate_hz, INCISE_PACE_OFF, 1);
 		for (int i = 0; i < 20 * (int)s->rate_hz; i++) {
 			int64_t t_ns;
 
@@ -74,7 +74,7 @@ TEST(takes_any_time)
 	static const int64_t times[] = {0, INT64_MAX, INT64_MIN, -1, 1, INT64_MAX / 2, 0};
 	struct incise_pace pace;
 
-	incise_pace_init(&pace, 1000, 1);
+	incise_pace_init(&pace, 1000, INCISE_PACE_OFF, 1);
 	for (int i = 0; i < 7000; i++)
 		assert_true(incise_pace_add(&pace, times[i % 7], 0) <= 1000000000);
 	assert_true(isfinite(pace.period_ns));
@@ -86,7 +86,7 @@ TEST(broken_link)
 	struct incise_pace pace;
 	uint64_t found = 0;
 
-	incise_pace_init(&pace, 1000, 1);
+	incise_pace_init(&pace, 1000, INCISE_PACE_OFF, 1);
 	incise_pace_broken(&pace);
 	for (int i = 0; i < 3000; i++) {
 		if (i == 2000)
@@ -230,7 +230,8 @@ static int play(struct play *p, struct incise_pace *pace)
 	int64_t t_ns = 0, before_ns = 0, stuck_ns = 0, arrival_ns;
 	int found = 0, kept = 0, chunk = -1;
 
-	incise_pace_init(pace, 1e9 / (p->T_ns * (1 + p->ppm * 1e-6)), 1);
+	incise_pace_init(pace, 1e9 / (p->T_ns * (1 + p->ppm * 1e-6)),
+			 p->way == POLLED || p->way == TIMER ? 2e-3 : INCISE_PACE_OFF, 1);
 	for (int i = 0; i < SAMPLES; i++) {
 		if (p->lost[i])
 			continue;
@@ -307,7 +308,7 @@ TEST(blocks_are_spread)
 	for (int size = 1; size <= 64; size *= 2) {
 		struct incise_pace pace;
 
-		incise_pace_init(&pace, 1000, 1);
+		incise_pace_init(&pace, 1000, INCISE_PACE_OFF, 1);
 		for (int i = 0; i < 5000; i++) {
 			int64_t due_ns = START_NS + i * INT64_C(1000100);
 			int64_t last_ns = START_NS +
