@@ -15,7 +15,8 @@
 #define WRAPS 4
 #define WRAPS_WINDOWS 8 /* so many times as many, if they show the beat of blocks */
 #define FITS_MAX 1000	/* windows that the line remembers */
-#define FITS_SURE 5	/* which show the beat of blocks */
+#define BEAT 2.5	/* periods, that the beat of blocks may make */
+#define FITS_SURE 5	/* which show that beat */
 #define FITS_MOVED 4	/* if the period has changed */
 #define OFF 0.06	/* period, seen in the first windows */
 #define SET_NS 20e6	/* a clock is not set by less */
@@ -214,8 +215,9 @@ static uint64_t end_window(struct incise_pace *pace)
 	limit_ns = pace->unit * T / 2 + noise_ns;
 	if (pace->fits < 3)
 		limit_ns += fmin(OFF, pace->off) * T * (double)pace->n;
-	if (!pace->fresh || fabs(rise_ns) <= limit_ns ||
-	    (pace->blocks == 3 && pace->fits < FITS_SURE))
+	if (pace->blocks == 3 && pace->fits < FITS_SURE)
+		limit_ns = fmax(limit_ns, BEAT * T);
+	if (!pace->fresh || fabs(rise_ns) <= limit_ns)
 		follow(pace, rise_ns);
 	else
 		missing = judge_rise(pace, rise_ns, T / 4 + noise_ns);

@@ -409,14 +409,14 @@ TEST(verify_says_so, IN_FOLDER)
 		 false,
 		 0,
 		 0},
-		/* one of a host that looks each 25 ms, which is counted some windows later */
+		/* one of a host that looks each 19 ms, which is counted some windows later */
 		{{.hz = 120,
 		  .grid_ms = 19,
-		  .mutes = {{1996 * MS, 2004 * MS}},
-		  .seconds = 4},
+		  .mutes = {{4996 * MS, 5004 * MS}},
+		  .seconds = 8},
 		 false,
 		 30,
-		 120},
+		 240},
 		{{.hz = 240, .jitter_ms = 0.2, .seconds = 4}, false, 200, 300},
 		{{.hz = 120, .to_hz = 240, .jitter_ms = 0.2, .seconds = 4},
 		 false,
