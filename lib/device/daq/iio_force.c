@@ -5,119 +5,17 @@
  *   trigger ─▶ converter ─▶ kernel's buffer (half a second) ─▶ thread, every 5 ms ─▶ feed
  */
 #include <errno.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include "../../base/monotonic.h"
 #include "../../rig/backends.h"
 #include "../../rig/daq_feed.h"
+#include "../../rig/pace.h"
 #include "iio_source.h"
-
-/*
- * --- spacing ---
- *
- * Missing samples, found by the kernel's timestamps: IIO silently drops samples when its
- * buffer is full.
- *
- *   timestamps   |    |    |                   |    |       gap of 4 T: 3 lost
- *   timestamps   |    |    |        | |    |    |    |      late by 0.9 T: none
- *
- * A timestamp later than 1.5 T is held until the next one has come: a sample is not later
- * than its successor less T. The period T is the nominal one until the timestamps have
- * drifted from it by half a period; then it is the average so far.
- */
 
 /* Nanoseconds since boot; more than this (146 years) is impossible. */
 #define TIMESTAMP_MAX (INT64_MAX / 2)
-/* Periods in a gap; longer ones are counted as this. */
-#define GAP_MAX 1e12
-
-struct spacing {
-	struct daq_feed *feed;
-	int64_t period_ns; /* nominal */
-	bool started, holds;
-	int64_t first_ns, last_ns; /* timestamps, without lateness */
-	uint64_t n;		   /* periods between these two */
-	int64_t held_ns;	   /* the sample that is held */
-	int32_t held_code;
-};
-
-/* @rate_hz > 0 */
-static void spacing_init(struct spacing *spacing, struct daq_feed *feed, double rate_hz)
-{
-	*spacing = (struct spacing){
-		.feed = feed,
-		.period_ns = llround(1e9 / rate_hz),
-	};
-}
-
-static double period(const struct spacing *s)
-{
-	double nominal = (double)s->period_ns;
-	double span = (double)(s->last_ns - s->first_ns);
-
-	if (fabs(span - nominal * (double)s->n) < nominal / 2)
-		return nominal;
-	/* Wrong timestamps of a device must not become a period. */
-	return fmin(fmax(span / (double)s->n, nominal * 0.8), nominal * 1.25);
-}
-
-/* @true_ns: the timestamp without lateness. */
-static void pass(struct spacing *s, int64_t t_ns, int64_t true_ns, int32_t code)
-{
-	double steps = (double)(true_ns - s->last_ns) / period(s);
-	uint64_t lost = 0;
-
-	/* Exactly half a period counts for the shorter gap. */
-	if (steps > 1.5)
-		lost = (uint64_t)ceil(fmin(steps, GAP_MAX) - 0.5) - 1;
-	daq_feed_lose(s->feed, lost);
-	daq_feed_put(s->feed, t_ns, code);
-	s->n += lost + 1;
-	s->last_ns = true_ns;
-}
-
-/* Pass on the held sample: no other comes soon. */
-static void spacing_flush(struct spacing *s)
-{
-	if (s->holds)
-		pass(s, s->held_ns, s->held_ns, s->held_code);
-	s->holds = false;
-}
-
-/*
- * Pass a sample to the feed, with the number missing ahead of it; @t_ns may be anything.
- */
-static void spacing_put(struct spacing *s, int64_t t_ns, int32_t code)
-{
-	int64_t T;
-
-	/* An impossible timestamp is replaced by the expected one. */
-	if (t_ns < 0 || t_ns > TIMESTAMP_MAX)
-		t_ns = s->holds ? s->held_ns + s->period_ns : s->last_ns + s->period_ns;
-	if (!s->started) {
-		s->started = true;
-		s->first_ns = s->last_ns = t_ns;
-		daq_feed_put(s->feed, t_ns, code);
-		return;
-	}
-	T = (int64_t)period(s);
-	if (s->holds) {
-		int64_t true_ns = t_ns - T < s->held_ns ? t_ns - T : s->held_ns;
-
-		/* Timestamps may run backwards. */
-		pass(s, s->held_ns, true_ns > s->last_ns ? true_ns : s->last_ns,
-		     s->held_code);
-		s->holds = false;
-	}
-	if (t_ns - s->last_ns <= T + T / 2) {
-		pass(s, t_ns, t_ns, code);
-		return;
-	}
-	s->holds = true;
-	s->held_ns = t_ns;
-	s->held_code = code;
-}
 
 /* --- channel --- */
 
@@ -130,8 +28,23 @@ static void spacing_put(struct spacing *s, int64_t t_ns, int32_t code)
 struct iio_force {
 	struct daq_feed feed; /* first */
 	struct iio_source source;
-	struct spacing spacing;
+	struct incise_pace pace;
 };
+
+/*
+ * IIO drops samples when its buffer is full, without a word: their times show it. Samples of a
+ * converter's own FIFO have the time at which it was read, so that a block has the time of its
+ * last one.
+ */
+static void take_iio_force(struct iio_force *f, int64_t t_ns, int32_t code,
+			   int64_t now_ns)
+{
+	/* An impossible timestamp is replaced by the expected one. */
+	if (t_ns < 0 || t_ns > TIMESTAMP_MAX)
+		t_ns = f->pace.last_ns + (int64_t)f->pace.period_ns;
+	daq_feed_lose(&f->feed, incise_pace_add(&f->pace, t_ns, now_ns));
+	daq_feed_put(&f->feed, t_ns - incise_pace_spread_ns(&f->pace), code);
+}
 
 /* An unplugged device shows when reading, not when waiting. */
 static void *run_iio_force(void *argument)
@@ -139,27 +52,24 @@ static void *run_iio_force(void *argument)
 	struct iio_force *f = argument;
 	int64_t dead_ms =
 		(int64_t)((DEAD_NS + PERIODS_DEAD * 1e9 / f->source.rate_hz) / 1e6);
-	int64_t quiet_ms = 0;
+	int64_t quiet_ms = 0, now_ns;
 	int got = 0;
 
 	while (daq_feed_wait(&f->feed, f->source.fd, QUIET_MS) != DAQ_STOP) {
 		got = iio_source_read(&f->source);
+		now_ns = incise_monotonic_ns();
 		for (int i = 0; i < got; i++)
-			spacing_put(&f->spacing, iio_source_timestamp(&f->source, i),
-				    iio_source_code(&f->source, i));
+			take_iio_force(f, iio_source_timestamp(&f->source, i),
+				       iio_source_code(&f->source, i), now_ns);
 		quiet_ms = got > 0 ? 0 : quiet_ms + QUIET_MS;
 		if (got < 0 && got != -EAGAIN && got != -EINTR)
 			break;
-		/* No successor of the held sample comes within the next periods. */
-		if (quiet_ms > 2 * QUIET_MS)
-			spacing_flush(&f->spacing);
 		got = quiet_ms > dead_ms	       ? -ETIME
 		      : iio_source_changed(&f->source) ? -ESTALE
 						       : 0;
 		if (got)
 			break;
 	}
-	spacing_flush(&f->spacing);
 	daq_feed_end(&f->feed,
 		     got == -ENODEV ? -ENODEV
 		     : got < 0	    ? -EIO
@@ -225,7 +135,7 @@ static int start_iio_force(struct iio_force *f, struct incise_error *err)
 		 name ? name : iio_device_get_id(s->device),
 		 iio_channel_get_id(s->voltage), *s->trigger_used ? ", " : "",
 		 s->trigger_used);
-	spacing_init(&f->spacing, &f->feed, s->rate_hz);
+	incise_pace_init(&f->pace, s->rate_hz, INCISE_PACE_OFF, 1);
 	rc = daq_feed_init(&f->feed);
 	if (rc)
 		return incise_error_set(err, -rc, "%s: no memory for samples: %s",

@@ -61,7 +61,7 @@ void igtl_poses_start(struct igtl_poses *poses, double rate_hz)
 
 	while (incise_ring_take(&poses->ring, &sample, 1) == 1)
 		;
-	incise_pace_init(&poses->pace, rate_hz);
+	incise_pace_init(&poses->pace, rate_hz, INCISE_PACE_OFF, 1);
 	/* Others that begin to send later are not taken for it. */
 	if (!*poses->device && poses->n_names)
 		memcpy(poses->device, poses->names[0], sizeof(poses->device));
@@ -241,7 +241,7 @@ static void take_igtl_poses(struct igtl_poses *poses, const double (*matrix)[4],
 		poses->first_ns = sample.t_ns;
 	poses->last_ns = sample.t_ns;
 	if (poses->counts)
-		lose(poses, incise_pace_add(&poses->pace, sample.t_ns));
+		lose(poses, incise_pace_add(&poses->pace, sample.t_ns, t_ns));
 	sample.seq = poses->seq++;
 	sample.restarted = poses->restarted;
 	if (incise_ring_put(&poses->ring, &sample))
@@ -406,7 +406,7 @@ int igtl_poses_put(struct igtl_poses *poses, const uint8_t *bytes, size_t n, int
 			poses->damaged++;
 		} else if (found == -EBADMSG) {
 			/* A damaged message may have been a pose. */
-			incise_pace_skip(&poses->pace);
+			incise_pace_skip(&poses->pace, 1);
 			lose(poses, 1);
 		}
 	}

@@ -93,7 +93,7 @@ static void take_lsl_force(struct lsl_force *f, double value, double stamp_s,
 	if (!(t_s >= 0 && t_s > now_s - OLD_S && t_s < now_s + AHEAD_S)) {
 		f->timeless++;
 		f->off_s = t_s - now_s;
-		incise_pace_skip(&f->pace);
+		incise_pace_skip(&f->pace, 1);
 		daq_feed_lose(&f->feed, 1);
 		return;
 	}
@@ -110,7 +110,7 @@ static void take_lsl_force(struct lsl_force *f, double value, double stamp_s,
 	f->taken++;
 	f->last_ns = t_ns;
 	f->last_value = value;
-	missing = incise_pace_add(&f->pace, t_ns);
+	missing = incise_pace_add(&f->pace, t_ns, now_ns);
 	daq_feed_lose(&f->feed, missing);
 	if (isfinite(value))
 		daq_feed_put(&f->feed, t_ns, code_of(f, value));
@@ -432,7 +432,7 @@ static int start_lsl_force(struct lsl_force *f, const char *where,
 {
 	int rc = daq_feed_init(&f->feed);
 
-	incise_pace_init(&f->pace, f->feed.info.rate_hz);
+	incise_pace_init(&f->pace, f->feed.info.rate_hz, INCISE_PACE_OFF, 1);
 	if (!rc)
 		rc = daq_feed_start(&f->feed, run_lsl_force, f);
 	return rc ? incise_error_set(err, -rc,

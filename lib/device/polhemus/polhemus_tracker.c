@@ -77,18 +77,6 @@ static int64_t least_polhemus_tracker(int64_t a, int64_t b)
 	return a < b ? a : b;
 }
 
-/* Until the thread is to look whether it is closed, or whether others follow a record. */
-static int patience_ms(const struct polhemus_tracker *t)
-{
-	int64_t due_ns = polhemus_stream_due_ns(&t->stream), left_ns;
-
-	if (due_ns == INT64_MAX)
-		return POLL_MS;
-	left_ns = due_ns - incise_monotonic_ns();
-	return left_ns > 0 ? (int)least_polhemus_tracker(left_ns / 1000000 + 1, POLL_MS)
-			   : 1;
-}
-
 static void *run_polhemus_tracker(void *argument)
 {
 	struct polhemus_tracker *t = argument;
@@ -98,8 +86,8 @@ static void *run_polhemus_tracker(void *argument)
 
 	while (!atomic_load(&t->stop)) {
 		int64_t t_ns = 0;
-		ssize_t n = t->line->ops->read(t->line, bytes, sizeof(bytes), &t_ns,
-					       patience_ms(t));
+		ssize_t n =
+			t->line->ops->read(t->line, bytes, sizeof(bytes), &t_ns, POLL_MS);
 
 		if (n > 0) {
 			noise += (size_t)n;
@@ -107,8 +95,6 @@ static void *run_polhemus_tracker(void *argument)
 				silent_ms = 0;
 				noise = 0;
 			}
-		} else if (!n) {
-			polhemus_stream_quiet(&t->stream, incise_monotonic_ns());
 		}
 		/* While the computer stood still, the line was not read. */
 		now = now_ms();

@@ -11,115 +11,99 @@
 #include "converter.h"
 #include "found.h"
 
-/* --- spacing --- */
+/* --- losses and times --- */
 
 #define T 100000 /* ns */
 #define START 5000000000LL
+#define SAMPLES 40000
 
-static struct daq_feed *feed;
-static struct spacing spacing;
+static struct iio_force *channel;
 
-static int spacing_setup(void **state)
+static int channel_setup(void **state)
 {
-	feed = aligned_alloc(_Alignof(struct daq_feed), sizeof(*feed));
-	memset(feed, 0, sizeof(*feed));
-	feed->info.bits = 12;
-	feed->info.rate_hz = 10000;
-	spacing_init(&spacing, feed, 10000);
-	return daq_feed_init(feed);
+	channel = aligned_alloc(_Alignof(struct iio_force), sizeof(*channel));
+	memset(channel, 0, sizeof(*channel));
+	channel->feed.info.bits = 20;
+	channel->feed.info.rate_hz = 10000;
+	incise_pace_init(&channel->pace, 10000, INCISE_PACE_OFF, 1);
+	return daq_feed_init(&channel->feed);
 }
 
 static int teardown(void **state)
 {
-	daq_feed_free(feed);
-	free(feed);
+	daq_feed_free(&channel->feed);
+	free(channel);
 	return 0;
 }
 
 /* The code says which conversion it was. */
-static void put(int64_t n, int64_t late_ns)
+static void take(int n, int64_t t_ns)
 {
-	spacing_put(&spacing, START + n * T + late_ns, (int32_t)(n & 4095));
+	take_iio_force(channel, t_ns, n + 1, t_ns);
 }
 
-/* All that came have the number of their conversion. */
-static void numbers_are_right(void)
+struct source {
+	const char *name;
+	int fifo;		 /* samples in a block, at its end */
+	int64_t apart_ns;	 /* as they are read out of it */
+	double jitter_T, factor; /* of the clock */
+	int every, missing;	 /* of so many the last ones */
+	double wrong_T;		 /* times, behind the first blocks */
+};
+
+/* Each is a source of a public report: what it loses is exact, and its times are right. */
+TEST(losses_and_times)
 {
-	struct incise_force_sample sample;
+	static const struct source sources[] = {
+		{"exact", 1, 0, 0, 1, 0, 0, 1e-4},
+		{"late by less than a period", 1, 0, 0.9, 1, 0, 0, 1},
+		{"overruns", 1, 0, 0.1, 1, 10000, 5, 0.1},
+		{"one of each 8000", 1, 0, 0.1, 1, 8000, 1, 0.1},
+		{"a clock that is off by 1 %", 1, 0, 0, 1.01, 10000, 5000, 1e-4},
+		{"a FIFO of 8", 8, 0, 0, 1, 0, 0, 0.01},
+		{"a FIFO of 32", 32, 0, 0, 1, 0, 0, 0.01},
+		{"a FIFO that is read in 1 us each", 32, 1000, 0, 1, 0, 0, 0.4},
+		{"blocks of a FIFO are lost", 32, 0, 0, 1, 6400, 64, 0.01},
+	};
 
-	spacing_flush(&spacing);
-	while (daq_feed_read(&feed->force, &sample, 1) == 1)
-		assert_int_equal(sample.code, sample.seq & 4095);
-}
+	for (size_t k = 0; k < sizeof(sources) / sizeof(*sources); k++) {
+		const struct source *s = &sources[k];
+		struct incise_force_sample sample;
+		uint64_t missing = 0;
+		int n = 0;
 
-TEST(gaps, spacing_setup, teardown)
-{
-	static const int lengths[] = {1, 2, 3, 10, 1000, 19999, 1000000};
-	uint64_t lost = 0, overflows = 0;
-	struct incise_force_info info;
-	int64_t n = 0;
+		channel_setup(NULL);
+		srand(1);
+		for (int i = 0; i < SAMPLES; i++) {
+			int last = i / s->fifo * s->fifo + s->fifo - 1;
+			double due_T = last + s->jitter_T * rand() / RAND_MAX;
 
-	for (size_t i = 0; i < sizeof(lengths) / sizeof(*lengths); i++) {
-		for (int k = 0; k < 100; k++)
-			put(n++, 0);
-		n += lengths[i];
-		lost += (uint64_t)lengths[i];
-		overflows++;
-	}
-	put(n, 0);
-	put(n + 1, 0);
-	numbers_are_right();
-	daq_feed_info(&feed->force, &info);
-	assert_int_equal(daq_feed_lost(&feed->force), lost);
-	assert_int_equal(info.overflows, overflows);
-}
+			/* Those at the end nothing shows. */
+			if (s->every && i < SAMPLES - s->every &&
+			    i % s->every >= s->every - s->missing)
+				missing++;
+			else
+				take(i, START + llround(due_T * s->factor * T) -
+						(last - i) * s->apart_ns);
+		}
+		if (daq_feed_lost(&channel->feed.force) != missing)
+			fail_msg("%s: %d lost, not %d", s->name,
+				 (int)daq_feed_lost(&channel->feed.force), (int)missing);
+		while (daq_feed_read(&channel->feed.force, &sample, 1) == 1) {
+			double due_ns = (sample.code - 1) * s->factor * T;
+			double wrong_T = fabs((double)(sample.t_ns - START) - due_ns) / T;
 
-/* Up to just below a period late: distinguished from a loss by what follows. */
-TEST(lateness_is_no_gap, spacing_setup, teardown)
-{
-	for (int64_t n = 0; n < 20000; n++)
-		put(n, n % 7 == 3 ? (n % 100) * T / 101 : 0);
-	numbers_are_right();
-	assert_int_equal(daq_feed_lost(&feed->force), 0);
-}
-
-/* And a loss is one, when the sample behind it is late, too. */
-TEST(late_behind_a_gap, spacing_setup, teardown)
-{
-	int64_t n = 0;
-
-	for (int i = 0; i < 1000; i++) {
-		put(n++, 0);
-		put(n++, 0);
-		n += i % 5;
-		put(n++, (i % 97) * T / 100);
-	}
-	numbers_are_right();
-	assert_int_equal(daq_feed_lost(&feed->force), 2000);
-}
-
-/* An oscillator that is 1 % off: after it has been seen, long gaps are right, too. */
-TEST(clock_is_off, spacing_setup, teardown)
-{
-	static const double factors[] = {0.99, 1.01};
-
-	for (size_t i = 0; i < 2; i++) {
-		int64_t n = 0;
-
+			if (n++ >= 2 * s->fifo && wrong_T > s->wrong_T + 1e-9)
+				fail_msg("%s: sample %d is %.3f periods wrong", s->name,
+					 sample.code - 1, wrong_T);
+		}
+		assert_int_equal((uint64_t)n + missing, SAMPLES);
 		teardown(NULL);
-		spacing_setup(NULL);
-		for (; n < 30000; n++)
-			put(n, llround((double)(n * T) * (factors[i] - 1)));
-		n += 5000;
-		for (int k = 0; k < 100; k++, n++)
-			put(n, llround((double)(n * T) * (factors[i] - 1)));
-		numbers_are_right();
-		assert_int_equal(daq_feed_lost(&feed->force), 5000);
 	}
 }
 
 /* Nothing is computed beyond what numbers hold, and no sample is left out. */
-TEST(nonsense, spacing_setup, teardown)
+TEST(nonsense, channel_setup, teardown)
 {
 	static const int64_t timestamps[] = {
 		0, INT64_MAX, INT64_MIN, -1, 1, INT64_MAX / 2, 0, 5, 5, 3};
@@ -130,10 +114,9 @@ TEST(nonsense, spacing_setup, teardown)
 	for (int round = 0; round < 200; round++)
 		for (size_t i = 0; i < sizeof(timestamps) / sizeof(*timestamps);
 		     i++, total++)
-			spacing_put(&spacing, timestamps[(i * 7 + (size_t)round) % 10],
-				    1);
-	spacing_flush(&spacing);
-	while (daq_feed_read(&feed->force, &sample, 1) == 1) {
+			take_iio_force(channel, timestamps[(i * 7 + (size_t)round) % 10],
+				       1, 0);
+	while (daq_feed_read(&channel->feed.force, &sample, 1) == 1) {
 		assert_true(!n || sample.seq > last);
 		last = sample.seq;
 		n++;
