@@ -131,7 +131,7 @@ refused() {
 	done <<-END
 		line motor0-step: no chip labelled chip|:2: bench/motor0/step: no chip labelled chip
 		line estop of a:chip: it is not available: -EBUSY|:6: bench/estop: of a:chip: it is not available: -EBUSY
-		error -ENOENT: line motor0-limit-min: it is not available|: bench/motor0/limit_min: it is not available
+		error -ENOENT: line motor0-limit-min: it is not available|: bench/motor0/limit_min: it must be wired
 	END
 }
 
@@ -143,7 +143,7 @@ refused() {
 	[ "$(ls "$steppers")" = bench ]
 	rmdir "$steppers/bench"
 	run -2 --separate-stderr stepper_setup start none.conf
-	[ "$stderr" = "stepper-setup: none.conf: cannot be read" ]
+	[ "$stderr" = "stepper-setup: none.conf: cannot be read; name a file" ]
 	rmdir "$steppers"
 	run -1 --separate-stderr stepper_setup start stepper.conf
 	[ "$stderr" = "stepper-setup: incise_stepper: Module incise_stepper not found in directory /lib/modules/6; install incise-dkms, or run 'make module_install'" ]

@@ -60,7 +60,7 @@ check "a long name" refused 2 ":7: a_name_that_is_longer_than_31_letters: File n
 with "more/motor2/step=incise-sim:9"
 check "a gap in the numbers" refused 1 ": more: Invalid argument; motors are numbered from 0 without a gap"
 with ""
-check "a motor without dir" refused 1 ": more/motor0/dir: it is not available; $help"
+check "a motor without dir" refused 1 ": more/motor0/dir: it must be wired; $help"
 cp $file.whole $file
 mkdir $config/more
 check "a controller made by hand is left alone" sh -c "! udev/stepper-setup start $file && [ \"\$(ls $config)\" = more ]"

@@ -17,16 +17,22 @@ check "and a folder for state pages" [ "$(stat -c '%a %U %G' /run/incise)" = "27
 
 wire()
 {
-	mkdir -p $controller/motor0 || return
 	for line in step=0 dir=1 enable=2 limit_min=3 limit_max=4 home=5; do
-		echo "incise-sim:${line#*=}" >"$controller/motor0/${line%=*}" || return
-	done
-	echo incise-sim:7 >$controller/estop
+		echo "bench/motor0/${line%=*}=incise-sim:${line#*=}"
+	done >>/etc/incise/stepper.conf
+	echo bench/estop=incise-sim:7 >>/etc/incise/stepper.conf
 	echo "number=0 step=0 dir=1 enable=2 min=3 max=4 home=5 min_at=-100 max_at=1000000" \
 		"home_at=-300..0 position=200" >$sim/carriage
 }
-check "the modules load" modprobe -a incise_sim incise_stepper || exit 0
-check "a controller is wired" wire && check "and bound" bind || exit 0
+refuses_missing_chip() { ! systemctl start incise-stepper; }
+from_now
+check "the simulated chip loads" modprobe incise_sim || exit 0
+check "a controller is wired" wire || exit 0
+sed -i s/incise-sim:5/incise-sin:5/ /etc/incise/stepper.conf
+check "a chip that is missing is refused" refuses_missing_chip
+check "with the line of the file" told ": bench/motor0/home: no chip labelled incise-sin; " incise-stepper
+sed -i s/incise-sin:5/incise-sim:5/ /etc/incise/stepper.conf
+check "the service tries again, and sets it up" comes is ActiveState active incise-stepper || exit 0
 node=/dev/$(cat $controller/cdev)
 owned() { [ "$(stat -c '%a %U %G' "$node")" = "660 root incise" ]; }
 check "udev gave its node to the group" comes owned
