@@ -300,33 +300,19 @@ void bench_value(struct bench_run *run, const char *key, json_t *value)
 	set_bench(run->report, key, value);
 }
 
-static void update(json_t *object, const char *fmt, va_list args)
-{
-	json_error_t err;
-	json_t *members = json_vpack_ex(&err, 0, fmt, args);
-
-	if (!members)
-		cli_fail("%s: %s", fmt, err.text);
-	json_object_update(object, members);
-	json_decref(members);
-}
-
 void bench_values(struct bench_run *run, const char *fmt, ...)
 {
+	json_error_t err;
+	json_t *members;
 	va_list args;
 
 	va_start(args, fmt);
-	update(run->report, fmt, args);
+	members = json_vpack_ex(&err, 0, fmt, args);
 	va_end(args);
-}
-
-void bench_scalars(struct bench_run *run, const char *fmt, ...)
-{
-	va_list args;
-
-	va_start(args, fmt);
-	update(run->scalars, fmt, args);
-	va_end(args);
+	if (!members)
+		cli_fail("%s: %s", fmt, err.text);
+	json_object_update(run->report, members);
+	json_decref(members);
 }
 
 static json_t *row_json(const struct bench_table *table, const void *row)
@@ -574,13 +560,11 @@ static void draw_bench(const struct bench_run *run, const struct bench_plot *plo
 		write_data(run, more_file, &plot->more, more);
 	width = plot->width * values_of(plot, plot->across, rows);
 	script = plot_begin(run->folder, name, width > WIDTH_LEAST ? width : WIDTH_LEAST,
-			    plot->height * values_of(plot, plot->down, rows) +
-				    plot->margin);
+			    plot->height);
 	fprintf(script, "set datafile columnheaders separator tab\nsuffix = '%s'\n",
 		plot->suffix ? plot->suffix : "");
 	write_scalars(script, run->machine);
 	write_scalars(script, run->report);
-	write_scalars(script, run->scalars);
 	write_variables(script, "data", file, &plot->data, rows);
 	if (more)
 		write_variables(script, "more", more_file, &plot->more, more);
@@ -642,7 +626,6 @@ void bench_measure(struct bench_run *run)
 		reserve(run, p);
 	run->machine = machine_json();
 	run->metrics = json_array();
-	run->scalars = json_object();
 	snprintf(command, sizeof(command), "bench %s", run->bench->name);
 	run->report = json_with_schema(json_pack("{sO sb}", "machine", run->machine,
 						 "quick", run->quick),
