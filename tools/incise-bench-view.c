@@ -620,8 +620,7 @@ static const struct bench_table shown_table = {
 			COLUMN(shown_row, "rms_error_max", rms_max, "%8.3f", "largest"),
 			COLUMN(shown_row, "ssim", ssim, "%8.5f", "SSIM"),
 			COLUMN(shown_row, "frame_ms", ms, "%9.2f", "ms/frame"),
-			COLUMN(shown_row, "ms_per_s", ms_s, "%9.0f", "ms/s",
-			       .blank = true),
+			COLUMN(shown_row, "ms_per_s", ms_s, "%9.0f", "ms/s"),
 		},
 	.metrics =
 		{

@@ -150,7 +150,7 @@ int main(int argc, char **argv)
 	if (argc && !strcmp(argv[0], "compare"))
 		compare_bench(&run, argc, argv);
 	run.bench = bench = bench_of(argc, argv);
-	allow(bench, run.plot, bench->plots->script, "output");
+	allow(bench, run.plot, bench->plot.script, "output");
 	allow(bench, run.seconds > 0, bench->takes_duration, "duration");
 	allow(bench, run.load, bench->takes_load, "load");
 	run.operands = argv + 1;

@@ -43,7 +43,6 @@ struct bench_column {
 	double scale;	     /* of the number; 0: 1 */
 	double text_scale;   /* in the text on top of that; 0: 1 */
 	bool optional;	     /* 0 is none */
-	bool blank;	     /* no value is empty in the text; else "-" */
 	bool whole;	     /* in the JSON a whole number is an integer */
 	bool data; /* neither in the text nor in the JSON: for plots and metrics */
 };
@@ -113,9 +112,7 @@ struct bench_data {
  *   data, more         file names; blocks are separated by two empty lines, each has a name
  *                      for "index", its keys' values with spaces between them, and a line of
  *                      keys for "using"
- *   data_blocks        names of all blocks, as a list of words; more_blocks
  *   data_KEY           values of each key of the blocks, as a list of words; more_KEY
- *   suffix             the plot's
  *   NAME               each scalar of bench_values(); cpu and kernel
  */
 struct bench_plot {
@@ -137,7 +134,7 @@ struct bench {
 	int n_operands;		     /* at most */
 	bool takes_duration, takes_load, takes_seed;
 	void (*run)(struct bench_run *run);
-	struct bench_plot plots[2]; /* end with {0}; without plots -o is bad usage */
+	struct bench_plot plot; /* without its script -o is bad usage */
 };
 
 extern const struct bench bench_loop, bench_precision, bench_scenes, bench_stability,
@@ -158,7 +155,7 @@ struct bench_run {
 
 	json_t *machine, *report, *metrics;
 	char failed[600];
-	const char *folder, *name; /* of plots */
+	const char *folder, *name; /* of the plot */
 	struct bench_rows {
 		const struct bench_table *table;
 		const char *rows;
@@ -205,7 +202,7 @@ void bench_fail(struct bench_run *run, const char *fmt, ...) INCISE_PRINTF(2, 3)
 /* Points of a plot that are no rows of the JSON. */
 struct bench_point {
 	char block[48];
-	double x, y, z;
+	double x, y;
 };
 extern const struct bench_table bench_points;
 

@@ -18,7 +18,6 @@
 #include "../cli/json.h"
 #include "../cli/mapped_libraries.h"
 #include "../cli/scene_argument.h"
-#include "../cli/stopwatch.h"
 #include "bench.h"
 #include "sheet.h"
 #include "trajectory.h"

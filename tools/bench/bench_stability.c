@@ -505,11 +505,11 @@ const struct bench bench_stability = {
 	.summary = "stability limits, simulated and computed; scenes at rest; "
 		   "integrators",
 	.run = run,
-	.plots = {{.suffix = "map",
-		   .script = text_stability_map_gp,
-		   .width = 340,
-		   .height = 540,
-		   .across = "BT_m",
-		   .data = {&results[0].table, "BT_m,delay"},
-		   .more = {&bench_points, "block"}}},
+	.plot = {.suffix = "map",
+		 .script = text_stability_map_gp,
+		 .width = 340,
+		 .height = 540,
+		 .across = "BT_m",
+		 .data = {&results[0].table, "BT_m,delay"},
+		 .more = {&bench_points, "block"}},
 };
