@@ -11,7 +11,7 @@ $(extremes): $(patsubst %.c,$(O)/obj/%.o,$(wildcard tests/extremes/*.c $(addpref
 	$(call step,AR)
 	$(Q)$(AR) rcs $@ $^
 
-bench_names := capture coverage extremes guards integers pose prediction rates $(filter serve,$(commands)) settings timeline vision work
+bench_names := capture coverage extremes integers prediction $(filter serve,$(commands)) settings timeline vision
 bench_programs := $(bench_names:%=$(O)/tests/bench/%)
 bench_objects := $(bench_names:%=$(O)/obj/tests/bench/%.o) $(O)/obj/tests/bench/main.o
 $(bench_objects): test_cflags = $(shell $(PKG_CONFIG) --cflags jansson)

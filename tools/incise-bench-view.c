@@ -191,7 +191,6 @@ struct frame_row {
 	double hz;		  /* of whole frames one after the other */
 	double texels;		  /* sent to the graphics, of a frame */
 	double tick_us;		  /* of the first, per tick */
-	const char *failed;	  /* NULL: failures end the program */
 };
 
 /* Texture, width, height. */
@@ -341,11 +340,10 @@ static double frame_ms(const struct frame_rows *rows, int texture_px)
 	return NAN;
 }
 
-#define TIMES(part, member)                                                       \
-	COLUMN(frame_row, part "_ms.median", member.median, "%6.2f", "median"),   \
-		COLUMN(frame_row, part "_ms.p99", member.p99, "%6.2f", "99 %"),   \
-		COLUMN(frame_row, part "_ms.max", member.max, "%6.1f", "   max"), \
-		COLUMN(frame_row, part "_median_ms", member.median)
+#define TIMES(part, member)                                                     \
+	COLUMN(frame_row, part "_ms.median", member.median, "%6.2f", "median"), \
+		COLUMN(frame_row, part "_ms.p99", member.p99, "%6.2f", "99 %"), \
+		COLUMN(frame_row, part "_ms.max", member.max, "%6.1f", "   max")
 
 static const struct bench_table frame_table = {
 	.key = "frames",
@@ -363,13 +361,10 @@ static const struct bench_table frame_table = {
 			TIMES("texture", texture),
 			TIMES("draw", draw),
 			TIMES("whole", whole),
-			COLUMN(frame_row, "whole_p99_ms", whole.p99),
-			COLUMN(frame_row, "whole_max_ms", whole.max),
 			COLUMN(frame_row, "in_20_ms_percent", whole.in_time, "%7.1f", ""),
 			COLUMN(frame_row, "frames_hz", hz, "%6.1f", ""),
 			COLUMN(frame_row, "texels", texels, "%9.0f", ""),
 			COLUMN(frame_row, "effects_us_tick", tick_us),
-			COLUMN(frame_row, "failed", failed),
 		},
 	.metrics = {METRIC(TIME, frame_row, time, "ms",
 			   "frame {width}x{height}, texture {texture_px}")},
@@ -552,7 +547,6 @@ struct shown_row {
 	double rms, rms_max, ssim, unlike;
 	double ms;   /* of a frame */
 	double ms_s; /* of run time for a second that is shown; NaN at the moment itself */
-	const char *failed; /* NULL */
 };
 
 struct shown_rows {
@@ -626,9 +620,7 @@ static const struct bench_table shown_table = {
 			COLUMN(shown_row, "rms_error_max", rms_max, "%8.3f", "largest"),
 			COLUMN(shown_row, "ssim", ssim, "%8.5f", "SSIM"),
 			COLUMN(shown_row, "frame_ms", ms, "%9.2f", "ms/frame"),
-			COLUMN(shown_row, "ms_per_s", ms_s, "%9.0f", "ms/s",
-			       .blank = true),
-			COLUMN(shown_row, "failed", failed),
+			COLUMN(shown_row, "ms_per_s", ms_s, "%9.0f", "ms/s"),
 		},
 	.metrics =
 		{
@@ -697,15 +689,7 @@ static void run_view(struct bench_run *run)
 static const struct bench bench_view = {
 	.name = "view",
 	.run = run_view,
-	.plots = {{.script = text_view_gp,
-		   .width = 1000,
-		   .height = 560,
-		   .data = {&shown_table, "texture_px", "shown!=exact"}},
-		  {.suffix = "frames",
-		   .script = text_view_frames_gp,
-		   .width = 900,
-		   .height = 560,
-		   .data = {&frame_table, "width", "failed="}}}};
+};
 
 /* --- the command --- */
 
@@ -714,10 +698,6 @@ static const struct cli_option options[] = {
 	{0, "against", "OLD.json",
 	 "report significant changes since an older report of --json",
 	 CLI_INPUT(struct bench_run, against)},
-	{'o', "output", "NAME",
-	 "plot error over run time as NAME.png and NAME.svg, and run times of "
-	 "frames as NAME-frames",
-	 CLI_OUTPUTS(struct bench_run, plot)},
 	{0, "quick", NULL, "smoke test with fewer frames and runs",
 	 CLI_FLAG(struct bench_run, quick)},
 	{0},

@@ -9,21 +9,14 @@
 #include "cli/file_kind.h"
 #include "cli/json.h"
 
-static void parse_profile(void *profile, char *text)
-{
-	static const char *const names[] = {"needed", "full", NULL};
-
-	*(const char **)profile = names[cli_choice("profile", text, names)];
-}
-
 static const struct cli_option options[] = {
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct bench_run, json)},
 	{0, "against", "OLD.json",
 	 "report significant changes since an older report of --json",
 	 CLI_INPUT(struct bench_run, against)},
 	{'o', "output", "NAME",
-	 "plot error over run time as NAME.png and NAME.svg; precision: NAME-average, "
-	 "too; stability: NAME-map, -rest, -integrators; loop: NAME-wakeups",
+	 "precision: plot error over run time as NAME.png and NAME.svg; stability: plot "
+	 "the limits as NAME-map",
 	 CLI_OUTPUTS(struct bench_run, plot)},
 	{0, "duration", "TIME",
 	 "loop: of each measurement of wake-up latency (default: 5s)",
@@ -32,10 +25,6 @@ static const struct cli_option options[] = {
 	 "loop: wake-up latency under one load only: idle, cpu, memory, disk or "
 	 "view",
 	 CLI_TEXT(struct bench_run, load), .names = load_names},
-	{0, "profile", "STAGES",
-	 "scenes: run one test path of one scene for perf stat or callgrind, with "
-	 "its stages or with all: needed or full",
-	 CLI_PARSED(struct bench_run, profile, parse_profile)},
 	{0, "quick", NULL, "smoke test with fewer points and repeats",
 	 CLI_FLAG(struct bench_run, quick)},
 	{0},
@@ -99,8 +88,7 @@ static _Noreturn void compare_bench(const struct bench_run *run, int argc, char 
 
 	if (argc != 3)
 		cli_usage("expected 'compare' and two reports");
-	if (run->plot || run->load || run->profile || run->against || run->quick ||
-	    run->seconds > 0)
+	if (run->plot || run->load || run->against || run->quick || run->seconds > 0)
 		cli_usage("'compare' takes no option but --json");
 	for (int i = 0; i < 2; i++) {
 		file_expect(argv[1 + i], FILE_REPORT);
@@ -162,10 +150,9 @@ int main(int argc, char **argv)
 	if (argc && !strcmp(argv[0], "compare"))
 		compare_bench(&run, argc, argv);
 	run.bench = bench = bench_of(argc, argv);
-	allow(bench, run.plot, bench->plots->script, "plot");
+	allow(bench, run.plot, bench->plot.script, "output");
 	allow(bench, run.seconds > 0, bench->takes_duration, "duration");
 	allow(bench, run.load, bench->takes_load, "load");
-	allow(bench, run.profile, bench->takes_profile, "profile");
 	run.operands = argv + 1;
 	run.n_operands = argc - 1;
 	bench_measure(&run);

@@ -472,7 +472,7 @@ int main(int argc, char **argv)
 	}
 	plan = cli_require(incise_plan_new(scene, rig, &err), &err);
 	cli_progress("%s: timing %d s of ticks", job.scene.path, MEASURED_S);
-	tick_cost(scene, rig ? NULL : plan, rig ? &tracker : NULL, 0, MEASURED_S, &cost);
+	tick_cost(scene, rig ? NULL : plan, rig ? &tracker : NULL, MEASURED_S, &cost);
 	cli_progress_end();
 	size = scene_argument_size(job.scene.path, incise_plan_surface(plan));
 	if (job.json)

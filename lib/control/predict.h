@@ -18,7 +18,7 @@
  * step by d / period of the difference.
  *
  * mm, s; times of the host's clock in ns. All numbers given are finite, whatever the poses
- * are. tests/bench/pose measures how far off it is. Gains after Kalata, The tracking
+ * are. tests/bench/settings measures how far off it is. Gains after Kalata, The tracking
  * index, IEEE Trans. AES-20(2), 1984, in the closed form of Gray and Murray, IEEE Trans.
  * AES-29(3), 1993.
  */

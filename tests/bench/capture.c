@@ -32,7 +32,6 @@
 
 #define SECONDS 7
 #define QUICK_SECONDS 0.8
-#define PARTS 12 /* of a run, for the interval of its processor time */
 #define CAMERA_HZ 60
 #define POLL_NS 10000000LL /* as incise capture */
 #define BATCH 256
@@ -203,10 +202,7 @@ struct row {
 	struct incise_rig *rig;
 	struct incise_recorder *recorder; /* NULL: samples are read and dropped */
 	double cpu_percent, net_percent;
-	double part_percent[PARTS];
-	int parts;
-	struct harness_spread cpu, memory; /* with their intervals */
-	double late_ms;			   /* the latest wake */
+	double late_ms; /* the latest wake */
 	double held_up; /* share of the time that wakes were late, by a period or more */
 	double rss_MB[2];   /* memory at a quarter of the time, and at its end */
 	double verify_MB_s; /* of its recording; NAN: it made none */
@@ -283,28 +279,16 @@ static double memory_MB(void)
 	return (double)pages * (double)sysconf(_SC_PAGESIZE) / 1e6;
 }
 
-/* Processor time of each part of the run. */
-static void end_part(struct row *row, int64_t now, int64_t *part_begin, double *part_cpu)
-{
-	double cpu = stopwatch_of(CLOCK_PROCESS_CPUTIME_ID);
-
-	if (row->parts < PARTS && now > *part_begin)
-		row->part_percent[row->parts++] =
-			100 * (cpu - *part_cpu) / (double)(now - *part_begin);
-	*part_begin = now;
-	*part_cpu = cpu;
-}
-
 /* Opening and closing are not measured: they happen once. */
 static int capture(struct row *row, double seconds, struct incise_error *err)
 {
 	struct incise_clock *clock = incise_rig_clock(row->rig);
-	int64_t length_ns = (int64_t)(seconds * INCISE_NS_PER_S), start, now, next, part;
-	double cpu, part_cpu, held_up_ns = 0;
+	int64_t length_ns = (int64_t)(seconds * INCISE_NS_PER_S), start, now, next;
+	double cpu, held_up_ns = 0;
 	int rc = 0;
 
-	start = now = next = part = incise_clock_now(clock);
-	cpu = part_cpu = stopwatch_of(CLOCK_PROCESS_CPUTIME_ID);
+	start = now = next = incise_clock_now(clock);
+	cpu = stopwatch_of(CLOCK_PROCESS_CPUTIME_ID);
 	while (!rc && !cli_stop && now - start < length_ns) {
 		next = now > next + POLL_NS ? now : next + POLL_NS;
 		incise_clock_wait_until(clock, next);
@@ -313,8 +297,6 @@ static int capture(struct row *row, double seconds, struct incise_error *err)
 		if (now - next >= POLL_NS)
 			held_up_ns += now - next;
 		rc = poll_streams(row, err);
-		if (now - part >= length_ns / PARTS)
-			end_part(row, now, &part, &part_cpu);
 		if (!row->rss_MB[0] && now - start >= length_ns / 4)
 			row->rss_MB[0] = memory_MB();
 	}
@@ -494,24 +476,14 @@ static const struct bench_table rows_table = {
 		    COLUMN(row, "end_MB", rss_MB[1]),
 		    COLUMN(row, "verify_MB_s", verify_MB_s),
 		    COLUMN(row, "failed", failed)},
-	.metrics = {METRIC(MEASURED, row, cpu, "%", "{name} processor"),
-		    METRIC(MEASURED, row, memory, "MB", "{name} memory")},
 };
 
-static void set_rows(struct row *rows)
+/* Of the capture alone: without the cost of the virtual rig. */
+static void set_net(struct row *rows)
 {
-	for (int i = 0; i < N(parts); i++) {
-		struct row *row = &rows[i];
-
-		/* Of the capture alone: without the cost of the virtual rig. */
-		row->net_percent = row->cpu_percent - rows[parts[i].base].cpu_percent;
-		harness_spread(row->part_percent, row->parts, &row->cpu);
-		row->memory = (struct harness_spread){
-			.median = row->rss_MB[1],
-			.low = fmin(row->rss_MB[0], row->rss_MB[1]),
-			.high = fmax(row->rss_MB[0], row->rss_MB[1]),
-		};
-	}
+	for (int i = 0; i < N(parts); i++)
+		rows[i].net_percent =
+			rows[i].cpu_percent - rows[parts[i].base].cpu_percent;
 }
 
 static void report(struct bench_run *run, const struct row *rows, double seconds)
@@ -538,7 +510,7 @@ static void run(struct bench_run *run)
 	cli_catch_signals();
 	code_all();
 	run_all(rows, seconds);
-	set_rows(rows);
+	set_net(rows);
 	report(run, rows, seconds);
 	for (int i = 0; i < FRAMES; i++)
 		free(camera.frame[i].bytes);

@@ -4,29 +4,20 @@
  *
  *   heights    a mesh, and grids of its heights by the size of a cell, compared with the sphere that both
  *              stand for
- *   trackers   the predictor's error, and the stiffest wall, by rate, latency and damping
- *   squares    least squares of training by QR and by an exact Gram matrix, on rules that overlap more
- *              and more
- *   leans      the search for swings that do not end, by the ways to lean that it tries: what a closed
- *              loop of its own finds, with more leans, is the truth
+ *   trackers   the predictor's error, by rate and latency
  */
 #include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <incise/plan.h>
 #include "../../lib/base/random.h"
 #include "../../lib/base/vector.h"
-#include "../../lib/learn/gram.h"
+#include "../../lib/control/predict.h"
 #include "../../lib/scene/heights.h"
-#include "../../lib/scene/rest.h"
 #include "../../lib/surface/surface.h"
-#include "../../tools/bench/noise.h"
-#include "../../tools/bench/stability.h"
 #include "../../tools/cli/file.h"
 #include "../../tools/cli/stopwatch.h"
-#include "../wall_limit.h"
 #include "program.h"
 
+#define PERIOD_S 1e-3
 #define REPEATS(run) ((run)->quick ? 5 : 31)
 
 /* --- heights of a mesh ---------------------------------------------------------------------- */
@@ -225,15 +216,10 @@ static void measure_heights(struct bench_run *run)
 #define TRACKED_TICKS 4000
 #define BEGIN_TICKS 500
 #define TRACKED_MM 0.02 /* of noise, sd */
-#define DAMPINGS 4
-
-/* N s/mm of the device, and of the wall. */
-static const double dampings[DAMPINGS][2] = {
-	{0.005, 0}, {0.02, 0}, {0.1, 0}, {0.02, 0.005}};
 
 /* The first of them for a quick run. */
 static struct tracker_row {
-	double rate_hz, latency_ms, rms_mm, most_mm, held_mm, limit[DAMPINGS];
+	double rate_hz, latency_ms, rms_mm, most_mm, held_mm;
 	struct harness_time time; /* of a tick, with its share of the poses */
 } trackers[] = {{120, 4.2}, {1000, 4.2}, {1000, 20}, {1000, 1},
 		{240, 4.2}, {120, 20},	 {60, 4.2}};
@@ -247,18 +233,11 @@ static const struct bench_table tracker_table = {
 		    COLUMN(tracker_row, "held_rms_mm", held_mm, "%9.2g", "held, mm"),
 		    COLUMN(tracker_row, "rms_error_mm", rms_mm, "%8.2g", "rms, mm"),
 		    COLUMN(tracker_row, "max_error_mm", most_mm, "%8.2g", "most, mm"),
-		    COLUMN(tracker_row, "limit_5_N_mm", limit[0], "%8.3g", "5"),
-		    COLUMN(tracker_row, "limit_20_N_mm", limit[1], "%8.3g", "20"),
-		    COLUMN(tracker_row, "limit_100_N_mm", limit[2], "%8.3g", "100"),
-		    COLUMN(tracker_row, "limit_damped_N_mm", limit[3], "%8.3g", "20+5"),
 		    QUANTILES(tracker_row, "ns", time, "%7.1f")},
 	.metrics = {METRIC(TIME, tracker_row, time, "ns",
 			   "predictor at {rate_hz} Hz, {latency_ms} ms"),
 		    METRIC(EXACT, tracker_row, rms_mm, "mm",
-			   "error of the predictor at {rate_hz} Hz, {latency_ms} ms"),
-		    METRIC(EXACT, tracker_row, limit[1], "N/mm",
-			   "stiffest wall at {rate_hz} Hz, {latency_ms} ms",
-			   .more_is_better = true)},
+			   "error of the predictor at {rate_hz} Hz, {latency_ms} ms")},
 };
 
 /* A stroke of 40 mm with a tremor. */
@@ -268,7 +247,7 @@ static double way_mm(double t_s)
 }
 
 /* Poses come as they are due; @miss: of each tick, with prediction and with none. */
-static struct incise_predict track(const struct tracker_row *row, double (*miss)[2])
+static void track(const struct tracker_row *row, double (*miss)[2])
 {
 	const struct incise_tracker_info info = {
 		.rate_hz = row->rate_hz, .latency_ns = llround(row->latency_ms * 1e6)};
@@ -297,7 +276,6 @@ static struct incise_predict track(const struct tracker_row *row, double (*miss)
 			miss[k][1] = sample.position_mm[0] - truth_mm;
 		}
 	}
-	return predict;
 }
 
 static void run_track(void *row)
@@ -308,9 +286,9 @@ static void run_track(void *row)
 static void measure_tracker(struct tracker_row *row)
 {
 	static double miss[TRACKED_TICKS][2];
-	const struct incise_predict predict = track(row, miss);
 	double square = 0, held = 0;
 
+	track(row, miss);
 	for (int k = BEGIN_TICKS; k < TRACKED_TICKS; k++) {
 		square += miss[k][0] * miss[k][0];
 		held += miss[k][1] * miss[k][1];
@@ -318,14 +296,6 @@ static void measure_tracker(struct tracker_row *row)
 	}
 	row->rms_mm = sqrt(square / (TRACKED_TICKS - BEGIN_TICKS));
 	row->held_mm = sqrt(held / (TRACKED_TICKS - BEGIN_TICKS));
-	for (int i = 0; i < DAMPINGS; i++) {
-		const struct incise_haptic_device device = {.mass_kg = DEVICE_KG,
-							    .damping_N_s_mm =
-								    dampings[i][0],
-							    .period_s = PERIOD_S};
-
-		row->limit[i] = wall_limit(&device, &predict, dampings[i][1], 0);
-	}
 }
 
 static void measure_trackers(struct bench_run *run)
@@ -337,325 +307,8 @@ static void measure_trackers(struct bench_run *run)
 	bench_times(&tracker_table, trackers, n, run_track, TRACKED_TICKS, REPEATS(run));
 	bench_text(
 		run,
-		"pose of now by the tracker: error of the last pose and of the predictor; "
-		"stiffest wall, N/mm, on %g kg with 5, 20 and 100 mN s/mm, and with 20 and 5 of "
-		"the wall\n",
-		DEVICE_KG);
+		"pose of now by the tracker: error of the last pose and of the predictor\n");
 	bench_table(run, &tracker_table, trackers, n);
-	bench_text(run, "\n");
-}
-
-/* --- least squares ------------------------------------------------------------------------ */
-
-#define MFS 5
-#define UNKNOWNS (2 * MFS)
-#define PAIRS 200
-
-/* Of membership functions, of the range. */
-static const double widths[] = {0.125, 0.25, 0.5, 1, 2};
-
-struct square_row {
-	const char *name;
-	double width, condition, unknowns, output; /* errors: relative, of the force */
-	struct harness_time time;
-	char failed[40];
-	bool by_gram;
-	double a[PAIRS][UNKNOWNS], t[PAIRS];
-};
-
-static const struct bench_table square_table = {
-	.key = "squares",
-	.row_bytes = sizeof(struct square_row),
-	.failed_after = 3,
-	.columns = {COLUMN(square_row, "name", name, "%12s", "method"),
-		    COLUMN(square_row, "width", width, "%6g", "width"),
-		    COLUMN(square_row, "condition", condition, "%10.2g", "condition"),
-		    COLUMN(square_row, "unknowns_error", unknowns, "%10.2g", "unknowns"),
-		    COLUMN(square_row, "max_error_N", output, "%10.2g", "force, N"),
-		    QUANTILES(square_row, "us", time, "%7.1f", 1e-3),
-		    COLUMN(square_row, "failed", failed)},
-	.metrics = {METRIC(TIME, square_row, time, "us",
-			   "least squares by {name}, width {width}")},
-};
-
-/* Strengths of Gaussians over 0 … 1, each times the input and times 1; the exact force. */
-static double fill(double width, double at, double a[UNKNOWNS])
-{
-	double sum = 0;
-	long double t = 0;
-
-	for (int j = 1; j < UNKNOWNS; j += 2) {
-		a[j] = exp(-0.5 * pow((at - (j / 2) / (MFS - 1.0)) / width, 2));
-		sum += a[j];
-	}
-	for (int j = 0; j < UNKNOWNS; j++) {
-		a[j] = j % 2 ? a[j] / sum : a[j + 1] / sum * at;
-		t += (long double)a[j] * (1 + j) / UNKNOWNS;
-	}
-	return (double)t;
-}
-
-static int solve(const struct square_row *row, double *x, double *condition)
-{
-	struct incise_lsq *lsq = incise_lsq_new(UNKNOWNS, NULL);
-	struct incise_gram *gram = incise_gram_new(UNKNOWNS + 2);
-	bool by_gram = row->by_gram && !condition;
-	int rc = 0;
-
-	for (int i = 0; i < PAIRS; i++) {
-		double *v = by_gram ? incise_gram_row(gram) : incise_lsq_row(lsq);
-
-		memcpy(v, row->a[i], sizeof(row->a[i]));
-		if (by_gram) {
-			v[UNKNOWNS] = 1;
-			v[UNKNOWNS + 1] = row->t[i];
-			rc |= incise_gram_add(gram);
-		} else {
-			incise_lsq_add(lsq, row->t[i]);
-		}
-	}
-	if (by_gram)
-		rc |= incise_gram_factor(gram, 0, 1, lsq);
-	rc |= condition ? incise_lsq_condition(lsq, condition)
-			: incise_lsq_solve(lsq, NULL, x);
-	incise_gram_free(gram);
-	incise_lsq_free(lsq);
-	return rc;
-}
-
-static void run_squares(void *row)
-{
-	double x[UNKNOWNS];
-
-	solve(row, x, NULL);
-}
-
-static void measure_square(struct square_row *row)
-{
-	double x[UNKNOWNS], a[UNKNOWNS], off = 0, all = 0;
-
-	for (int i = 0; i < PAIRS; i++)
-		row->t[i] = fill(row->width, (i + 0.5) / PAIRS, row->a[i]);
-	solve(row, x, &row->condition);
-	row->unknowns = row->output = NAN;
-	if (solve(row, x, NULL)) {
-		strcpy(row->failed, "singular to its roundings");
-		return;
-	}
-	for (int j = 0; j < UNKNOWNS; j++) {
-		off += pow(x[j] - (1.0 + j) / UNKNOWNS, 2);
-		all += pow((1.0 + j) / UNKNOWNS, 2);
-	}
-	row->unknowns = sqrt(off / all);
-	row->output = 0;
-	for (int i = 0; i <= 1000; i++) {
-		double miss = -fill(row->width, i * 1e-3, a);
-
-		for (int j = 0; j < UNKNOWNS; j++)
-			miss += a[j] * x[j];
-		row->output = fmax(row->output, fabs(miss));
-	}
-}
-
-static void measure_squares(struct bench_run *run)
-{
-	static struct square_row rows[2 * N(widths)];
-
-	for (int i = 0; i < N(rows); i++) {
-		rows[i].by_gram = i % 2;
-		rows[i].name = i % 2 ? "Gram, exact" : "QR";
-		rows[i].width = widths[i / 2];
-		measure_square(&rows[i]);
-	}
-	bench_times(&square_table, rows, N(rows), run_squares, 1, REPEATS(run));
-	bench_text(
-		run,
-		"least squares of training, %d pairs and %d rules: membership functions of a "
-		"width, of the range; error of the unknowns, relative, and of the force\n",
-		PAIRS, MFS);
-	bench_table(run, &square_table, rows, N(rows));
-	bench_text(run, "\n");
-}
-
-/* --- leans -------------------------------------------------------------------------------- */
-
-#define WAYS 64
-#define SCENES(run) ((run)->quick ? 3 : 60)
-#define SCENES_MAX 60
-#define SIZES(run) ((run)->quick ? 3 : 8) /* of the truth's leans, in each of its ways */
-#define LITTLE 1e-3			  /* a gain that each device bears */
-#define DAMPED_N_s_mm 1
-
-/* A scene, and each way: of how many leans, whether it is guided, swings, and its time. */
-struct searched {
-	bool swings; /* in truth */
-	struct {
-		bool guided, swings;
-		int runs;
-		double ns;
-	} way[WAYS];
-};
-
-/* All scenes, judged by a part of the ways. */
-static struct lean_row {
-	const char *name;
-	int first;
-	bool guided, free;
-	double ways, runs; /* of a scene */
-	int scenes, swing, missed, refused;
-	struct harness_time time; /* of a search to its end */
-} leans[] = {
-	{"first way", 1, true, true}, {"first 2", 2, true, true},
-	{"first 4", 4, true, true},   {"first 8", 8, true, true},
-	{"first 16", 16, true, true}, {"guided", WAYS, true, false},
-	{"free", WAYS, false, true},  {"all", WAYS, true, true},
-};
-
-static const struct bench_table lean_table = {
-	.key = "leans",
-	.row_bytes = sizeof(struct lean_row),
-	.columns = {COLUMN(lean_row, "name", name, "%12s", "ways"),
-		    COLUMN(lean_row, "ways", ways, "%7.1f", "ways"),
-		    COLUMN(lean_row, "leans", runs, "%7.1f", "leans"),
-		    COLUMN(lean_row, "scenes", scenes, "%7.0f", "scenes"),
-		    COLUMN(lean_row, "swing", swing, "%7.0f", "swing"),
-		    COLUMN(lean_row, "missed", missed, "%7.0f", "missed"),
-		    COLUMN(lean_row, "refused", refused, "%8.0f", "too much"),
-		    QUANTILES(lean_row, "ms", time, "%8.1f", 1e-6)},
-};
-
-/* A size between two, as many of each. */
-static double sized(uint64_t *seed, double low, double high)
-{
-	return low * pow(high / low, lcg_uniform(seed));
-}
-
-static struct lean_case draw_case(uint64_t *seed)
-{
-	return (struct lean_case){
-		.shape = (int)incise_random_draw(seed, LEAN_SHAPES),
-		.force = (int)incise_random_draw(seed, LEAN_FORCES),
-		.loop = {.mass_kg = sized(seed, 0.03, 0.2),
-			 .damping_N_s_mm = sized(seed, 0.005, 0.05),
-			 .tracker_hz = sized(seed, 60, 1000),
-			 .latency_s = sized(seed, 1e-3, 20e-3),
-			 .late_ticks = (int)incise_random_draw(seed, 6)},
-	};
-}
-
-static struct incise_plan *plan_of(const struct lean_case *is, double gain,
-				   double damping_N_s_mm, struct incise_scene **scene)
-{
-	struct incise_error err = {0};
-
-	return cli_require(lean_plan(is, gain, damping_N_s_mm, scene, &err), &err);
-}
-
-/* A gain below that with which a flat wall swings: what swings then is the search's to find. */
-static double near_gain(const struct lean_case *is, uint64_t *seed)
-{
-	const struct incise_tracker_info tracker = closed_loop_tracker(&is->loop);
-	double gain = sized(seed, 0.5, 1), most;
-	struct incise_plan_stability s;
-	struct incise_predict predict;
-	struct incise_scene *scene;
-	struct incise_plan *plan = plan_of(is, LITTLE, is->loop.damping_N_s_mm, &scene);
-
-	incise_plan_stability(plan, &s);
-	incise_plan_free(plan);
-	incise_scene_free(scene);
-	incise_predict_init(&predict, &tracker, 0);
-	most = wall_limit(&s.device, &predict, 0, is->loop.late_ticks) / s.stiffness_N_mm;
-	while (!wall_rests(&s.device, &predict, most * s.stiffness_N_mm,
-			   most * s.damping_N_s_mm, is->loop.late_ticks))
-		most *= 0.9;
-	return gain * LITTLE * most;
-}
-
-/* Run each way alone. The time of none, for the noise of one that rests, is not the way's. */
-static bool search_scene(const struct lean_case *is, double gain, int sizes,
-			 struct searched *to)
-{
-	struct incise_tracker_info tracker = closed_loop_tracker(&is->loop);
-	struct incise_rest_trial trial = {gain, is->loop.damping_N_s_mm, WAYS};
-	struct incise_scene *scene;
-	struct incise_plan *plan = plan_of(is, gain, DAMPED_N_s_mm, &scene);
-	struct incise_rest rest;
-	struct lean_end end;
-	double none_ns = 0;
-
-	for (; trial.way >= 0; trial.way--) {
-		double begin = stopwatch_ns(), ns;
-
-		if (incise_plan_rest(plan, &tracker, &trial, &rest))
-			cli_fail("no memory");
-		ns = stopwatch_ns() - begin - rest.rests * none_ns;
-		if (trial.way == WAYS)
-			none_ns = ns;
-		else
-			to->way[trial.way] = (typeof(*to->way)){
-				rest.worst.guided, !rest.rests, rest.runs, ns};
-	}
-	lean_all(plan, is, sizes, true, &end);
-	to->swings = end.swing_mm > CLOSED_LOOP_SWING_MM;
-	incise_plan_free(plan);
-	incise_scene_free(scene);
-	return !isnan(end.swing_mm);
-}
-
-static void sum_up(struct lean_row *row, const struct searched *all, int n)
-{
-	double ns[SCENES_MAX] = {0};
-
-	row->scenes = n;
-	for (int s = 0; s < n; s++) {
-		bool swings = false;
-		int ways = 0;
-
-		for (int i = 0; i < WAYS && ways < row->first; i++) {
-			const typeof(*all->way) *way = &all[s].way[i];
-
-			if (!way->runs || !(way->guided ? row->guided : row->free))
-				continue;
-			ways++;
-			swings |= way->swings;
-			row->runs += (double)way->runs / n;
-			ns[s] += way->ns;
-		}
-		row->ways += (double)ways / n;
-		row->swing += all[s].swings;
-		row->missed += all[s].swings && !swings;
-		row->refused += !all[s].swings && swings;
-	}
-	harness_spread(ns, n, &row->time.ns);
-}
-
-static void measure_leans(struct bench_run *run)
-{
-	static struct searched all[SCENES_MAX];
-	int n = 0, left = 0;
-	uint64_t seed = 1;
-
-	lean_files();
-	while (n < SCENES(run) && !cli_stop) {
-		struct lean_case is = draw_case(&seed);
-
-		cli_progress("leans: %d of %d", n, SCENES(run));
-		if (search_scene(&is, near_gain(&is, &seed), SIZES(run), &all[n]))
-			n++;
-		else
-			left++;
-	}
-	cli_progress_end();
-	for (int i = 0; i < N(leans); i++)
-		sum_up(&leans[i], all, n);
-	bench_text(
-		run,
-		"search for swings that do not end, of %d random scenes that the linear "
-		"check accepts (%d more had no lean that stays): ways to lean, and what %d leans "
-		"of a loop of its own find; too much: refused, though they rest there\n",
-		n, left, SIZES(run) * LEAN_WAYS);
-	bench_table(run, &lean_table, leans, N(leans));
 }
 
 static void run_settings(struct bench_run *run)
@@ -663,14 +316,11 @@ static void run_settings(struct bench_run *run)
 	run->tabs = false; /* its tables have headings */
 	measure_heights(run);
 	measure_trackers(run);
-	measure_squares(run);
-	measure_leans(run);
 }
 
 const struct bench bench_program = {
 	.name = "settings",
-	.summary =
-		"error against run time of what has a setting: heights of meshes, trackers, "
-		"least squares, leans of the search for swings",
+	.summary = "error against run time of what has a setting: heights of meshes, "
+		   "trackers",
 	.run = run_settings,
 };

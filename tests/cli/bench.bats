@@ -4,7 +4,7 @@
 load cli
 load report
 
-names="double_libm double_separable double_library float fixed_direct fixed_table_64 \
+names="double_libm double_separable double_library fixed_direct fixed_table_64 \
 	fixed_table_1024 fixed_table force_table_32 force_table batch batch_force"
 
 setup() {
@@ -31,18 +31,17 @@ setup() {
 		holds "$(row r.json $name rms_error_N) <= $(row r.json $name max_error_N)"
 		[ "$(row r.json $name peer)" = 0 ]
 	done
-	for name in double_libm double_separable double_library float; do
+	for name in double_libm double_separable double_library; do
 		[ -z "$(row r.json $name bound_N)" ]
 	done
 	for name in fixed_direct fixed_table fixed_table_64 force_table batch batch_force; do
 		holds "$(row r.json $name max_error_N) <= $(row r.json $name bound_N)"
 		holds "$(row r.json $name size_bytes) > 288" # more than the header
 	done
-	# double: some roundings of 3 N; float: the same, in 24 bits
+	# some roundings of 3 N
 	holds "$(row r.json double_libm max_error_N) < 1e-13"
 	holds "$(row r.json double_separable max_error_N) < 1e-13"
 	holds "$(row r.json double_library max_error_N) < 1e-13"
-	holds "$(row r.json float max_error_N) > 1e-8 && $(row r.json float max_error_N) < 1e-5"
 	# half an LSB of the output is 7.6 uN; the default budget 0.1 mN
 	holds "$(row r.json fixed_table max_error_N) > 5e-6"
 	holds "$(row r.json fixed_table bound_N) <= 1e-4"
@@ -223,24 +222,6 @@ setup() {
 	fi
 }
 
-@test "bench precision: paper 2's forces, their error and time" {
-	quick_report precision
-	# a few roundings; the integers' unit is 15 uN; finer meshes are closer
-	holds "$(of forces max_error_N "name = 'sphere, double'") < 1e-13"
-	holds "$(of forces max_error_N "name = 'sphere, fixed'") < 1e-4"
-	error() { of forces rms_error_N "average_ticks = 1 AND triangles = $1"; }
-	holds "$(error 528) > 2 * $(error 2208) && $(error 2208) > 2 * $(error 9024)"
-	holds "$(of forces 'min(contact)') > 1000"
-	holds "$(of forces 'min(ns)') > 0"
-	# a mean of n ticks is half of the others late, and smoother
-	mesh="triangles = 2208 AND average_ticks"
-	for n in 2 4 8 16 32 64; do
-		late=$(of forces "max(lag_ms) - min(lag_ms)" "$mesh IN (1, $n)")
-		holds "$late > 0.9 * ($n - 1) / 2 && $late < 1.1 * ($n - 1) / 2"
-		holds "$(of forces ripple_mrad "$mesh = $n") < 0.95 * $(of forces ripple_mrad "$mesh = $((n / 2))")"
-	done
-}
-
 # bats test_tags=slow
 @test "bench precision draws a chart" {
 	command -v gnuplot >/dev/null || skip "gnuplot is not installed, it draws the chart"
@@ -253,7 +234,6 @@ setup() {
 		grep -q ">$name<" "a folder/b/chart.svg"
 	done
 	[ -f "a folder/b/plot/chart.gp" ]
-	grep -q '<svg' "a folder/b/chart-average.svg"
 	# into the current folder, and with a suffix
 	incise bench precision --quick -o c.svg >/dev/null
 	[ -f c.png ] && [ -f c.svg ] && [ ! -e c.svg.svg ]
@@ -301,7 +281,7 @@ setup() {
 @test "bench training gives error on unseen cuts over time, by method and epochs" {
 	quick_report training
 	[ "$(key r.json rows[0].name)$(key r.json rows[1].name)" = classicdefault ]
-	for name in classic default mean linear knn classic_1 classic_40 classic_3x3 default_3x3 \
+	for name in classic default classic_1 classic_40 classic_3x3 default_3x3 \
 		default_chosen; do
 		[ -z "$(row r.json $name failed)" ]
 		holds "$(row r.json $name ms) > 0"
@@ -330,12 +310,10 @@ setup() {
 }
 
 # bats test_tags=slow
-@test "bench training as a table, with a chart" {
-	command -v gnuplot >/dev/null || skip "gnuplot is not installed, it draws the chart"
-	run -0 --separate-stderr incise bench training --quick -o c
+@test "bench training as a table" {
+	run -0 --separate-stderr incise bench training --quick
 	[ -z "$stderr" ]
 	[[ "$output" == *$'\n'"classic "*$'\n'"default "* ]]
-	grep -q '>default chosen<' c.svg
 	run -2 incise bench nothing
 }
 
@@ -355,14 +333,13 @@ in_order() {
 # bats test_tags=slow
 @test "bench loop times ticks over a plane and meshes, and wake-ups beside cyclictest" {
 	incise bench loop --quick --load idle --json >r.json
-	for i in 0 1 2 3 4 5; do
+	for i in 0 1 2 3 4; do
 		holds "$(key r.json "rows[$i].tick_ns.median") > 0"
 		holds "$(key r.json "rows[$i].tick_ns.median") <= $(key r.json "rows[$i].tick_ns.p999")"
 		holds "$(key r.json "rows[$i].ticks") > 2000" # of 4000, the stroke's in contact; in the valleys of a sheet's waves it is in the air
 	done
 	[ "$(key r.json "rows[3].triangles")" = 20000 ]
 	[ "$(key r.json "rows[4].triangles")" = 500000 ]
-	[ "$(key r.json "rows[5].triangles") $(key r.json "rows[5].cuts")" = "500000 32" ]
 	holds "$(key r.json "rows[4].memory_bytes") > 10 * $(key r.json "rows[3].memory_bytes")"
 	[ "$(key r.json tick_ns)" = "$(key r.json "rows[0].tick_ns")" ]
 	holds "$(key r.json "rows[0].ns") > 0"
@@ -418,19 +395,9 @@ in_order() {
 	bench_interrupted loop --quick --load disk --duration 1min "$root/scenes/wall.scene"
 }
 
-# bats test_tags=slow
-@test "bench loop draws lateness" {
-	command -v gnuplot >/dev/null || skip "gnuplot is not installed, it draws the chart"
-	run -0 --separate-stderr incise bench loop --quick --load idle -o "a folder/w" \
-		"$root/scenes/wall.scene"
-	[ -z "$stderr" ]
-	[ "$(head -c 8 "a folder/w-wakeups.png" | od -An -tx1 | tr -d ' \n')" = 89504e470d0a1a0a ]
-	grep -q '1 kHz, idle' "a folder/w-wakeups.svg"
-}
-
 @test "bench loop: bad usage" {
 	run -2 --separate-stderr incise bench loop a b
-	run --separate-stderr incise bench loop -o a/
+	run --separate-stderr incise bench loop -o a
 	bad_usage "--output"
 	run --separate-stderr incise bench loop --load much
 	bad_usage "--load: expected idle, cpu, memory, disk or view, found 'much'"
@@ -501,7 +468,7 @@ in_order() {
 }
 
 # bats test_tags=slow
-@test "bench stability as text, with a verdict on every ratio, and its maps" {
+@test "bench stability as text, with a verdict on every ratio, and its map" {
 	! command -v gnuplot >/dev/null || plot=(-o "a folder/w")
 	run -0 --separate-stderr incise bench stability --quick "${plot[@]}"
 	[ -z "$stderr" ]
@@ -510,12 +477,8 @@ in_order() {
 	[ "$(grep -c '  ok$' <<<"$output")" -ge 15 ]
 	[[ "$output" != *MISSED* ]]
 	[ -n "${plot[*]}" ] || skip "gnuplot is not installed, it draws the chart"
-	for part in map rest integrators; do
-		[ "$(head -c 8 "a folder/w-$part.png" | od -An -tx1 | tr -d ' \n')" = 89504e470d0a1a0a ]
-		grep -q '<svg' "a folder/w-$part.svg"
-	done
+	[ "$(head -c 8 "a folder/w-map.png" | od -An -tx1 | tr -d ' \n')" = 89504e470d0a1a0a ]
 	grep -q 'delay of 2 ticks' "a folder/w-map.svg"
-	grep -q 'trapezoid' "a folder/w-integrators.svg"
 }
 
 @test "bench stability: bad usage" {

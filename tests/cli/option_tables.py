@@ -89,7 +89,6 @@ VALUES = """
 --policy | fifo deadline fifo:1 fifo:84 | rr fifo:0 fifo:85 fifo:x {}
 --poses | arrival acquisition | dawn {}
 --premises | any.fis |
---profile bench | |
 --profile export | plain ros2 | ros {}
 --range | 2s..2500ms 5s.. ..1s | 5s 5s..4s {}
 --range calibrate stepper | 0mm..1.5mm | 5mm 5mm..1mm {}

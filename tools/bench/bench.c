@@ -201,21 +201,15 @@ static void print_headings(const struct bench_column *columns)
 static void print_line(const struct bench_table *table, const void *row)
 {
 	const char *failed = table->failed_after ? failed_of(table, row) : NULL;
-	int n = 0, blank = 0;
+	int n = 0;
 
 	for (const struct bench_column *c = table->columns; c->key || c->heading; c++) {
 		if (!c->heading)
 			continue;
 		if (failed && n == table->failed_after)
 			break;
-		blank += n++ > 0;
-		if (c->blank && !text_of_bench(c, row) &&
-		    isnan(number_of_bench(c, row))) {
-			blank += abs(width_of_bench(c->format));
-			continue;
-		}
-		printf("%*s", blank, "");
-		blank = 0;
+		if (n++)
+			putchar(' ');
 		print_cell(c, row);
 	}
 	printf(failed ? " %s\n" : "\n", failed);
@@ -300,33 +294,19 @@ void bench_value(struct bench_run *run, const char *key, json_t *value)
 	set_bench(run->report, key, value);
 }
 
-static void update(json_t *object, const char *fmt, va_list args)
-{
-	json_error_t err;
-	json_t *members = json_vpack_ex(&err, 0, fmt, args);
-
-	if (!members)
-		cli_fail("%s: %s", fmt, err.text);
-	json_object_update(object, members);
-	json_decref(members);
-}
-
 void bench_values(struct bench_run *run, const char *fmt, ...)
 {
+	json_error_t err;
+	json_t *members;
 	va_list args;
 
 	va_start(args, fmt);
-	update(run->report, fmt, args);
+	members = json_vpack_ex(&err, 0, fmt, args);
 	va_end(args);
-}
-
-void bench_scalars(struct bench_run *run, const char *fmt, ...)
-{
-	va_list args;
-
-	va_start(args, fmt);
-	update(run->scalars, fmt, args);
-	va_end(args);
+	if (!members)
+		cli_fail("%s: %s", fmt, err.text);
+	json_object_update(run->report, members);
+	json_decref(members);
 }
 
 static json_t *row_json(const struct bench_table *table, const void *row)
@@ -409,7 +389,7 @@ void bench_table(struct bench_run *run, const struct bench_table *table, const v
 const struct bench_table bench_points = {
 	.row_bytes = sizeof(struct bench_point),
 	.columns = {COLUMN(bench_point, "block", block), COLUMN(bench_point, "x", x),
-		    COLUMN(bench_point, "y", y), COLUMN(bench_point, "z", z)},
+		    COLUMN(bench_point, "y", y)},
 };
 
 /* The value of each key of "motion,name", with spaces between them; of @only that alone. */
@@ -502,12 +482,11 @@ static void write_words(FILE *script, const char *name, const char *key, json_t 
 	json_decref(words);
 }
 
-/* The file and the lists of blocks as variables of a script. */
+/* The file and the values of its blocks as variables of a script. */
 static void write_variables(FILE *script, const char *name, const char *file,
 			    const struct bench_data *data, const struct bench_rows *rows)
 {
 	fprintf(script, "%s = '%s'\n", name, file);
-	write_words(script, name, "blocks", words_of(data, NULL, rows));
 	for (const char *key = data->blocks; *key;) {
 		size_t length = strcspn(key, ",");
 		char one[64];
@@ -543,27 +522,24 @@ static int values_of(const struct bench_plot *plot, const char *key,
 	return n;
 }
 
-static char *plot_name(const struct bench_run *run, const struct bench_plot *plot)
-{
-	return cli_text("%s%s%s", run->name, plot->suffix ? "-" : "",
-			plot->suffix ? plot->suffix : "");
-}
-
 /* Fail before the measurement if the plot may not be drawn. */
-static void reserve(const struct bench_run *run, const struct bench_plot *plot)
+static void reserve(struct bench_run *run)
 {
-	char *name = plot_name(run, plot);
+	const char *suffix = run->bench->plot.suffix;
 
-	plot_reserve(run->folder, name);
-	free(name);
+	plot_place("output", run->plot, &run->folder, &run->name);
+	if (suffix)
+		run->name = cli_text("%s-%s", run->name, suffix);
+	plot_reserve(run->folder, run->name);
 }
 
-static void draw_bench(const struct bench_run *run, const struct bench_plot *plot)
+static void draw_bench(const struct bench_run *run)
 {
+	const struct bench_plot *plot = &run->bench->plot;
 	const struct bench_rows *rows = rows_of(run, plot->data.table),
 				*more = rows_of(run, plot->more.table);
-	char *name = plot_name(run, plot);
-	char *file = cli_text("%s.dat", name), *more_file = cli_text("%s-more.dat", name);
+	char *file = cli_text("%s.dat", run->name),
+	     *more_file = cli_text("%s-more.dat", run->name);
 	FILE *script;
 	int width;
 
@@ -573,20 +549,18 @@ static void draw_bench(const struct bench_run *run, const struct bench_plot *plo
 	if (more)
 		write_data(run, more_file, &plot->more, more);
 	width = plot->width * values_of(plot, plot->across, rows);
-	script = plot_begin(run->folder, name, width > WIDTH_LEAST ? width : WIDTH_LEAST,
-			    plot->height * values_of(plot, plot->down, rows) +
-				    plot->margin);
-	fprintf(script, "set datafile columnheaders separator tab\nsuffix = '%s'\n",
-		plot->suffix ? plot->suffix : "");
+	script = plot_begin(run->folder, run->name,
+			    width > WIDTH_LEAST ? width : WIDTH_LEAST, plot->height);
+	fputs("set datafile columnheaders separator tab\n", script);
 	write_scalars(script, run->machine);
 	write_scalars(script, run->report);
-	write_scalars(script, run->scalars);
 	write_variables(script, "data", file, &plot->data, rows);
 	if (more)
 		write_variables(script, "more", more_file, &plot->more, more);
 	fputs(plot->script, script);
-	if (!plot_draw(script, run->folder, name))
-		cli_fail("%s/plot/%s.gp: gnuplot failed, see above", run->folder, name);
+	if (!plot_draw(script, run->folder, run->name))
+		cli_fail("%s/plot/%s.gp: gnuplot failed, see above", run->folder,
+			 run->name);
 }
 
 /* --- a run --- */
@@ -637,12 +611,9 @@ void bench_measure(struct bench_run *run)
 
 	/* A wrong name fails before the work, not after. */
 	if (run->plot)
-		plot_place("output", run->plot, &run->folder, &run->name);
-	for (const struct bench_plot *p = run->bench->plots; run->plot && p->script; p++)
-		reserve(run, p);
+		reserve(run);
 	run->machine = machine_json();
 	run->metrics = json_array();
-	run->scalars = json_object();
 	snprintf(command, sizeof(command), "bench %s", run->bench->name);
 	run->report = json_with_schema(json_pack("{sO sb}", "machine", run->machine,
 						 "quick", run->quick),
@@ -653,8 +624,8 @@ void bench_measure(struct bench_run *run)
 	if (run->json && !old)
 		json_print(json_incref(run->report));
 	cli_finish();
-	for (const struct bench_plot *p = run->bench->plots; run->plot && p->script; p++)
-		draw_bench(run, p);
+	if (run->plot)
+		draw_bench(run);
 	if (old) {
 		worse = print_comparison(run, old);
 	} else if (!run->json) {

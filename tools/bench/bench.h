@@ -43,7 +43,6 @@ struct bench_column {
 	double scale;	     /* of the number; 0: 1 */
 	double text_scale;   /* in the text on top of that; 0: 1 */
 	bool optional;	     /* 0 is none */
-	bool blank;	     /* no value is empty in the text; else "-" */
 	bool whole;	     /* in the JSON a whole number is an integer */
 	bool data; /* neither in the text nor in the JSON: for plots and metrics */
 };
@@ -113,25 +112,19 @@ struct bench_data {
  *   data, more         file names; blocks are separated by two empty lines, each has a name
  *                      for "index", its keys' values with spaces between them, and a line of
  *                      keys for "using"
- *   data_blocks        names of all blocks, as a list of words; more_blocks
  *   data_KEY           values of each key of the blocks, as a list of words; more_KEY
- *   suffix             the plot's
- *   NAME               each scalar of bench_values() and bench_scalars(); cpu and kernel
+ *   NAME               each scalar of bench_values(); cpu and kernel
  */
 struct bench_plot {
 	const char *suffix; /* the plot is NAME-suffix; NULL: NAME */
 	const char *script;
 	int width,
-		height; /* px; with across and down of a panel of a value of that key */
-	int margin;	/* added to the height */
-	const char *across, *down;
+		height; /* px; with across the width of a panel of a value of that key */
+	const char *across;
 	struct bench_data data, more;
 };
 
-extern const char text_loop_wakeups_gp[], text_precision_gp[],
-	text_precision_average_gp[], text_scenes_gp[], text_stability_integrators_gp[],
-	text_stability_map_gp[], text_stability_rest_gp[], text_training_gp[],
-	text_view_gp[], text_view_frames_gp[];
+extern const char text_precision_gp[], text_stability_map_gp[];
 
 struct bench_run;
 
@@ -139,17 +132,13 @@ struct bench {
 	const char *name, *operands; /* "loop", "[SCENE]" */
 	const char *summary;	     /* in --help */
 	int n_operands;		     /* at most */
-	bool takes_duration, takes_load, takes_profile, takes_seed;
+	bool takes_duration, takes_load, takes_seed;
 	void (*run)(struct bench_run *run);
-	struct bench_plot plots[5]; /* end with {0}; without plots -o is bad usage */
+	struct bench_plot plot; /* without its script -o is bad usage */
 };
 
 extern const struct bench bench_loop, bench_precision, bench_scenes, bench_stability,
 	bench_training;
-
-/* A part of bench_precision. */
-void precision_forces(struct bench_run *run);
-extern const struct bench_table precision_force_table;
 
 /* --- a run --- */
 
@@ -160,13 +149,13 @@ struct bench_run {
 	bool json, quick, tabs; /* tabs: the text has all columns of the JSON */
 	double seconds;		/* 0: not given */
 	long seed;		/* the same */
-	const char *plot, *load, *profile, *against; /* NULL: not given */
+	const char *plot, *load, *against; /* NULL: not given */
 	char **operands;
 	int n_operands;
 
-	json_t *machine, *report, *metrics, *scalars;
+	json_t *machine, *report, *metrics;
 	char failed[600];
-	const char *folder, *name; /* of plots */
+	const char *folder, *name; /* of the plot */
 	struct bench_rows {
 		const struct bench_table *table;
 		const char *rows;
@@ -184,9 +173,6 @@ const char *bench_machine(const struct bench_run *run, const char *key);
 
 /* Members of the JSON, an object of json_pack(). */
 void bench_values(struct bench_run *run, const char *fmt, ...);
-
-/* Scalars for the plots alone, the same. */
-void bench_scalars(struct bench_run *run, const char *fmt, ...);
 
 /* A member of the JSON; takes the value. */
 void bench_value(struct bench_run *run, const char *key, json_t *value);
@@ -216,7 +202,7 @@ void bench_fail(struct bench_run *run, const char *fmt, ...) INCISE_PRINTF(2, 3)
 /* Points of a plot that are no rows of the JSON. */
 struct bench_point {
 	char block[48];
-	double x, y, z;
+	double x, y;
 };
 extern const struct bench_table bench_points;
 

@@ -33,21 +33,18 @@ static const char all_forces[] =
 static const struct own {
 	const char *name, *arithmetic, *surface;
 	int cells; /* along each side of a sheet; two triangles each */
-	int cuts;  /* in the tissue before */
 } own[] = {
-	{"plane", "double", "kind = \"plane\";", 0, 0},
-	{"plane_fixed", "fixed", "kind = \"plane\";", 0, 0},
+	{"plane", "double", "kind = \"plane\";", 0},
+	{"plane_fixed", "fixed", "kind = \"plane\";", 0},
 	{"sphere", "double",
-	 "kind = \"sphere\"; centre_mm = [0.0, 0.0, -50.0]; radius_mm = 50.0;", 0, 0},
-	{"mesh_20000", "double", "kind = \"mesh\"; file = \"%s\";", 100, 0},
-	{"mesh_500000", "double", "kind = \"mesh\"; file = \"%s\";", 500, 0},
-	{"mesh_500000_cuts", "double", "kind = \"mesh\"; file = \"%s\";", 500, 32},
+	 "kind = \"sphere\"; centre_mm = [0.0, 0.0, -50.0]; radius_mm = 50.0;", 0},
+	{"mesh_20000", "double", "kind = \"mesh\"; file = \"%s\";", 100},
+	{"mesh_500000", "double", "kind = \"mesh\"; file = \"%s\";", 500},
 };
 
 struct tick_row {
 	const char *name, *failed;
 	size_t memory, triangles;
-	int cuts;
 	double load_s;
 	struct tick_cost cost;
 	struct harness_time time; /* of a tick, in turn with the others */
@@ -86,14 +83,14 @@ static void time_ticks(struct tick_row *rows, int n, bool quick)
 
 	for (int i = 0; i < n; i++) {
 		cli_progress("%s", rows[i].name);
-		tick_cost(rows[i].scene, NULL, NULL, rows[i].cuts,
+		tick_cost(rows[i].scene, NULL, NULL,
 			  quick ? QUICK_MEASURED_S : MEASURED_S, &rows[i].cost);
 		if (!rows[i].cost.ticks)
 			cli_fail(
 				"%s: a stroke over its top met no tissue: nothing to time",
 				rows[i].name);
-		rows[i].timed = tick_stroke_new(rows[i].scene, NULL, NULL,
-						rows[i].cost.tool, rows[i].cuts);
+		rows[i].timed =
+			tick_stroke_new(rows[i].scene, NULL, NULL, rows[i].cost.tool);
 		variants[i] = (struct harness_variant){
 			.ns = turn_ns, .context = &rows[i], .time = &rows[i].time};
 	}
@@ -131,7 +128,6 @@ static void load_own(const struct own *own, struct tick_row *row)
 	scene = write_scene(own, sheet.path, 1000);
 	row->name = own->name;
 	row->triangles = 2 * (size_t)own->cells * own->cells;
-	row->cuts = own->cuts;
 	load_scene(scene.path, row);
 	fclose(scene.file);
 	if (sheet.file)
@@ -143,7 +139,7 @@ static const struct bench_table tick_table = {
 	.row_bytes = sizeof(struct tick_row),
 	.columns = {COLUMN(tick_row, "name", name, "%-16s", "ns a tick, hot"),
 		    COLUMN(tick_row, "triangles", triangles),
-		    COLUMN(tick_row, "cuts", cuts), COLUMN(tick_row, "ticks", cost.ticks),
+		    COLUMN(tick_row, "ticks", cost.ticks),
 		    COLUMN(tick_row, "tick_ns.median", cost.median, "%9.0f", "median"),
 		    COLUMN(tick_row, "tick_ns.p99", cost.p99, "%9.0f", "99 %"),
 		    COLUMN(tick_row, "tick_ns.p999", cost.p999, "%9.0f", "99.9 %"),
@@ -166,79 +162,45 @@ static const struct bench_table tick_table = {
 static const struct bench_table wakeup_table = {
 	.key = "wakeups.rows",
 	.row_bytes = sizeof(struct wakeup),
-	.columns = {COLUMN(wakeup, "load", load), COLUMN(wakeup, "rate_hz", rate_hz),
+	.failed_after = 2,
+	.columns = {COLUMN(wakeup, "rate_hz", rate_hz, "%6g", "Hz"),
+		    COLUMN(wakeup, "load", load, "%-6s", "load"),
 		    COLUMN(wakeup, "no_load", no_load),
 		    COLUMN(wakeup, "no_cyclictest", no_cyclictest),
 		    COLUMN(wakeup, "lateness_us", loop.json),
 		    COLUMN(wakeup, "cyclictest_us", cyclictest.json),
-		    COLUMN(wakeup, "skipped", skipped),
-		    COLUMN(wakeup, "skipped_by_machine", machine, .whole = true),
-		    COLUMN(wakeup, "ratio_p999", ratio),
-		    COLUMN(wakeup, "tick_cold_us", tick_us),
+		    COLUMN(wakeup, NULL, loop.median, "%7.0f", "median"),
+		    COLUMN(wakeup, NULL, loop.p99, "%7.0f", "99 %"),
+		    COLUMN(wakeup, NULL, loop.p999, "%7.0f", "99.9 %"),
+		    COLUMN(wakeup, NULL, loop.max, "%8.0f", "max"),
+		    COLUMN(wakeup, NULL, cyclictest.p999, "%18.0f", "cyclictest: 99.9 %"),
+		    COLUMN(wakeup, NULL, cyclictest.max, "%8.0f", "max"),
+		    COLUMN(wakeup, "skipped", skipped, "%8.0f", "skipped"),
+		    COLUMN(wakeup, "skipped_by_machine", machine, "%8.0f", "machine",
+			   .whole = true),
+		    COLUMN(wakeup, "ratio_p999", ratio, "%6.2f", "ratio"),
+		    COLUMN(wakeup, "tick_cold_us", tick_us, "%6.1f", "tick"),
 		    COLUMN(wakeup, "tick_max_us", tick_max_us),
 		    COLUMN(wakeup, "frames_hz", frames_hz),
-		    COLUMN(wakeup, "late_median_us", loop.median),
-		    COLUMN(wakeup, "late_p99_us", loop.p99),
-		    COLUMN(wakeup, "late_p999_us", loop.p999),
-		    COLUMN(wakeup, "late_max_us", loop.max),
-		    COLUMN(wakeup, "cyclictest_p999_us", cyclictest.p999),
-		    COLUMN(wakeup, "failed", no_load),
-		    COLUMN(wakeup, "title", title, .data = true)},
+		    COLUMN(wakeup, "failed", no_load)},
 	.metrics = {METRIC(MEASURED, wakeup, median, "us",
 			   "late at {rate_hz} Hz, {load}, median"),
 		    METRIC(MEASURED, wakeup, p999, "us",
 			   "late at {rate_hz} Hz, {load}, 99.9 %")},
 };
 
-/* A line of text: of the loop, or of cyclictest below it. */
-struct line {
-	const char *rate, *load, *program, *failed;
-	struct lateness late;
-	double skipped, machine, ratio, tick_us;
-};
-
-static const struct bench_table line_table = {
-	.row_bytes = sizeof(struct line),
-	.failed_after = 2,
-	.columns = {COLUMN(line, NULL, rate, "%6s", "Hz"),
-		    COLUMN(line, NULL, load, "%-6s", "load"),
-		    COLUMN(line, NULL, program, "%-10s", "program"),
-		    COLUMN(line, NULL, late.min, "%7.0f", "min"),
-		    COLUMN(line, NULL, late.median, "%7.0f", "median"),
-		    COLUMN(line, NULL, late.p99, "%7.0f", "99 %"),
-		    COLUMN(line, NULL, late.p999, "%7.0f", "99.9 %"),
-		    COLUMN(line, NULL, late.p9999, "%7.0f", "99.99 %"),
-		    COLUMN(line, NULL, late.max, "%8.0f", "max"),
-		    COLUMN(line, NULL, skipped, "%8.0f", "skipped"),
-		    COLUMN(line, NULL, machine, "%8.0f", "machine"),
-		    COLUMN(line, NULL, ratio, "%6.2f", "ratio"),
-		    COLUMN(line, NULL, tick_us, "%6.1f", "tick"),
-		    COLUMN(line, "failed", failed)},
-};
-
-static void print_wakeups(struct bench_run *run, const struct wakeups *wakeups)
+static void report_wakeups(struct bench_run *run, const struct wakeups *wakeups)
 {
-	struct line lines[2 * WAKEUPS_MAX];
 	const char *no_cyclictest = NULL;
 	double frames_hz = NAN;
-	int n = 0;
 
-	for (int i = 0; i < wakeups->n; i++) {
-		const struct wakeup *row = &wakeups->row[i];
-
-		lines[n++] = (struct line){cli_text("%g", row->rate_hz),
-					   row->load,
-					   "loop",
-					   row->no_load,
-					   row->loop,
-					   (double)row->skipped,
-					   row->machine,
-					   row->ratio,
-					   row->tick_us};
-		if (row->cyclictest.bins)
-			lines[n++] = (struct line){
-				" ", " ", "cyclictest", NULL, row->cyclictest,
-				NAN, NAN, NAN,		NAN};
+	bench_values(run, "{s{sf ss so si}}", "wakeups", "seconds", wakeups->seconds,
+		     "policy", wakeups->realtime ? "fifo" : "other", "priority",
+		     wakeups->realtime ? json_integer(INCISE_REALTIME_PRIORITY)
+				       : json_null(),
+		     "cpu", wakeups->cpu);
+	for (const struct wakeup *row = wakeups->row; row < wakeups->row + wakeups->n;
+	     row++) {
 		frames_hz = fmax(frames_hz, row->frames_hz);
 		if (!row->no_load && row->no_cyclictest)
 			no_cyclictest = row->no_cyclictest;
@@ -248,7 +210,7 @@ static void print_wakeups(struct bench_run *run, const struct wakeups *wakeups)
 		   wakeups->realtime ? cli_text("SCHED_FIFO %d", INCISE_REALTIME_PRIORITY)
 				     : "SCHED_OTHER, without real-time permission",
 		   wakeups->cpu);
-	bench_lines(run, &line_table, lines, n);
+	bench_table(run, &wakeup_table, wakeups->row, wakeups->n);
 	bench_text(run,
 		   "tick: median after each sleep, with cold caches and the rig; the "
 		   "first table is of ticks in a row, with hot caches\n");
@@ -256,61 +218,6 @@ static void print_wakeups(struct bench_run *run, const struct wakeups *wakeups)
 		bench_text(run, "view: %.1f frames per second\n", frames_hz);
 	if (no_cyclictest)
 		bench_text(run, "%s\n", no_cyclictest);
-}
-
-/* Histograms for the plot: lower edge, share of all wake-ups. Bins are a tenth wider than the
- * ones before, whole µs at least; both ends are drawn down to the axis. */
-static int add_histogram(struct bench_point *points, const struct wakeup *row,
-			 const char *program, const struct lateness *l)
-{
-	int n = 0, from = 0;
-
-	snprintf(points->block, sizeof(points->block), "%g %s %s", row->rate_hz,
-		 row->load, program);
-	points[n] = points[0];
-	points[n++].x = 1;
-	while (from < INCISE_LOOP_BINS) {
-		int to = from + (from < 10 ? 1 : from / 10);
-		uint64_t sum = 0;
-
-		for (int i = from; i < to && i < INCISE_LOOP_BINS; i++)
-			sum += l->bins[i];
-		/* Lateness within the first µs begins where the axis does. */
-		points[n] = points[0];
-		points[n].x = fmax(from, 0.9);
-		points[n++].y = (double)sum / (double)l->ticks;
-		from = to;
-	}
-	return n;
-}
-
-static void report_wakeups(struct bench_run *run, const struct wakeups *wakeups)
-{
-	static struct bench_point points[2 * WAKEUPS_MAX * 200];
-	double most = 1;
-	int n = 0;
-
-	bench_values(run, "{s{sf ss so si}}", "wakeups", "seconds", wakeups->seconds,
-		     "policy", wakeups_policy(wakeups->realtime), "priority",
-		     wakeups->realtime ? json_integer(INCISE_REALTIME_PRIORITY)
-				       : json_null(),
-		     "cpu", wakeups->cpu);
-	print_wakeups(run, wakeups);
-	bench_rows(run, &wakeup_table, wakeups->row, wakeups->n);
-	for (int i = 0; i < wakeups->n; i++) {
-		const struct wakeup *row = &wakeups->row[i];
-
-		if (!row->loop.bins)
-			continue;
-		most = fmax(most, (double)row->loop.ticks);
-		n += add_histogram(&points[n], row, "loop", &row->loop);
-		if (row->cyclictest.bins)
-			n += add_histogram(&points[n], row, "cyclictest",
-					   &row->cyclictest);
-	}
-	bench_rows(run, &bench_points, points, n);
-	bench_scalars(run, "{sf sf ss}", "least", 0.5 / most, "seconds", wakeups->seconds,
-		      "policy", wakeups->realtime ? "SCHED_FIFO" : "SCHED_OTHER");
 }
 
 /* --- the bench --- */
@@ -368,13 +275,4 @@ const struct bench bench_loop = {
 	.takes_duration = true,
 	.takes_load = true,
 	.run = run,
-	.plots = {{.suffix = "wakeups",
-		   .script = text_loop_wakeups_gp,
-		   .width = 480,
-		   .height = 240,
-		   .across = "rate_hz",
-		   .down = "load",
-		   .margin = 170,
-		   .data = {&wakeup_table, "rate_hz,load,title", "failed="},
-		   .more = {&bench_points, "block"}}},
 };

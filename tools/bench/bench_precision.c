@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * incise bench precision: error against run time of the evaluators of one model, the plainest
- * and another project's among them, over the same points; then of forces.
+ * and another project's among them, over the same points.
  */
 #include <dlfcn.h>
 #include <stdio.h>
@@ -29,7 +29,6 @@ struct points {
 	size_t n;
 	int n_inputs;
 	double *x_double, *y_double;
-	float *x_float, *y_float;
 	int32_t *x_fixed, *y_fixed;
 	double *truth; /* eq. (3) in long double */
 };
@@ -100,18 +99,76 @@ static struct plain *plain_new(const struct incise_model *model)
 	return m;
 }
 
-#define REAL double
-#define EXP exp
-#define NAME(x) x##_double
-#include "separable.inc"
-#undef REAL
-#undef EXP
-#undef NAME
+/* The model with an exponential per membership function rather than per rule, each input
+ * normalised by its largest degree. */
+struct separable {
+	int n_inputs, n_mfs[INPUTS];
+	double centre[INPUTS][MFS], factor[INPUTS][MFS]; /* -1/(2 s²) */
+	double p[RULES][INPUTS + 1];
+};
 
-#define REAL float
-#define EXP expf
-#define NAME(x) x##_float
-#include "separable.inc"
+static struct separable *separable_new(const struct plain *from)
+{
+	struct separable *m = cli_alloc(1, sizeof(*m));
+
+	m->n_inputs = from->n_inputs;
+	for (int i = 0; i < m->n_inputs; i++) {
+		m->n_mfs[i] = from->n_mfs[i];
+		for (int k = 0; k < m->n_mfs[i]; k++) {
+			double s = from->width[i][k];
+
+			m->centre[i][k] = from->centre[i][k];
+			m->factor[i][k] = (-0.5 / (s * s));
+		}
+	}
+	for (int r = 0; r < from->n_rules; r++)
+		for (int i = 0; i <= m->n_inputs; i++)
+			m->p[r][i] = from->p[r][i];
+	return m;
+}
+
+/* Degrees of one input, the largest about 1; returns their sum. */
+static double degrees(const struct separable *m, int i, double x, double *mu)
+{
+	double largest = -HUGE_VAL, sum = 0;
+
+	for (int k = 0; k < m->n_mfs[i]; k++) {
+		double d = x - m->centre[i][k];
+
+		mu[k] = d * d * m->factor[i][k];
+		largest = mu[k] > largest ? mu[k] : largest;
+	}
+	/* A bit more than the largest, which cancels: exp(0) would take a way of its own, that
+	 * the processor cannot foresee. */
+	largest += 0x1p-10;
+	for (int k = 0; k < m->n_mfs[i]; k++) {
+		mu[k] = exp(mu[k] - largest);
+		sum += mu[k];
+	}
+	return sum;
+}
+
+static double separable_eval(const struct separable *m, const double *x)
+{
+	double mu_a[MFS], mu_b[MFS] = {1}, sum = 0, weights;
+	const double(*r)[INPUTS + 1] = m->p;
+
+	weights = degrees(m, 0, x[0], mu_a);
+	if (m->n_inputs == 1) {
+		for (int i = 0; i < m->n_mfs[0]; i++, r++)
+			sum += mu_a[i] * ((*r)[0] + (*r)[1] * x[0]);
+		return sum / weights;
+	}
+	weights *= degrees(m, 1, x[1], mu_b);
+	for (int i = 0; i < m->n_mfs[0]; i++) {
+		double part = 0;
+
+		for (int j = 0; j < m->n_mfs[1]; j++, r++)
+			part += mu_b[j] * ((*r)[0] + (*r)[1] * x[0] + (*r)[2] * x[1]);
+		sum += mu_a[i] * part;
+	}
+	return sum / weights;
+}
 
 /* Eq. (3) in long double, and apart from the library: the truth. The largest exponent is
  * taken off all, without which narrow functions would leave 0/0. */
@@ -152,8 +209,6 @@ static void points_init(struct points *p, const struct incise_model *model,
 		.n_inputs = m->n_inputs,
 		.x_double = cli_alloc(values, sizeof(double)),
 		.y_double = cli_alloc(n, sizeof(double)),
-		.x_float = cli_alloc(values, sizeof(float)),
-		.y_float = cli_alloc(n, sizeof(float)),
 		.x_fixed = cli_alloc(values, sizeof(int32_t)),
 		.y_fixed = cli_alloc(n, sizeof(int32_t)),
 		.truth = cli_alloc(n, sizeof(double)),
@@ -163,7 +218,6 @@ static void points_init(struct points *p, const struct incise_model *model,
 			&incise_model_info(model)->input[(int)(k % m->n_inputs)];
 
 		p->x_double[k] = v->min + (v->max - v->min) * lcg_uniform(&seed);
-		p->x_float[k] = (float)p->x_double[k];
 		p->x_fixed[k] = (int32_t)lrint(p->x_double[k] * INCISE_FIXED_ONE);
 	}
 	for (size_t k = 0; k < n; k++)
@@ -196,6 +250,13 @@ static void run_libm(const struct row *row, const struct points *p)
 		}
 		p->y_double[k] = sum / weights;
 	}
+}
+
+static void run_separable(const struct row *row, const struct points *p)
+{
+	for (size_t k = 0; k < p->n; k++)
+		p->y_double[k] =
+			separable_eval(row->context, p->x_double + k * p->n_inputs);
 }
 
 /* The library's: any kind and shape of model, any input, and its flags. */
@@ -333,9 +394,8 @@ static void add_all(struct evaluators *all, const struct incise_model *model,
 	fixed = cli_require(incise_fixed_compile(model, &any, &err), &err);
 	incise_fixed_free(fixed);
 	add(all, floating, run_libm, plain, "double_libm");
-	add(all, floating, run_double, separable_new_double(plain), "double_separable");
+	add(all, floating, run_separable, separable_new(plain), "double_separable");
 	add(all, floating, run_library, model, "double_library");
-	add(all, floating, run_float, separable_new_float(plain), "float");
 	add_fixed(all, model, INCISE_FIXED_DIRECT, 0, 0, "fixed_direct");
 	for (int i = 0; i < N(table_cells); i++)
 		add_fixed(all, model, INCISE_FIXED_TABLE, table_cells[i], 0,
@@ -364,7 +424,7 @@ static double answer(const struct row *row, const struct points *p, size_t k)
 {
 	if (row->fixed)
 		return p->y_fixed[k] / (double)INCISE_FIXED_ONE;
-	return row->run == run_float ? p->y_float[k] : p->y_double[k];
+	return p->y_double[k];
 }
 
 static void measure_error(struct row *row, const struct points *p)
@@ -485,8 +545,6 @@ static void run(struct bench_run *run)
 		   all->reference_version ? "; fuzzylite " : "",
 		   all->reference_version ? all->reference_version : "");
 	bench_table(run, &rows_table, all->row, all->n);
-	bench_text(run, "\n");
-	precision_forces(run);
 }
 
 const struct bench bench_precision = {
@@ -495,14 +553,9 @@ const struct bench bench_precision = {
 	.summary = "error and run time of a model's evaluators",
 	.n_operands = 1,
 	.run = run,
-	.plots = {{.script = text_precision_gp,
-		   .width = 1000,
-		   .height = 720,
-		   .data = {&rows_table, "kind", "failed="},
-		   .more = {&rows_table, "name,failed", "failed!=,peer=1"}},
-		  {.suffix = "average",
-		   .script = text_precision_average_gp,
-		   .width = 900,
-		   .height = 560,
-		   .data = {&precision_force_table, "triangles", "triangles=2208"}}},
+	.plot = {.script = text_precision_gp,
+		 .width = 1000,
+		 .height = 720,
+		 .data = {&rows_table, "kind", "failed="},
+		 .more = {&rows_table, "name,failed", "failed!=,peer=1"}},
 };

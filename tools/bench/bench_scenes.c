@@ -18,7 +18,6 @@
 #include "../cli/json.h"
 #include "../cli/mapped_libraries.h"
 #include "../cli/scene_argument.h"
-#include "../cli/stopwatch.h"
 #include "bench.h"
 #include "sheet.h"
 #include "trajectory.h"
@@ -206,9 +205,7 @@ struct variant {
 	struct incise_plan *plan;
 	struct walk walk;
 	struct harness_time time; /* of a tick, ns */
-	double p99_ns;		  /* of single ticks */
 	double memory_KiB;
-	double stage_ns[INCISE_PLAN_STAGES_MAX]; /* means of the middle half */
 };
 
 struct scene {
@@ -365,7 +362,7 @@ static void open_scene(struct scene *s)
 	struct incise_error err = {0};
 
 	for (int i = 0; i < 2; i++)
-		variants[i]->memory_KiB = variants[i]->p99_ns = NAN;
+		variants[i]->memory_KiB = NAN;
 	if (!s->path) {
 		snprintf(s->failed, sizeof(s->failed),
 			 "no file and no scene of that name: %s", s->name);
@@ -435,39 +432,6 @@ static void watch_processes(struct scenes *s)
 
 #define TURNS 101
 #define QUICK_TURNS 9
-#define RUNS 10 /* of which single ticks and their stages are timed */
-
-/* Time ticks and then stages one by one; the time of reading the clock is subtracted. */
-static void time_single(struct variant *v, int runs)
-{
-	const size_t n = (size_t)runs * v->walk.trajectory->ticks;
-	double *times = cli_alloc(n * (INCISE_PLAN_STAGES_MAX + 1), sizeof(*times));
-	double own = stopwatch_own_ns();
-	struct incise_tick tick;
-
-	for (size_t i = 0; i < n; i++) {
-		int64_t t_ns = walk_feed(&v->walk);
-		double begin = stopwatch_ns();
-
-		incise_plan_tick(v->plan, t_ns, &tick);
-		times[i] = stopwatch_ns() - begin;
-	}
-	for (size_t i = 0; i < n; i++) {
-		int64_t stage_ns[INCISE_PLAN_STAGES_MAX];
-
-		incise_plan_tick_timed(v->plan, walk_feed(&v->walk), &tick, stage_ns);
-		for (int k = 0; k < INCISE_PLAN_STAGES_MAX; k++)
-			times[(k + 1) * n + i] = (double)stage_ns[k];
-	}
-	stopwatch_sort(times, (int)n);
-	v->p99_ns = fmax(stopwatch_quantile(times, (int)n, 0.99) - own, 0);
-	for (int k = 0; k < INCISE_PLAN_STAGES_MAX; k++) {
-		stopwatch_sort(times + (k + 1) * n, (int)n);
-		v->stage_ns[k] =
-			fmax(stopwatch_middle(times + (k + 1) * n, (int)n) - own, 0);
-	}
-	free(times);
-}
 
 /* All of them in turns. */
 static void time_all(struct scenes *s, bool quick)
@@ -491,31 +455,8 @@ static void time_all(struct scenes *s, bool quick)
 
 		scene->times_cheaper =
 			scene->full.time.ns.median / scene->few.time.ns.median;
-		if (!scene->measured)
-			continue;
-		cli_progress("single ticks of scene %d of %d", i + 1, s->n);
-		time_single(&scene->few, quick ? 1 : RUNS);
-		time_single(&scene->full, quick ? 1 : RUNS);
 	}
 	cli_progress_end();
-}
-
-/* --- for a profiler --- */
-
-/* Run the ticks that are timed, and nothing else, for another program that counts. */
-static void profile(const char *name, bool full)
-{
-	struct scene_argument argument = {0};
-	struct scene scene = {.name = name};
-
-	if (!scene_argument_find(&argument, name))
-		scene_argument_missing(name);
-	/* Both plans are made, as the trajectory depends on the needs of both. */
-	scene.path = argument.path;
-	open_scene(&scene);
-	if (!scene.measured)
-		cli_fail("%s", scene.failed);
-	walk_run(full ? &scene.full.walk : &scene.few.walk);
 }
 
 /* --- report --- */
@@ -530,7 +471,6 @@ static const struct bench_table table = {
 			COLUMN(scene, "left_out", left_out),
 			COLUMN(scene, "libraries", libraries),
 			COLUMN(scene, "tick_ns", few.time.ns.median, "%7.1f", "ns"),
-			COLUMN(scene, "tick_ns_p99", few.p99_ns, "%7.0f", "99 %"),
 			COLUMN(scene, "full_ns", full.time.ns.median, "%7.1f", "full ns"),
 			COLUMN(scene, "times_cheaper", times_cheaper, "%7.2f", "times"),
 			COLUMN(scene, "plan_memory_KiB", few.memory_KiB, "%9.1f",
@@ -561,23 +501,6 @@ static const struct bench_table table = {
 		},
 };
 
-struct left_out {
-	const char *scene, *stage, *why;
-	double ns; /* of the stage that does nothing, in the full pipeline; NaN: not there */
-};
-
-static const struct bench_table left_table = {
-	.key = "left_out",
-	.row_bytes = sizeof(struct left_out),
-	.columns =
-		{
-			COLUMN(left_out, "scene", scene),
-			COLUMN(left_out, "stage", stage),
-			COLUMN(left_out, "why", why),
-			COLUMN(left_out, "ns", ns),
-		},
-};
-
 /* Names with ", " between them; NULL of no list. Takes the list. */
 static json_t *joined(json_t *list)
 {
@@ -598,29 +521,27 @@ static json_t *joined(json_t *list)
 	return json_string(text);
 }
 
-/* Name the stages, and add to those that are left out. */
-static int name_stages(struct scene *s, struct left_out *left)
+static json_t *stages_of(const struct incise_plan *plan)
 {
-	json_t *stages = json_array(), *left_out = json_array();
-	const struct incise_plan *plan = s->few.plan;
+	json_t *names = json_array();
 	const char *name;
-	int n = 0, full;
 
 	for (int i = 0; (name = incise_plan_stage(plan, i)); i++)
-		json_array_append_new(stages, json_string(name));
-	for (; (name = incise_plan_left_out(plan, n, &left[n].why)); n++) {
-		json_array_append_new(left_out, json_string(name));
-		left[n].scene = s->name;
-		left[n].stage = name;
-		full = stage_of(s->full.plan, name);
-		left[n].ns = full < 0 ? NAN : s->full.stage_ns[full];
-	}
-	s->stages = joined(stages);
-	s->left_out = joined(left_out);
-	return n;
+		json_array_append_new(names, json_string(name));
+	return joined(names);
 }
 
-static int complete(struct scene *s, struct left_out *left)
+static json_t *left_out_of(const struct incise_plan *plan)
+{
+	json_t *names = json_array();
+	const char *name, *why;
+
+	for (int i = 0; (name = incise_plan_left_out(plan, i, &why)); i++)
+		json_array_append_new(names, json_string(name));
+	return joined(names);
+}
+
+static void complete(struct scene *s)
 {
 	struct loop_process *process = &s->process;
 	bool same = s->first_difference < 0;
@@ -636,12 +557,13 @@ static int complete(struct scene *s, struct left_out *left)
 	s->files = joined(process->files);
 	s->forces = "-";
 	if (!s->measured)
-		return 0;
+		return;
 	s->forces = same ? "same" : "DIFFER";
 	s->identical = json_boolean(same);
 	if (!same)
 		s->difference = json_integer(s->first_difference);
-	return name_stages(s, left);
+	s->stages = stages_of(s->few.plan);
+	s->left_out = left_out_of(s->few.plan);
 }
 
 static void print_list(const struct bench_run *run, const char *title, json_t *text)
@@ -651,19 +573,12 @@ static void print_list(const struct bench_run *run, const char *title, json_t *t
 	bench_text(run, "  %-9s %s\n", title, names && *names ? names : "none");
 }
 
-/* Its stages, the stages that it leaves out, and their cost in a plan that keeps them. */
-static void print_details(const struct bench_run *run, const struct scene *s,
-			  const struct left_out *left, int n)
+/* The stages of a plan, and what its loop's process holds. */
+static void print_details(const struct bench_run *run, const struct scene *s)
 {
 	bench_text(run, "\n%s\n", s->name);
 	print_list(run, "stages", s->stages);
-	for (int i = 0; i < n; i++) {
-		bench_text(run, "  %-9s %-10s", i ? "" : "left out", left[i].stage);
-		if (isfinite(left[i].ns))
-			bench_text(run, " %4.0f ns  %s\n", left[i].ns, left[i].why);
-		else
-			bench_text(run, " %4s     %s\n", "-", left[i].why);
-	}
+	print_list(run, "left out", s->left_out);
 	if (!s->libraries)
 		return;
 	print_list(run, "devices", s->devices);
@@ -695,24 +610,17 @@ static void print_notes(const struct bench_run *run, const struct scenes *all)
 
 static void report(struct bench_run *run, struct scenes *all)
 {
-	struct left_out *left =
-		cli_alloc((size_t)all->n * INCISE_PLAN_STAGES_MAX + 1, sizeof(*left));
-	int n = 0, of[SCENES_MAX];
-
-	for (int i = 0; i < all->n; i++) {
-		of[i] = complete(&all->scene[i], left + n);
-		n += of[i];
-	}
+	for (int i = 0; i < all->n; i++)
+		complete(&all->scene[i]);
 	bench_text(run,
 		   "a tick of each scene, and of the full pipeline, which has all "
 		   "stages\n%s\n\n",
 		   bench_machine(run, NULL));
 	bench_table(run, &table, all->scene, all->n);
-	bench_rows(run, &left_table, left, n);
 	print_notes(run, all);
-	for (int i = 0; i < all->n; left += of[i++])
+	for (int i = 0; i < all->n; i++)
 		if (all->scene[i].measured)
-			print_details(run, &all->scene[i], left, of[i]);
+			print_details(run, &all->scene[i]);
 }
 
 static void judge(struct bench_run *run, const struct scenes *all)
@@ -754,29 +662,10 @@ static void run_scenes(struct bench_run *run)
 	judge(run, all);
 }
 
-static void run_or_profile(struct bench_run *run)
-{
-	if (!run->profile) {
-		run_scenes(run);
-		return;
-	}
-	if (run->n_operands != 1)
-		cli_usage("--profile is of one scene, got %d", run->n_operands);
-	profile(run->operands[0], !strcmp(run->profile, "full"));
-	exit(0);
-}
-
 const struct bench bench_scenes = {
 	.name = "scenes",
 	.operands = "[SCENE...]",
 	.summary = "disabled stages of each scene, and the time saved",
 	.n_operands = SCENES_MAX,
-	.takes_profile = true,
-	.run = run_or_profile,
-	.plots = {{.script = text_scenes_gp,
-		   .width = 900,
-		   .height = 46,
-		   .down = "name",
-		   .margin = 180,
-		   .data = {&table, "", "measured=1"}}},
+	.run = run_scenes,
 };

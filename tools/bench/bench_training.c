@@ -90,20 +90,14 @@ static void make_unseen(double row[UNSEEN][3])
 
 /* --- rows --- */
 
-static const char baselines[] = "baselines", classic[] = "classic ANFIS by epochs",
-		  ours[] = "the default of incise", scikit_learn[] = "scikit-learn";
-
-enum fit { FIT_MEAN, FIT_LINEAR, FIT_KNN, FIT_MODEL, FIT_CHOSEN };
-
 /* Norms of the error on unseen cuts, N. */
 enum norm { NORM_RMSE, NORM_MAX, NORM_MEAN, NORMS };
 
 struct row {
 	char name[40];
-	const char *kind;
-	enum fit fit;
+	bool classic, chosen; /* chosen: the training selects its grid */
 	int epochs, mfs[2], rules;
-	bool is_reference;
+	bool is_baseline, is_reference;
 	const struct data *timed;
 
 	double norm[NORMS][SEEDS];
@@ -128,13 +122,12 @@ static struct row *add(struct training *t, struct row row)
 	return &t->row[t->n++];
 }
 
-static void add_grid(struct training *t, const char *kind, int epochs, int a, int b,
+static void add_grid(struct training *t, bool classic, int epochs, int a, int b,
 		     const char *suffix)
 {
-	struct row row = {
-		.kind = kind, .fit = FIT_MODEL, .epochs = epochs, .mfs = {a, b}};
+	struct row row = {.classic = classic, .epochs = epochs, .mfs = {a, b}};
 
-	snprintf(row.name, sizeof(row.name), "%s%s", kind == ours ? "default" : "classic",
+	snprintf(row.name, sizeof(row.name), "%s%s", classic ? "classic" : "default",
 		 suffix);
 	add(t, row);
 }
@@ -145,24 +138,18 @@ static void add_all(struct training *t, bool quick)
 	static const int grids[][2] = {{3, 3}, {2, 2}, {4, 3}};
 	char suffix[20];
 
-	add_grid(t, classic, EPOCHS, 5, 4, "");
-	add_grid(t, ours, EPOCHS, 5, 4, "");
-	add(t, (struct row){.name = "mean", .kind = baselines, .fit = FIT_MEAN});
-	add(t, (struct row){.name = "linear", .kind = baselines, .fit = FIT_LINEAR});
-	add(t, (struct row){.name = "knn", .kind = baselines, .fit = FIT_KNN});
+	add_grid(t, true, EPOCHS, 5, 4, "");
+	add_grid(t, false, EPOCHS, 5, 4, "");
 	for (int i = 0; i < N(epochs); i++) {
 		snprintf(suffix, sizeof(suffix), "_%d", epochs[i]);
-		add_grid(t, classic, epochs[i], 5, 4, suffix);
+		add_grid(t, true, epochs[i], 5, 4, suffix);
 	}
 	for (int i = 0; i < (quick ? 1 : N(grids)); i++) {
 		snprintf(suffix, sizeof(suffix), "_%dx%d", grids[i][0], grids[i][1]);
-		add_grid(t, classic, EPOCHS, grids[i][0], grids[i][1], suffix);
-		add_grid(t, ours, EPOCHS, grids[i][0], grids[i][1], suffix);
+		add_grid(t, true, EPOCHS, grids[i][0], grids[i][1], suffix);
+		add_grid(t, false, EPOCHS, grids[i][0], grids[i][1], suffix);
 	}
-	add(t, (struct row){.name = "default_chosen",
-			    .kind = ours,
-			    .fit = FIT_CHOSEN,
-			    .epochs = EPOCHS});
+	add(t, (struct row){.name = "default_chosen", .chosen = true, .epochs = EPOCHS});
 }
 
 /* --- methods --- */
@@ -181,11 +168,11 @@ static struct incise_model *train(const struct row *row, const struct data *data
 	struct incise_model *model;
 
 	incise_train_options_init(&options);
-	options.classic = row->kind == classic;
+	options.classic = row->classic;
 	options.epochs = row->epochs;
 	options.groups = data->group;
 	options.ranges = variables;
-	if (row->fit == FIT_CHOSEN)
+	if (row->chosen)
 		model = incise_train_start(&pairs, names, INCISE_MF_GAUSS, mfs, &options,
 					   &err);
 	else
@@ -197,116 +184,22 @@ static struct incise_model *train(const struct row *row, const struct data *data
 	return model;
 }
 
-/* A plane through the pairs: three normal equations, which need no pivots. */
-static void fit_linear(const struct data *data, double p[3])
-{
-	double m[3][4] = {{0}};
-
-	for (int i = 0; i < PAIRS; i++) {
-		const double x[4] = {1, data->row[i][0], data->row[i][1],
-				     data->row[i][2]};
-
-		for (int r = 0; r < 3; r++)
-			for (int c = 0; c < 4; c++)
-				m[r][c] += x[r] * x[c];
-	}
-	for (int i = 0; i < 3; i++)
-		for (int r = 0; r < 3; r++) {
-			double share = m[r][i] / m[i][i];
-
-			for (int c = i; r != i && c < 4; c++)
-				m[r][c] -= share * m[i][c];
-		}
-	for (int i = 0; i < 3; i++)
-		p[i] = m[i][3] / m[i][i];
-}
-
-static int fit_k(const struct data *data)
-{
-	struct incise_pairs pairs = {data->row[0], PAIRS, 2};
-	struct incise_baselines found;
-	struct incise_error err = {0};
-
-	if (incise_baselines(&pairs, data->group, &pairs, NULL, NULL, &found, &err))
-		cli_fail_with(&err);
-	return found.k;
-}
-
-/* Mean of the k nearest; both inputs are spread evenly, so their ranges are the scales. */
-static double nearest(const struct data *data, int k, const double *x)
-{
-	bool taken[PAIRS] = {false};
-	double sum = 0;
-
-	for (int n = 0; n < k; n++) {
-		double best = INFINITY;
-		int at = 0;
-
-		for (int i = 0; i < PAIRS; i++) {
-			double away = hypot((x[0] - data->row[i][0]) / DEPTH_mm,
-					    (x[1] - data->row[i][1]) / SPEED_mm_s);
-
-			if (!taken[i] && away < best) {
-				best = away;
-				at = i;
-			}
-		}
-		taken[at] = true;
-		sum += data->row[at][2];
-	}
-	return sum / k;
-}
-
-/* The result of a method: a model, a plane or a number of neighbours. */
-struct learnt {
-	struct incise_model *model;
-	double p[3];
-	int k;
-};
-
-static struct learnt learn(const struct row *row, const struct data *data)
-{
-	struct learnt learnt = {0};
-
-	if (row->fit == FIT_MEAN)
-		for (int i = 0; i < PAIRS; i++)
-			learnt.p[0] += data->row[i][2] / PAIRS;
-	else if (row->fit == FIT_LINEAR)
-		fit_linear(data, learnt.p);
-	else if (row->fit == FIT_KNN)
-		learnt.k = fit_k(data);
-	else
-		learnt.model = train(row, data);
-	return learnt;
-}
-
-static double predict(const struct learnt *learnt, const struct data *data,
-		      const double *x)
-{
-	if (learnt->model)
-		return incise_model_eval(learnt->model, x, NULL);
-	if (learnt->k)
-		return nearest(data, learnt->k, x);
-	return learnt->p[0] + learnt->p[1] * x[0] + learnt->p[2] * x[1];
-}
-
 /* --- measurement --- */
 
 static void measure_error(const struct training *t, struct row *row, int seed)
 {
-	const struct data *data = &t->data[seed];
-	struct learnt learnt = learn(row, data);
+	struct incise_model *model = train(row, &t->data[seed]);
 	double square = 0, sum = 0, largest = 0;
 
 	for (int i = 0; i < UNSEEN; i++) {
-		double error =
-			fabs(predict(&learnt, data, t->unseen[i]) - t->unseen[i][2]);
+		const double *pair = t->unseen[i];
+		double error = fabs(incise_model_eval(model, pair, NULL) - pair[2]);
 
 		square += error * error;
 		sum += error;
 		largest = fmax(largest, error);
 	}
-	incise_model_free(learnt.model);
+	incise_model_free(model);
 	row->norm[NORM_RMSE][seed] = sqrt(square / UNSEEN);
 	row->norm[NORM_MAX][seed] = largest;
 	row->norm[NORM_MEAN][seed] = sum / UNSEEN;
@@ -316,7 +209,7 @@ static void run_timed(void *context)
 {
 	const struct row *row = context;
 
-	incise_model_free(learn(row, row->timed).model);
+	incise_model_free(train(row, row->timed));
 }
 
 static void measure(struct training *t)
@@ -326,6 +219,36 @@ static void measure(struct training *t)
 		for (int s = 0; s < t->seeds; s++)
 			measure_error(t, &t->row[i], s);
 		t->row[i].timed = &t->data[0];
+	}
+}
+
+static struct row *add_baseline(struct training *t, const char *name)
+{
+	struct row *row = add(t, (struct row){.is_baseline = true});
+
+	snprintf(row->name, sizeof(row->name), "%s", name);
+	harness_time_of(NULL, 0, &row->time);
+	return row;
+}
+
+/* The library's, which incise train prints next to each model. */
+static void add_baselines(struct training *t)
+{
+	struct row *mean = add_baseline(t, "mean"), *linear = add_baseline(t, "linear"),
+		   *knn = add_baseline(t, "knn");
+	const struct incise_pairs unseen = {t->unseen[0], UNSEEN, 2};
+
+	for (int s = 0; s < t->seeds; s++) {
+		const struct incise_pairs pairs = {t->data[s].row[0], PAIRS, 2};
+		struct incise_baselines found;
+		struct incise_error err = {0};
+
+		if (incise_baselines(&pairs, t->data[s].group, &unseen, NULL, NULL,
+				     &found, &err))
+			cli_fail_with(&err);
+		mean->norm[NORM_RMSE][s] = found.mean;
+		linear->norm[NORM_RMSE][s] = found.linear;
+		knn->norm[NORM_RMSE][s] = found.knn;
 	}
 }
 
@@ -409,8 +332,7 @@ static void add_references(struct training *t)
 	json_t *answer = ask_all(t, why, sizeof(why));
 
 	for (int i = 0; i < N(names); i++) {
-		struct row *row =
-			add(t, (struct row){.kind = scikit_learn, .is_reference = true});
+		struct row *row = add(t, (struct row){.is_reference = true});
 		double ns[SEEDS];
 
 		snprintf(row->name, sizeof(row->name), "%s", names[i]);
@@ -455,8 +377,7 @@ static const struct bench_table rows_table = {
 		    COLUMN(row, "max_error_N_max", spread[NORM_MAX].max),
 		    COLUMN(row, "mean_abs_error_N", spread[NORM_MEAN].median, "%10.4f",
 			   "mean |.|/N"),
-		    COLUMN(row, "peer", is_reference), COLUMN(row, "failed", failed),
-		    COLUMN(row, "kind", kind, .data = true)},
+		    COLUMN(row, "peer", is_reference), COLUMN(row, "failed", failed)},
 	.metrics = {METRIC(TIME, row, time, "ms", "{name}", "peer=0"),
 		    METRIC(EXACT, row, spread[NORM_RMSE].median, "N",
 			   "{name} error on unseen cuts", "peer=0")},
@@ -474,13 +395,16 @@ static void run(struct bench_run *run)
 	add_all(t, run->quick);
 	measure(t);
 	bench_times(&rows_table, t->row, t->n, run_timed, 1, t->repeats);
+	add_baselines(t);
 	add_references(t);
 	for (int i = 0; i < t->n; i++) {
 		struct row *row = &t->row[i];
 		int n = *row->failed ? 0 : t->seeds;
 
 		for (int k = 0; k < NORMS; k++)
-			harness_spread(row->norm[k], n, &row->spread[k]);
+			harness_spread(row->norm[k],
+				       row->is_baseline && k != NORM_RMSE ? 0 : n,
+				       &row->spread[k]);
 	}
 	bench_values(run, "{si si si si}", "pairs", PAIRS, "epochs", EPOCHS, "repeats",
 		     t->repeats, "seeds", t->seeds);
@@ -496,8 +420,4 @@ const struct bench bench_training = {
 	.name = "training",
 	.summary = "error on unseen cuts over the training time",
 	.run = run,
-	.plots = {{.script = text_training_gp,
-		   .width = 1000,
-		   .height = 720,
-		   .data = {&rows_table, "kind", "failed="}}},
 };

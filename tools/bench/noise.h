@@ -8,12 +8,6 @@
 #include <stdint.h>
 #include "../../lib/base/random.h"
 
-/* 0 … 1, without 1. */
-static inline double noise_uniform(uint64_t *state)
-{
-	return (double)(incise_random_next(state) >> 11) * 0x1p-53;
-}
-
 /* 0 … 1, without 1, by Knuth's linear congruential generator. */
 static inline double lcg_uniform(uint64_t *state)
 {

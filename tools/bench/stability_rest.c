@@ -20,6 +20,7 @@
 #include "../../lib/base/vector.h"
 #include "../cli/scene_argument.h"
 #include "../cli/stopwatch.h"
+#include "closed_loop.h"
 #include "sheet.h"
 #include "stability.h"
 
@@ -35,7 +36,7 @@
 #define FORCE_N 4.0 /* the scene's limit */
 
 /* The whole group, or its file's name. */
-static const char *const shapes[LEAN_SHAPES][2] = {
+static const char *const shapes[][2] = {
 	{"plane", ""},
 	{"sphere", "surface = { kind = \"sphere\"; centre_mm = [0.0, 0.0, -40.0]; "
 		   "radius_mm = 40.0; };\n"},
@@ -49,7 +50,7 @@ static const char *const shapes[LEAN_SHAPES][2] = {
 static const struct force {
 	const char *name, *tissue, *rest;
 	bool inserts, model;
-} forces[LEAN_FORCES + 1] = {
+} forces[] = {
 	{"wall", "reaction_N_mm = 1.0;", ""},
 	{"averaged", "reaction_N_mm = 1.0;", "effects = { average_ticks = 16; };\n"},
 	{"damper", "reaction_N_mm = 1.0; damping_N_s_mm = 0.01;", ""},
@@ -67,7 +68,8 @@ static const struct force {
 static char *liver, *given; /* files of models */
 static struct memory_file files[N(shapes)];
 
-void lean_files(void)
+/* Files of shapes and models, before all plans. */
+static void make_files(void)
 {
 	liver = cli_text("%s/liver.fis", scene_argument_shipped());
 	for (int i = 0; i < N(shapes); i++)
@@ -76,9 +78,15 @@ void lean_files(void)
 				sheet_of_waves(CELLS, !strcmp(shapes[i][0], "heights"));
 }
 
-struct incise_plan *lean_plan(const struct lean_case *lean, double gain,
-			      double damping_N_s_mm, struct incise_scene **scene,
-			      struct incise_error *err)
+struct lean_case {
+	int shape, force;
+	struct closed_loop loop; /* the device, the tracker and the actuator */
+};
+
+/* Its plan, on a device of that damping, or NULL with the reason. */
+static struct incise_plan *lean_plan(const struct lean_case *lean, double gain,
+				     double damping_N_s_mm, struct incise_scene **scene,
+				     struct incise_error *err)
 {
 	const struct force *force = &forces[lean->force];
 	struct closed_loop loop = lean->loop;
@@ -116,17 +124,25 @@ struct incise_plan *lean_plan(const struct lean_case *lean, double gain,
 static const struct {
 	bool free, beside, held;
 	double askew, along_mm_s;
-} ways[LEAN_WAYS] = {{.along_mm_s = 0},
-		     {.along_mm_s = 15},
-		     {.free = true},
-		     {.free = true, .held = true, .askew = 0.25},
-		     {.free = true, .held = true, .beside = true}};
+} ways[] = {{.along_mm_s = 0},
+	    {.along_mm_s = 15},
+	    {.free = true},
+	    {.free = true, .held = true, .askew = 0.25},
+	    {.free = true, .held = true, .beside = true}};
 
 /* A light hand, along the skin. */
 static const struct closed_loop_hand hand = {0.14, 0.0016, 0.034};
 
-void lean_all(struct incise_plan *plan, const struct lean_case *lean, int sizes,
-	      bool first, struct lean_end *most)
+/* The widest swing of all leans, and the lean. */
+struct lean_end {
+	double swing_mm, shaken_mm; /* shaken: by noise */
+	struct closed_loop loop;
+};
+
+/* Lean with so many forces in each way, or until the first that swings. The swing is NaN where all
+ * runs left the surface. */
+static void lean_all(struct incise_plan *plan, const struct lean_case *lean, int sizes,
+		     bool first, struct lean_end *most)
 {
 	struct incise_touch place[2];
 	struct closed_loop_end end;
@@ -297,13 +313,9 @@ static const struct closed_loop devices[] = {
 /* Quick: each force once, on one surface of all in turn. */
 static void add_cases(const struct bench_run *run)
 {
-	lean_files();
+	make_files();
 	given = run->n_operands ? run->operands[0] : NULL;
 	sizes = run->quick ? 4 : 10;
-	for (int i = 0; i < N(shapes); i++)
-		if (!shapes[i][1])
-			files[i] =
-				sheet_of_waves(CELLS, !strcmp(shapes[i][0], "heights"));
 	for (int f = 0; f < N(forces) - !given; f++)
 		for (int s = 0; s < N(shapes); s++)
 			for (int d = 0; d < (run->quick ? 1 : N(devices)); d++) {

@@ -25,58 +25,10 @@ struct tick_stroke {
 	double clock_ns;
 };
 
-/* The way of each cut: above its place, down, along, up. */
-#define CUT_S 0.8
-#define CUT_MM 10.0
-#define CUT_DEPTH_MM 2.0
-#define CUT_APART_MM 2.5
-#define CUT_ABOVE_MM 4.0
-
-static void cut_pose(const struct stroke *stroke, int cut, int cuts, double t_s,
-		     double position_mm[3])
-{
-	const double *n = stroke->top.normal, *along = stroke->along;
-	double phase = 4 * t_s / CUT_S, out_mm, along_mm, aside_mm;
-
-	out_mm = phase < 1   ? CUT_ABOVE_MM
-		 : phase < 2 ? CUT_ABOVE_MM - (phase - 1) * (CUT_ABOVE_MM + CUT_DEPTH_MM)
-		 : phase < 3 ? -CUT_DEPTH_MM
-			     : (phase - 3) * (CUT_ABOVE_MM + CUT_DEPTH_MM) - CUT_DEPTH_MM;
-	along_mm = (fmin(fmax(phase - 2, 0), 1) - 0.5) * CUT_MM;
-	aside_mm = (cut - (cuts - 1) / 2.0) * CUT_APART_MM;
-	for (int i = 0; i < 3; i++) {
-		int j = (i + 1) % 3, k = (i + 2) % 3;
-
-		position_mm[i] = stroke->top.point_mm[i] + out_mm * n[i] +
-				 along_mm * along[i] +
-				 aside_mm * (n[j] * along[k] - n[k] * along[j]);
-	}
-}
-
-/* The blade makes cuts next to each other. */
-static void make_cuts(struct tick_stroke *timed, int cuts)
-{
-	double pose_s = 1 / incise_tracker_station_hz(timed->tracker), next_s = 0;
-	struct incise_tracker_sample sample = {.quaternion = {1}, .status = ' '};
-	struct incise_tick tick;
-
-	incise_plan_set_tool(timed->plan, INCISE_TOOL_BLADE);
-	while ((double)timed->t_ns * 1e-9 < cuts * CUT_S) {
-		timed->t_ns += timed->period_ns;
-		for (; next_s <= (double)timed->t_ns * 1e-9; next_s += pose_s) {
-			sample.t_ns = timed->t_ns;
-			cut_pose(&timed->stroke, (int)(next_s / CUT_S), cuts,
-				 fmod(next_s, CUT_S), sample.position_mm);
-			incise_plan_feed(timed->plan, &sample, 1);
-		}
-		incise_plan_tick(timed->plan, timed->t_ns, &tick);
-	}
-}
-
 struct tick_stroke *tick_stroke_new(const struct incise_scene *scene,
 				    struct incise_plan *plan,
 				    const struct incise_tracker_info *tracker,
-				    enum incise_tool tool, int cuts)
+				    enum incise_tool tool)
 {
 	struct tick_stroke *timed = calloc(1, sizeof(*timed));
 	struct incise_error err = {0};
@@ -91,11 +43,7 @@ struct tick_stroke *tick_stroke_new(const struct incise_scene *scene,
 	if (!timed->plan)
 		cli_fail_with(&err);
 	stroke_begin(&timed->stroke, timed->plan, timed->tracker);
-	if (cuts)
-		make_cuts(timed, cuts);
 	incise_plan_set_tool(timed->plan, tool);
-	timed->pose = (int64_t)((double)timed->t_ns * 1e-9 *
-				incise_tracker_station_hz(timed->tracker));
 	stroke_pose(&timed->stroke, timed->pose, &timed->sample);
 	return timed;
 }
@@ -165,9 +113,9 @@ static bool has_insertion(const struct incise_plan *plan)
 /* The cost with one tool. Returns whether there is another one. */
 static bool cost_with(const struct incise_scene *scene, struct incise_plan *plan,
 		      const struct incise_tracker_info *tracker, enum incise_tool tool,
-		      int cuts, int ticks, double *times, struct tick_cost *cost)
+		      int ticks, double *times, struct tick_cost *cost)
 {
-	struct tick_stroke *timed = tick_stroke_new(scene, plan, tracker, tool, cuts);
+	struct tick_stroke *timed = tick_stroke_new(scene, plan, tracker, tool);
 	bool insertion = has_insertion(timed->plan);
 	double own = timed->clock_ns;
 	int n;
@@ -199,7 +147,7 @@ static bool cost_with(const struct incise_scene *scene, struct incise_plan *plan
 }
 
 void tick_cost(const struct incise_scene *scene, struct incise_plan *plan,
-	       const struct incise_tracker_info *tracker, int cuts, double seconds,
+	       const struct incise_tracker_info *tracker, double seconds,
 	       struct tick_cost *cost)
 {
 	int ticks = (int)fmax(seconds * incise_scene_rate_hz(scene), 1000);
@@ -209,12 +157,10 @@ void tick_cost(const struct incise_scene *scene, struct incise_plan *plan,
 	if (!times)
 		cli_fail("out of memory for the times of %d ticks", ticks);
 	*cost = (struct tick_cost){0};
-	if (cost_with(scene, plan, tracker, INCISE_TOOL_BLADE, cuts, ticks, times,
-		      cost)) {
+	if (cost_with(scene, plan, tracker, INCISE_TOOL_BLADE, ticks, times, cost)) {
 		struct tick_cost blade = *cost;
 
-		cost_with(scene, NULL, tracker, INCISE_TOOL_TUBE, cuts, ticks, times,
-			  &tube);
+		cost_with(scene, NULL, tracker, INCISE_TOOL_TUBE, ticks, times, &tube);
 		if (tube.median > blade.median)
 			*cost = tube;
 		for (int k = 0; k < INCISE_PLAN_STAGES_MAX; k++)

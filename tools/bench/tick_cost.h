@@ -26,17 +26,16 @@ struct tick_cost {
  * times are NaN. Poses come as of the tracker, or with NULL of one of 120 Hz that is 4.2 ms late.
  *
  * @plan  NULL, or one of this scene without a rig, before its first tick: to check it once more takes time
- * @cuts that the blade makes before, 10 mm long and next to each other; 0: none
  */
 void tick_cost(const struct incise_scene *scene, struct incise_plan *plan,
-	       const struct incise_tracker_info *tracker, int cuts, double seconds,
+	       const struct incise_tracker_info *tracker, double seconds,
 	       struct tick_cost *cost);
 
 /* The stroke by parts, for times that take turns with others. Fails the program. */
 struct tick_stroke *tick_stroke_new(const struct incise_scene *scene,
 				    struct incise_plan *plan,
 				    const struct incise_tracker_info *tracker,
-				    enum incise_tool tool, int cuts);
+				    enum incise_tool tool);
 
 /* Mean of the middle half of so many ticks more, ns, times in @ns, an array of @ticks; NaN without contact. */
 double tick_stroke_ns(struct tick_stroke *timed, int ticks, double *ns);

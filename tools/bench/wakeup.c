@@ -409,45 +409,42 @@ static void close_run(struct run *run)
 /* --- both together --- */
 
 /* NaN if the wake-ups are too few for it. */
-static double percentile(const struct lateness *l, double q)
+static double percentile(const uint64_t *bins, uint64_t ticks, double q)
 {
-	return stopwatch_resolves(l->ticks, q) ? incise_loop_quantile(l->bins, q) : NAN;
+	return stopwatch_resolves(ticks, q) ? incise_loop_quantile(bins, q) : NAN;
 }
 
 static struct lateness lateness_of(const uint64_t *bins, double max_us)
 {
-	struct lateness l = {
-		.max = max_us,
-		.bins = cli_alloc(INCISE_LOOP_BINS, sizeof(*bins)),
-	};
+	struct lateness l = {.max = max_us};
+	int least = 0;
 
-	memcpy(l.bins, bins, INCISE_LOOP_BINS * sizeof(*bins));
-	while (l.min < INCISE_LOOP_BINS - 1 && !bins[(int)l.min])
-		l.min++;
+	while (least < INCISE_LOOP_BINS - 1 && !bins[least])
+		least++;
 	for (int i = 0; i < INCISE_LOOP_BINS; i++)
 		l.ticks += bins[i];
-	l.median = percentile(&l, 0.5);
-	l.p99 = percentile(&l, 0.99);
-	l.p999 = percentile(&l, 0.999);
-	l.p9999 = percentile(&l, 0.9999);
-	l.json = json_pack("{sf so so so so sf sI}", "min", l.min, "median",
+	l.median = percentile(bins, l.ticks, 0.5);
+	l.p99 = percentile(bins, l.ticks, 0.99);
+	l.p999 = percentile(bins, l.ticks, 0.999);
+	l.json = json_pack("{sf so so so so sf sI}", "min", (double)least, "median",
 			   json_number(l.median), "p99", json_number(l.p99), "p999",
-			   json_number(l.p999), "p9999", json_number(l.p9999), "max",
-			   l.max, "ticks", (json_int_t)l.ticks);
+			   json_number(l.p999), "p9999",
+			   json_number(percentile(bins, l.ticks, 0.9999)), "max", l.max,
+			   "ticks", (json_int_t)l.ticks);
 	return l;
 }
 
 /* By ranks, as if wake-ups were independent of each other, for one run alone. */
-static struct harness_spread quantile_of(const struct lateness *l, double q)
+static struct harness_spread quantile_of(const uint64_t *bins, uint64_t ticks, double q)
 {
-	double off = 1.96 * sqrt(q * (1 - q) / fmax((double)l->ticks, 1));
+	double off = 1.96 * sqrt(q * (1 - q) / fmax((double)ticks, 1));
 
-	if (!stopwatch_resolves(l->ticks, q))
+	if (!stopwatch_resolves(ticks, q))
 		return HARNESS_SPREAD_NONE;
 	return (struct harness_spread){
-		.median = incise_loop_quantile(l->bins, q),
-		.low = incise_loop_quantile(l->bins, fmax(q - off, 0)),
-		.high = incise_loop_quantile(l->bins, fmin(q + off, 1)),
+		.median = incise_loop_quantile(bins, q),
+		.low = incise_loop_quantile(bins, fmax(q - off, 0)),
+		.high = incise_loop_quantile(bins, fmin(q + off, 1)),
 	};
 }
 
@@ -478,23 +475,7 @@ static double blame(const struct run *run)
 	return (double)(machine < run->stats.skipped ? machine : run->stats.skipped);
 }
 
-/* A loop that fails fails the program. */
-/* The title of a row's histogram: 99.9 %, or the largest of samples that do not resolve that. */
-static void name_wakeups(struct wakeup *row)
-{
-	bool resolved = !isnan(row->loop.p999) &&
-			(row->no_cyclictest || !isnan(row->cyclictest.p999));
-	const char *name = resolved ? "99.9 %" : "largest";
-	double loop_us = resolved ? row->loop.p999 : row->loop.max;
-	double peer_us = resolved ? row->cyclictest.p999 : row->cyclictest.max;
-
-	if (row->no_cyclictest)
-		snprintf(row->title, sizeof(row->title), "%s: %.0f µs", name, loop_us);
-	else
-		snprintf(row->title, sizeof(row->title),
-			 "%s: %.0f µs, cyclictest %.0f µs", name, loop_us, peer_us);
-}
-
+/* A loop that fails ends the program. */
 static void run_both(struct run *run, const char *scene, struct wakeup *row)
 {
 	struct cyclictest *c = &run->cyclictest;
@@ -515,8 +496,8 @@ static void run_both(struct run *run, const char *scene, struct wakeup *row)
 		cli_fail_with(&run->err);
 	row->loop =
 		lateness_of(run->stats.lateness_us, run->stats.lateness_max_ns * 1e-3);
-	row->median = quantile_of(&row->loop, 0.5);
-	row->p999 = quantile_of(&row->loop, 0.999);
+	row->median = quantile_of(run->stats.lateness_us, row->loop.ticks, 0.5);
+	row->p999 = quantile_of(run->stats.lateness_us, row->loop.ticks, 0.999);
 	row->tick_us = incise_loop_quantile(run->stats.tick_100ns, 0.5) / 10;
 	row->tick_max_us = run->stats.tick_max_ns * 1e-3;
 	row->skipped = run->stats.skipped;
@@ -525,7 +506,6 @@ static void run_both(struct run *run, const char *scene, struct wakeup *row)
 		row->ratio = row->loop.p999 / row->cyclictest.p999;
 		row->machine = blame(run);
 	}
-	name_wakeups(row);
 }
 
 static void measure_wakeup(const char *scene, enum load_kind load,
@@ -574,11 +554,6 @@ struct incise_realtime *wakeup_realtime(int cpu)
 	return incise_realtime_new(&setup, &ignored);
 }
 
-const char *wakeups_policy(bool realtime)
-{
-	return realtime ? "fifo" : "other";
-}
-
 /* A load takes seconds to begin and to end. */
 static bool wanted(enum load_kind load, enum load_kind only, bool quick, int rate)
 {
@@ -591,7 +566,7 @@ void wakeups_measure(const char *scene, struct memory_file (*own)(double rate_hz
 		     enum load_kind only, bool quick, double seconds,
 		     struct wakeups *wakeups)
 {
-	static const struct lateness none = {NAN, NAN, NAN, NAN, NAN, NAN, 0, NULL, NULL};
+	static const struct lateness none = {NAN, NAN, NAN, NAN, 0, NULL};
 	const double rates_hz[] = {scene ? scene_rate(scene) : 1000, 4000};
 	struct incise_realtime *realtime;
 

@@ -19,10 +19,9 @@ extern const char *const load_names[LOADS + 1]; /* end with NULL */
 
 /* Wake-ups of one program, us; NaN: not measured. Quantiles are upper edges of bins. */
 struct lateness {
-	double min, median, p99, p999, p9999, max;
+	double median, p99, p999, max;
 	uint64_t ticks;
-	uint64_t *bins; /* INCISE_LOOP_BINS of 1 us, the last one all above; or NULL */
-	json_t *json;	/* {"min", "median", …, "ticks"}, or null */
+	json_t *json; /* {"min", "median", …, "ticks"}, or null */
 };
 
 /* Its memory is never freed. */
@@ -39,7 +38,6 @@ struct wakeup {
 	double tick_us; /* median after each sleep, with cold caches */
 	double tick_max_us;
 	double frames_hz; /* drawn meanwhile by the view, or NaN */
-	char title[64];	  /* of a plot: the 99.9 % */
 };
 
 #define WAKEUPS_MAX (2 * LOADS)
@@ -57,9 +55,6 @@ struct wakeups {
 void wakeups_measure(const char *scene, struct memory_file (*own)(double rate_hz),
 		     enum load_kind only, bool quick, double seconds,
 		     struct wakeups *wakeups);
-
-/* "fifo" or "other". */
-const char *wakeups_policy(bool realtime);
 
 /* As incise haptic asks for it, with the CPU; NULL where it is not granted. */
 struct incise_realtime *wakeup_realtime(int cpu);

@@ -19,6 +19,7 @@ import time
 LINES = 20  # of warnings that are kept
 LINE_CHARACTERS = 600
 OWN_PROGRAM = {"view"}
+DRAWN = {"precision", "stability"}
 
 stopped = []
 
@@ -74,7 +75,7 @@ def measure(name, job, folder, title):
         why = f"{os.path.basename(program)} is missing: it is built if its libraries are installed"
         return "left out", why, [], None
     command = [program] + ([] if own else [name]) + ["--json"] + (["--quick"] if job["quick"] else [])
-    if shutil.which("gnuplot"):
+    if name in DRAWN and shutil.which("gnuplot"):
         command += ["-o", os.path.join(folder, "plots", name)]
     with open(data, "wb") as out, open(os.memfd_create("said"), "w+b") as said:
         status = run(command, out, said, title)
