@@ -359,36 +359,6 @@ TEST(test_jang_example_2)
 	incise_model_free(model);
 }
 
-/* A plane lies within reach of any first-order model: both ways must find it. */
-TEST(test_plane_is_learnt)
-{
-	double rows[400 * 3];
-	const int mfs[] = {3, 2};
-	const double min[] = {0, 10}, max[] = {20, 60};
-	struct incise_pairs pairs = {rows, 400, 2};
-
-	for (int i = 0; i < 400; i++) {
-		double *row = rows + 3 * i;
-
-		row[0] = i % 20 * 20.0 / 19;
-		row[1] = 10 + i / 20 * 50.0 / 19;
-		row[2] = 0.3 + 0.1 * row[0] - 0.02 * row[1];
-	}
-	for (int classic = 0; classic < 2; classic++) {
-		struct incise_model *model = grid(2, min, max, mfs, INCISE_MF_GAUSS);
-
-		incise_train_options_init(&options);
-		options.classic = classic;
-		options.epochs = 5;
-		assert_int_equal(
-			incise_train(model, &pairs, NULL, &options, &report, NULL), 0);
-		/* What remains is the ridge's pull: at most 1e-4 of squared scaled
-		 * coefficients of order 1 against 400 pairs, output spread 0.7. */
-		assert_true(report.train_rmse < 1e-3);
-		incise_model_free(model);
-	}
-}
-
 /*
  * Two cuts with different offsets, and noise: choosing the ridge by single rows would see
  * no harm in following each cut; the default mode must not do worse on a third cut than
