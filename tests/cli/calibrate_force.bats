@@ -83,39 +83,11 @@ made_weights() {
 	[ "${lines[-1]}" = "wrote calibration.conf: in its history only, the previous values stay active" ]
 }
 
-@test "outliers up to one in ten are listed, more are refused" {
-	made_weights "if (i == 9 || i == 20) r += 400" >w.csv
-	run -0 incise calibrate force --from w.csv -o r
-	[[ "$output" == *"26 of 28 used"*"2 outliers"* ]]
-	[[ "$output" == *"pair 9 "*"outlier"*"pair 20 "*"outlier"* ]]
-	cp calibration.conf before
-	made_weights "if (i % 7 == 3) r += 400 + 50 * s" >w.csv
-	run --separate-stderr incise calibrate force --from w.csv -o r --overwrite
-	failed_with "refused" "of 28 pairs are outliers" "calibration.conf stays as it was"
-	cmp calibration.conf before
-	grep -q "^refused: " r/report.txt
-	[ "$(grep -c 'outlier$' r/report.txt)" = 4 ]
-}
-
 @test "a weight beyond the converter's end does not hold up those after it" {
 	# 5 V less 180 mV at 1260 mV/N are 3.83 N: 500 g are too much
 	incise calibrate force --rig sim:clock=simulated,force_mV_N=1260 \
 		--weights 0,100g,200g,300g,500g --repeat 3 >out 2>err
 	grep -q 'pairs  *18 of 21 used, 4 loads, 3 series; 3 saturated, 0 outliers' out
-}
-
-@test "saturated readings are left out and named" {
-	made_weights "if (r > 3000) r = 3000" >w.csv
-	for range in "" "--input-range 0,3000"; do
-		# shellcheck disable=SC2086
-		run -0 incise calibrate force --from w.csv --dry-run $range
-		[[ "$output" == *"8 saturated, 0 outliers"* ]]
-		[[ "$output" == *"pair 6 "*"saturated"* ]]
-	done
-	# a rig whose converter ends at 3.89 N: 400 g are beyond
-	run -0 --separate-stderr incise calibrate force --rig sim:clock=simulated --dry-run \
-		--weights 100g,200g,300g,400g --duration 500ms </dev/null
-	[[ "$output" == *"3 saturated"* ]]
 }
 
 # bats test_tags=check

@@ -47,14 +47,6 @@ until_it_runs() {
 	[ "$n" -le 15001 ]
 }
 
-@test "capture on the virtual rig ends with its cuts" {
-	incise capture -o a.rec --rig $quick,cut_s=1,pause_s=0.6
-	# 14 cuts of 1 s, 15 pauses of 0.6 s: 23 s
-	n=$(ask a.rec 'SELECT count(*) FROM force')
-	[ "$n" -ge 230000 ]
-	[ "$n" -le 230001 ]
-}
-
 # bats test_tags=check
 @test "capture reports as JSON" {
 	incise capture -o a.rec --rig $quick --duration 2s --json >report.json
@@ -66,14 +58,6 @@ until_it_runs() {
 	[ "$(key report.json lost)" = 0 ]
 	[ "$(key report.json clipped)" = 0 ]
 	[[ "$(key report.json zero_mV)" == 1[78]?.* ]]
-}
-
-@test "capture of the same seed records the same samples" {
-	incise capture -o a.rec --rig $quick,seed=7 --duration 3s
-	incise capture -o b.rec --rig $quick,seed=7 --duration 3s
-	for table in force tracker depth; do
-		cmp <(ask a.rec "SELECT * FROM $table") <(ask b.rec "SELECT * FROM $table")
-	done
 }
 
 # SIGHUP comes twice of a terminal that closes: the kernel's, and the shell's to its jobs.
@@ -169,17 +153,6 @@ until_it_runs() {
 	failed_with "it was never triggered; nothing was recorded, and nothing was replaced"
 	[ "$(sha256sum <a.rec/recording.db)" = "$before" ]
 	[ "$(ls)" = a.rec ]
-}
-
-@test "capture --overwrite replaces nothing but recordings" {
-	mkdir a.rec && touch a.rec/thesis.txt
-	touch b.rec
-	run --separate-stderr incise capture -o a.rec --rig $quick --duration 1s --overwrite
-	failed_with "not a recording"
-	[ -e a.rec/thesis.txt ]
-	run --separate-stderr incise capture -o b.rec --rig $quick --duration 1s --overwrite
-	failed_with "not a recording"
-	[ -f b.rec ]
 }
 
 # bats test_tags=check

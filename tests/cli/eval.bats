@@ -34,19 +34,6 @@ refuses() {
 	paste got want | awk '($1 - $2)^2 > 1e-18 { bad = 1; print } END { exit bad || NR != 4 }'
 }
 
-@test "eval joins by min, and takes rules of a list" {
-	example_in "$root/man/incise-fis.5" "[Rules]" |
-		sed "s/^AndMethod='prod'/AndMethod='min'/; s/^1 2, 2 (1)/0 2, 2 (0.5)/" >min.fis
-	printf '%s\n' "0 0" "5 20" "20 50" "7.5 31.25" >points
-	incise eval min.fis points >got
-	awk 'function low(a, b) { return a < b ? a : b }
-		{ a = low(exp(-($1 - 10)^2 / 800), exp(-$2^2 / 800)); b = 0.5 * exp(-($2 - 50)^2 / 800)
-		printf "%.10g\n", (a * 0.1 * $1 + b * 0.15 * $1) / (a + b) }' points >want
-	paste got want | awk '($1 - $2)^2 > 1e-18 { bad = 1; print } END { exit bad || NR != 4 }'
-	run --separate-stderr incise eval min.fis --arith fixed <<<'5 20'
-	failed_with min.fis "AndMethod is min"
-}
-
 @test "where no triangle is, the nearest rule answers and eval says so" {
 	cat >gap.fis <<-'EOF'
 		[System]
@@ -143,14 +130,6 @@ refuses() {
 	[ "$(echo '5 20' | incise eval m.fis --no-clamp)" = "$(echo '5 20' | incise eval m.fis)" ]
 }
 
-@test "eval stays finite wherever it is asked" {
-	printf '%s\n' "1e308 1e308" "-1e308 1e-308" "0 -1e300" "1e15 20" >points
-	for arithmetic in double fixed; do
-		incise eval m.fis points --arith $arithmetic 2>/dev/null >out
-		[ "$(grep -cE '^-?[0-9.]+(e[-+][0-9]+)?$' out)" -eq 4 ]
-	done
-}
-
 @test "eval --grid covers the support to its ends" {
 	run -0 incise eval m.fis --grid 3x2
 	[ "$(awk 'NF { printf "%s,%s ", $1, $2 }' <<<"$output")" = "0,0 0,50 10,0 10,50 20,0 20,50 " ]
@@ -196,23 +175,6 @@ refuses() {
 	echo '5 20' | incise eval alone.fis >/dev/null
 }
 
-@test "eval --uncertainty total reads the same in another language" {
-	[ "$(LC_ALL=de_DE.UTF-8 locale decimal_point 2>/dev/null)" = , ] || skip "no locale with a decimal comma here"
-	[ "$(echo '5 20' | LC_ALL=de_DE.UTF-8 incise eval m.fis --uncertainty total)" = "$(echo '5 20' | incise eval m.fis --uncertainty total)" ]
-}
-
-@test "eval: files that are not there" {
-	run --separate-stderr incise eval none.fis
-	failed_with none.fis "No such file"
-	run --separate-stderr incise eval m.fis none.txt
-	failed_with none.txt "No such file"
-	run --separate-stderr incise eval m.fis .
-	failed_with "Is a directory"
-	run --separate-stderr incise eval .
-	failed_with "Is a directory"
-	[[ "$stderr" != *:0:* ]] # there is no line 0
-}
-
 # tests/unit/model/fis.c has the rest, and cuts a file at each byte.
 # bats test_tags=check
 @test "what a .fis may hold and incise does not know is refused by name and line" {
@@ -241,18 +203,6 @@ refuses() {
 	holds "$(cat out) > 0"
 	run --separate-stderr incise eval bell.fis --arith fixed <<<'5 20'
 	failed_with bell.fis gbellmf depth_mm very_shallow
-}
-
-@test "a model that fixed point cannot hold is refused by name" {
-	# the last consequent is beyond any format of 64 bits with 1 mN left
-	sed "s/^MF20='out1mf20':'linear',.*/MF20='out1mf20':'linear',[1e9 1e9 1e9]/" m.fis >big.fis
-	incise eval big.fis <<<'5 20' >out
-	[ -s out ]
-	run --separate-stderr incise eval big.fis --arith fixed <<<'5 20'
-	failed_with big.fis "exceed all number formats"
-	sed "s/^MF1='very_shallow':'gaussmf',.*/MF1='very_shallow':'gaussmf',[1e-9 0]/" m.fis >thin.fis
-	run --separate-stderr incise eval thin.fis --arith fixed <<<'5 20'
-	failed_with thin.fis very_shallow
 }
 
 # bats test_tags=check

@@ -55,14 +55,6 @@ well_formed() {
 	[ "${#lines[@]}" -lt 2900 ]
 }
 
-@test "export of all samples" {
-	incise export --no-lineage liver.rec -o all.csv
-	well_formed all.csv 10 2
-	# as many as lie in the tissue, nearly: depth is interpolated between the table's rows
-	awk -F, 'NR > 1 && $3 <= 0 { bad = 1 } END { exit bad }' all.csv
-	[ "$(wc -l <all.csv)" -gt 140000 ]
-}
-
 # bats test_tags=check
 @test "export of a part: its rows are those of the whole, and its lineage says which" {
 	incise export --no-lineage liver.rec -o whole.csv
@@ -91,20 +83,6 @@ well_formed() {
 	run --separate-stderr incise export --range 2s..4s damaged.rec -o other.csv
 	failed_with "damaged.rec: damaged: stream force, block 30"
 	[ ! -e other.csv ]
-}
-
-@test "export averaged" {
-	run -0 --separate-stderr incise export --no-lineage liver.rec --average 12x10 -o a.csv
-	[[ "$output" == "wrote a.csv: "*" rows from 14 cuts" ]]
-	[ "$(head -n 1 a.csv)" = depth_mm,velocity_mm_s,force_N,sd_N,count,cuts,advancing,acceleration_mm_s2,tilt_deg,time_in_tissue_s ]
-	well_formed a.csv 10 1
-	for advancing in 0 1; do
-		[ "$(cut -d, -f7 a.csv | grep -cx $advancing)" -le 120 ]
-	done
-	# the force rises with depth: rows are in order of depth
-	awk -F, '!$7 || NR == 1 { next } !first { first = $3 } { last = $3 }
-		END { exit !(last > 5 * first) }' a.csv
-	awk -F, 'NR > 1 && ($5 < 50 || $6 < 1 || $6 > 14) { bad = 1 } END { exit bad }' a.csv
 }
 
 # bats test_tags=check
@@ -141,35 +119,11 @@ well_formed() {
 		'\$.velocity_max_mm_s') BETWEEN 40 AND 200")" = 1 ]
 }
 
-@test "export of several recordings" {
-	mkdir b && ln -s "$BATS_FILE_TMPDIR/liver.rec" b/liver.rec
-	incise export --no-lineage liver.rec b/liver.rec -a 3x3 --json -o a.csv >report.json
-	[ "$(key report.json cuts)" = 28 ]
-	incise export --no-lineage liver.rec b/liver.rec --rate 10 -o raw.csv
-	[ "$(tail -n +2 raw.csv | cut -d, -f1 | sort -u | wc -l)" -eq 28 ]
-}
-
-@test "export is the same every time" {
-	incise export --no-lineage liver.rec -a 12x10 -o a.csv
-	incise export --no-lineage liver.rec -a 12x10 -o b.csv
-	cmp a.csv b.csv
-}
-
 @test "export of an interrupted recording" {
 	incise capture -o cut.rec --rig sim:clock=simulated --duration 6s >/dev/null
 	mv cut.rec cut.rec.part
 	incise export --no-lineage cut.rec -a 3x3 -o a.csv
 	well_formed a.csv 10 1
-}
-
-@test "export of a recording without a cut" {
-	incise capture -o air.rec --rig sim:clock=simulated --duration 800ms >/dev/null
-	run --separate-stderr incise export air.rec -o a.csv
-	failed_with "air.rec:"
-	[ ! -e a.csv ]
-	run --separate-stderr incise export air.rec
-	failed_with "air.rec:"
-	[ -z "$output" ]
 }
 
 # bats test_tags=check
@@ -184,36 +138,10 @@ well_formed() {
 	[ ! -e a.csv ]
 }
 
-@test "export of a damaged recording" {
-	cp -r liver.rec/ hurt.rec
-	truncate -s 100000 hurt.rec/recording.db
-	run --separate-stderr incise export hurt.rec -o a.csv
-	failed_with "hurt.rec: damaged"
-	[ ! -e a.csv ]
-}
-
 @test "export killed by a closed pipe is quiet" {
 	bash -c "set -o pipefail; incise export liver.rec 2>err | head -n 1" >out || true
 	[[ "$(cat out)" == "# incise: "* ]]
 	[ ! -s err ]
-}
-
-@test "export as HDF5" {
-	[ -e "$INCISE_BUILD/lib/incise/export_hdf5.so" ] || skip "the module of HDF5 is not built"
-	command -v h5dump >/dev/null || skip "h5dump is not installed"
-	incise export --no-lineage liver.rec --rate 100 -o raw.csv
-	run -0 --separate-stderr incise export liver.rec --rate 100 -o raw.h5
-	[ -z "$stderr" ]
-	[[ "$output" == "wrote raw.h5: "*" rows from 14 cuts" ]]
-	h5dump -y -w 1 -d /t_s -m "%.6f" raw.h5 | grep -oE '^ +[0-9.]+' | tr -d ' ' >t
-	diff t <(tail -n +2 raw.csv | cut -d, -f2)
-	h5dump -y -w 1 -d /force_N -m "%.5f" raw.h5 | grep -oE '^ +-?[0-9.]+' >force
-	# float32 may round the last digit to the other side
-	paste -d, force <(tail -n +2 raw.csv | cut -d, -f5) |
-		awk -F, '{ d = $1 - $2; if (d > 1.5e-5 || d < -1.5e-5) bad = 1 } END { exit bad || !NR }'
-	h5dump -a /source raw.h5 | grep -q '"liver.rec"'
-	h5dump -d /cut_names raw.h5 | grep -q '"liver-14"'
-	h5dump -a /depth_mm/units raw.h5 | grep -q '"mm"'
 }
 
 @test "export as HDF5 needs a file and the module" {
@@ -365,23 +293,6 @@ read_mcap() {
 	[ ! -e a.mcap ]
 }
 
-@test "export resampled" {
-	incise export --no-lineage liver.rec --resample --rate 100 -o a.csv
-	well_formed <(sed 's/nan/0/g' a.csv) 25 2
-	[[ "$(head -n 1 a.csv)" != *camera* ]]
-	# 43 s of it, in cuts or not
-	[ "$(wc -l <a.csv)" -eq 4301 ]
-	[ "$(tail -n +2 a.csv | cut -d, -f2 | sort -nu | tail -n 1)" -eq 14 ]
-	incise export --no-lineage liver.rec --resample -o b.csv
-	[ "$(wc -l <b.csv)" -eq 430001 ]
-	# a row without a pose has no tilt
-	awk -F, 'NR > 1 && $4 == "nan" { n++; if ($24 != "nan") bad = 1 } END { exit bad || !n }' b.csv
-	# at the same time the same pose, and a force that is less uncertain
-	join -t, <(tail -n +2 a.csv | cut -d, -f3-16 | sort) <(tail -n +2 b.csv |
-		cut -d, -f3-16 | sort) | awk -F, '
-		{ for (i = 2; i < 15; i++) if ($i != $(i + 13)) bad = 1 } END { exit bad || NR < 4290 }'
-}
-
 @test "export resampled with pictures" {
 	cp -r liver.rec/ seen.rec
 	sqlite3 seen.rec/recording.db "DELETE FROM knots;
@@ -397,41 +308,6 @@ read_mcap() {
 	awk -F, 'FNR > 1 && /^seen/ && $14 != "nan" { n++; d = $26 - 2 * $14; if (d > 2e-4 || d < -2e-4) bad = 1 }
 		END { exit bad || n < 2100 }' b.csv
 	grep -qx '# depth_mm_px: 0.2375' b.csv
-}
-
-@test "export takes the times of the line" {
-	cp -r liver.rec/ even.rec
-	sqlite3 even.rec/recording.db "UPDATE tracker SET t_ns = seq * 8333333;
-		DELETE FROM knots"
-	cp -r even.rec line.rec
-	# each record of the tracker 100 ms later than its row says, and so did all arrive
-	sqlite3 line.rec/recording.db "UPDATE tracker SET arrival_ns = t_ns + 105000000;
-		DELETE FROM knots; INSERT INTO knots SELECT 'tracker',
-		seq > 0, seq, t_ns + 100000000, 1e5, seq = 0 FROM tracker
-		WHERE seq IN (0, (SELECT max(seq) FROM tracker))"
-	for how in "" --resample; do
-		incise export --no-lineage even.rec $how -o a.csv --overwrite --damaged
-		incise export --no-lineage line.rec $how -o b.csv --overwrite --damaged
-		python3 - <<-'END'
-			import csv
-			def depth(path):
-			    return {float(r["t_s"]): float(r["depth_mm"]) for r in csv.DictReader(open(path))}
-			a, b = depth("a.csv"), depth("b.csv")
-			both = [t for t in a if 2 < t < 30 and round(t + 0.1, 6) in b]
-			assert len(both) > 50000, len(both)
-			off = [abs(a[t] - b[round(t + 0.1, 6)]) for t in both]
-			off = [d for d in off if d == d]
-			# the last digit
-			assert max(off) < 1.5e-4, max(off)
-		END
-	done
-	incise export --no-lineage even.rec --resample --rate 100 -o a.csv --overwrite --damaged
-	# by another delay, 100 ms longer, they are as they were
-	delay=$(sqlite3 line.rec/recording.db "SELECT delay_ns FROM streams WHERE name = 'tracker'")
-	echo "tracker_delay_ms = $(awk "BEGIN { print 100 + $delay / 1e6 }");" >back.conf
-	incise export --no-lineage line.rec --resample --rate 100 -c back.conf -o c.csv --damaged
-	paste -d, a.csv c.csv | awk -F, 'NR > 20 && $14 != "nan" && $39 != "nan" {
-		n++; d = $14 - $39; if (d > 1.5e-4 || d < -1.5e-4) bad = 1 } END { exit bad || n < 4000 }'
 }
 
 @test "export as HDF5 is what h5py reads" {
@@ -466,24 +342,6 @@ read_mcap() {
 		            assert math.isnan(value) and math.isnan(text) or abs(
 		                value - text) < 2e-5 + half + 1e-6 * abs(text), (name, value, text)
 	END
-}
-
-@test "resampled positions are those of the calibrated tip" {
-	printf 'tip_mm = [60.0, 0.0, 0.0];\n' >tip.conf
-	incise capture -o plain.rec --rig sim:clock=simulated --duration 4s
-	incise capture -o far.rec --rig sim:clock=simulated,tip_x_mm=60 -c tip.conf --duration 4s
-	for name in plain far; do
-		incise export --no-lineage $name.rec -o $name.csv --resample --rate 100
-	done
-	# Noise of 0.025 degrees turns an arm of 60 mm by 0.026 mm; both have the tracker's 0.02
-	# mm: within 6 sd of 0.04 mm. Without the tip x_mm is 60 mm off, or turned.
-	paste -d, plain.csv far.csv | awk -F, 'NR == 1 { for (i = 1; i <= NF; i++)
-			if ($i ~ /^(x|y|z|depth)_mm$/) { if ($i in at) pair[at[$i]] = i; else at[$i] = i }; next }
-		{ for (i in pair) if ($i != "" && $i != "nan") { d = $i - $pair[i]; n++
-			if (d > 0.24 || d < -0.24) { print "row " NR ": " $i " and " $pair[i]; bad = 1 } } }
-		END { exit bad || n < 1000 }'
-	sqlite3 far.rec/recording.db "SELECT avg(abs(x_mm)) > 30 FROM tracker" | grep -qx 1 ||
-		sqlite3 far.rec/recording.db "SELECT avg(abs(z_mm)) > 30 FROM tracker" | grep -qx 1
 }
 
 # A calibration with a covariance of the tip, and all else stated.
@@ -536,36 +394,6 @@ calibrated() {
 			assert seen > 2 * len(none), seen
 		END
 	done
-}
-
-# 500 samples of white noise: the own part of the mean is that of one by √500, gain stays.
-@test "export with uncertainties: the own part of a mean shrinks, the common one does not" {
-	calibrated
-	incise export --no-lineage calibrated.rec --uncertainty parts -o one.csv
-	incise export --no-lineage calibrated.rec --rate 20 --uncertainty parts -o mean.csv
-	python3 - <<-'END'
-		import csv, math
-		rows = {}
-		for row in csv.DictReader(open("one.csv")):
-		    rows.setdefault((row["cut"], math.floor(float(row["t_s"]) * 20 + 1e-6)), []).append(row)
-		n = 0
-		for mean in csv.DictReader(open("mean.csv")):
-		    key = (mean["cut"], math.floor(float(mean["t_s"]) * 20 + 1e-6))
-		    of = rows[key]
-		    if len(of) != 500 or "nan" in mean.values():
-		        continue
-		    n += 1
-		    for name in ("force_u_gain_N", "depth_u_tip_x_mm", "depth_u_alignment_mm", "t_u_delay_s"):
-		        all = sum(float(r[name]) for r in of) / 500
-		        assert abs(float(mean[name]) - all) < 1e-3 * abs(all) + 2e-7, (name, mean[name], all)
-		    noise = float(of[0]["force_u_noise_N"]) / math.sqrt(500)
-		    # the correlation of white noise is found to be at most some percent
-		    assert 0.97 * noise < float(mean["force_u_noise_N"]) < 1.2 * noise
-		    # 0.05 s are 6 records of the tracker
-		    depth = 0.02 / math.sqrt(6)
-		    assert 0.7 * depth < float(mean["depth_u_noise_mm"]) < 1.3 * depth, mean["depth_u_noise_mm"]
-		assert n > 50
-	END
 }
 
 # bats test_tags=check

@@ -112,33 +112,6 @@ beside_the_model() {
 	cmp fixed.csv scene.csv
 }
 
-@test "haptic is the same every time" {
-	incise haptic liver.scene --rig $quick --duration 2s -o a.csv
-	incise haptic liver.scene --rig $quick --duration 2s -o b.csv
-	cmp a.csv b.csv
-	incise haptic liver.scene --rig $quick,seed=2 --duration 2s -o c.csv
-	run ! cmp -s a.csv c.csv
-}
-
-@test "no force is over the limit, and none changes faster than it may" {
-	incise haptic liver.scene --rig $quick --duration 3s -o free.csv
-	cat >tight.scene <<-'EOF'
-		model = "liver.fis";
-		limits = { force_N = 0.2; slew_N_s = 5.0; };
-	EOF
-	incise haptic tight.scene --rig $quick --duration 3s -o l.csv --json >r.json
-	# five decimals are printed; the slew is 5 mN a tick
-	awk -F, 'NR > 1 { if ($7 > 0.200005 || $7 < 0) exit 1
-		d = $7 - last; if (d > 0.00501 || d < -0.00501) exit 1; last = $7 }' l.csv
-	# both limits were needed
-	awk -F, '$7 > m { m = $7 } NR > 2 && $7 - last > s { s = $7 - last } { last = $7 }
-		END { exit !(m > 0.3 && s > 0.006) }' free.csv
-	holds "$(key r.json limited) > 100"
-	# Integers round the limit down, and a force that is shortened to it: 2 of 2^-16 N.
-	holds "$(key r.json force_max_N) <= 0.2"
-	holds "$(key r.json force_max_N) > 0.2 - 3 / 65536"
-}
-
 @test "haptic runs at the scene's rate, with another model" {
 	printf 'rate_hz = 250;\nmodel = "none.fis";\n' >slow.scene
 	incise haptic slow.scene --rig $quick --duration 2s --model liver.fis --json >r.json
@@ -155,18 +128,6 @@ beside_the_model() {
 	incise haptic there/empty.scene --rig $quick --duration 100ms --model there/liver.fis
 	run --separate-stderr incise haptic there/empty.scene --rig $quick --duration 100ms
 	failed_with there/empty.scene model
-}
-
-@test "the surface may lie anywhere and face anywhere" {
-	cat >deep.scene <<-'EOF'
-		model = "liver.fis";
-		surface = { point_mm = [0.0, 0.0, -2.0]; normal = [0, 0, 7]; };
-	EOF
-	incise haptic liver.scene --rig $quick --duration 2s -o a.csv
-	incise haptic deep.scene --rig $quick --duration 2s -o b.csv
-	# 2 mm lower: where it is touched, depth is 2 mm less, to the printed 0.1 um
-	paste -d, a.csv b.csv | awk -F, '$23 ~ /^c/ && $19 > 0 { n++; if (($5 - $19 - 2)^2 > 4.1e-8) exit 1 }
-		END { exit n < 500 }'
 }
 
 @test "in real time it keeps to the clock, and SIGINT ends it with the report" {
@@ -211,16 +172,6 @@ beside_the_model() {
 	[ ! -e l.csv ]
 }
 
-@test "SIGTERM ends it as well" {
-	incise haptic liver.scene --rig sim: --no-rt --overruns 0 --json >r.json 2>err 3>&- &
-	pid=$!
-	until_it_catches $pid incise-haptic 0x4000
-	kill -TERM $pid
-	wait $pid
-	pid=
-	[ "$(key r.json stopped_by)" = Terminated ]
-}
-
 # bats test_tags=check
 @test "haptic: files that are not there, or not what they should be" {
 	run --separate-stderr incise haptic none.scene --rig $quick
@@ -238,48 +189,6 @@ beside_the_model() {
 	incise train one.csv --inputs depth_m -o one.fis 2>/dev/null
 	printf 'model = "one.fis";\n' >bad.scene
 	refuses bad.scene "'depth_m', which a loop does not have; did you mean depth_mm: expected depth_mm, "
-}
-
-@test "haptic: a column of training is an input of the loop" {
-	incise capture -o d.rec --rig sim:clock=simulated,cut_s=2,pause_s=0.5
-	incise export --no-lineage d.rec --rate 100 -o d.csv
-	incise train d.csv --inputs depth_mm,velocity_mm_s,acceleration_mm_s2 --mf 3,2,1 -o d.fis
-	printf 'model = "d.fis"; arithmetic = "double"; tissue = { gain = 0.5; };\n' >d.scene
-	incise haptic d.scene --rig $quick --duration 3s -o l.csv --json >r.json
-	[ "$(key r.json ticks)" = 3000 ]
-	# a force, and none beyond the limit
-	python3 - <<-'END'
-		import csv, math
-		forces = [float(r["command_z_N"]) for r in csv.DictReader(open("l.csv"))]
-		assert all(math.isfinite(f) and abs(f) <= 4.0001 for f in forces)
-		assert max(forces) > 0.1, max(forces)
-	END
-	incise plan d.scene --json >p.json
-	[ "$(key p.json 'model.inputs[2].name')" = acceleration_mm_s2 ]
-	[ "$(key p.json model.evaluator)" = double ]
-	holds "$(key p.json model.ns) > 0 && $(key p.json acceleration_slope_N_s2_mm) > 0"
-	# too much of it
-	mv l.csv l2.csv
-	printf 'model = "d.fis"; arithmetic = "double"; tissue = { gain = 2.0; };\n' >bad.scene
-	refuses bad.scene "not stable"
-	# in integers the same, within what is certified
-	printf 'model = "d.fis"; tissue = { gain = 0.5; };\n' >f.scene
-	incise haptic f.scene --rig $quick --duration 3s -o f.csv >out
-	incise plan f.scene --json >p.json
-	[ "$(key p.json model.evaluator)" = direct ]
-	python3 - "$(key p.json bound_N)" <<-'END'
-		import csv, sys
-		double, fixed = ([float(r["command_z_N"]) for r in csv.DictReader(open(name))] for name in ("l2.csv", "f.csv"))
-		# and the last digits of both
-		assert max(abs(a - b) for a, b in zip(double, fixed)) < float(sys.argv[1]) + 2e-5
-	END
-}
-
-@test "haptic: a model that fixed point cannot hold is refused before it runs" {
-	incise train "$BATS_FILE_TMPDIR/pairs.csv" --search type=gbellmf -o bell.fis 2>/dev/null
-	printf 'model = "bell.fis"; device = { damping_N_s_mm = 0.02; };\n' >bad.scene
-	refuses gbellmf
-	run -0 incise haptic bad.scene --rig $quick --duration 100ms --arith double
 }
 
 # bats test_tags=check
@@ -330,36 +239,6 @@ turned_blade() {
 		tool = { side = [0.6, 0.8, 0.0]; };
 	END
 	cut=sim:clock=simulated,depth_mm=10,times=1,pause_s=0.5,cut_s=2,tracker_noise_mm=0
-}
-
-# Rms of an expression of awk over the ticks of a log.
-rms() { awk -F, "NR > 1 { sum += ($2) ^ 2 } END { printf \"%.9f\", sqrt(sum / (NR - 1)) }" "$1"; }
-
-@test "two axes feel the plane constraint, and one counts it as not felt" {
-	turned_blade
-	for n in 1 2 3; do
-		incise haptic side.scene --rig $cut,axes=$n --duration 2s --json -o $n.csv >$n.json
-		[ "$(key $n.json "actuators[#-1].direction")" = "$(key $n.json "actuators[$((n - 1))].direction")" ]
-	done
-	[ "$(key 3.json "actuators[0].direction")" = "[0.0,0.0,1.0]" ]
-	[ "$(key 3.json "actuators[1].direction")" = "[0.0,1.0,0.0]" ]
-	[ "$(key 3.json "actuators[2].direction")" = "[1.0,0.0,0.0]" ]
-	# $11 to $13 are the command's parts, with five decimals
-	holds "$(rms 1.csv '$12') > 0.2"
-	holds "($(key 1.json unfelt_rms_N) - $(rms 1.csv 'sqrt($11^2 + $12^2)'))^2 < 1e-10"
-	holds "($(key 2.json unfelt_rms_N) - $(rms 2.csv '$11'))^2 < 1e-10"
-	holds "($(key 2.json unfelt_rms_N) - $(rms 2.csv '$16'))^2 < 1e-10"
-	holds "$(key 3.json unfelt_max_N) < 1e-12"
-	[ "$(head -n 1 2.csv)" = "$(head -n 1 1.csv),rendered_2_N,unfelt_N" ]
-	[ "$(head -n 1 3.csv)" = "$(head -n 1 1.csv),rendered_2_N,rendered_3_N,unfelt_N" ]
-	# the hand is pushed aside by what was asked a tick before, within a tenth
-	awk -F, '$10 == "cutting" && before { off += ($15 - last)^2; sum += last^2 }
-		{ last = $12; before = $10 == "cutting" }
-		END { exit !(sum > 0 && off < 0.01 * sum) }' 2.csv
-	# the first axis is as if it were alone
-	for n in 2 3; do
-		cut -d, -f1-14 $n.csv | cmp - 1.csv
-	done
 }
 
 @test "the report names what is felt and what is not" {

@@ -140,14 +140,6 @@ setup() {
 	[ "$(key r.json name)" = "li?ver" ]
 }
 
-@test "info of a recording" {
-	run -0 --separate-stderr incise info a.rec/
-	[ -z "$stderr" ]
-	[[ "${lines[0]}" == "recording a.rec/: "* ]]
-	[[ "$output" == *"cuts     2"* ]]
-	[[ "$output" != *incomplete* ]]
-}
-
 # bats test_tags=check
 @test "info of a recording that was altered shows it, and fails by its name" {
 	cp -r a.rec/ b.rec
@@ -218,23 +210,6 @@ setup() {
 	[ -z "$(grep -E '^(tracker|depth|cuts)' <<<"$output")" ]
 	incise info force.rec --json >force.json
 	jq -e '.cuts == null and .depth_max_mm == null and .adc.bits == 12' force.json
-}
-
-@test "info of an interrupted recording" {
-	incise capture -o b.rec --rig sim: 2>/dev/null 3>&- &
-	pid=$!
-	# rows are committed every 100 ms
-	has_rows() { incise info b.rec --json >r.json && [ "$(key r.json rows.force)" -gt 0 ]; }
-	await has_rows
-	rows=$(key r.json rows.force)
-	kill -9 $pid
-	wait $pid || [ $? -eq 137 ]
-	[ ! -e b.rec ]
-	run -0 incise info b.rec
-	[[ "$output" == *incomplete* ]]
-	incise info b.rec --json >r.json
-	[ "$(key r.json complete)" = 0 ]
-	holds "$(key r.json rows.force) >= $rows"
 }
 
 # bats test_tags=check

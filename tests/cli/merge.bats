@@ -83,32 +83,6 @@ large_shares() {
 	[ "$(key r.json pairs)" -eq 32000 ]
 }
 
-@test "small parts of a factor are joined, and too small a share is refused" {
-	shares
-	cuts tiny.csv 90 93 400
-	incise train s1.csv --group cut --mf 3,3 -o start.fis >/dev/null
-	incise train s1.csv --premises start.fis --group cut -o a.fac >out
-	grep -q "^1 of 5 parts, as small ones would reveal their pairs" out
-	grep -aq "^part 5 1250 1000 5$" a.fac
-	incise train s2.csv --premises start.fis --group cut -o b.fac >/dev/null
-	incise merge a.fac b.fac -o m.fis >out
-	grep -q "^1 of 5 parts: the factors have small ones joined$" out
-	# 4 cuts; 41 elements of a row have 1711 sums; rows without cuts may be of one
-	run --separate-stderr incise train tiny.csv --premises start.fis --group cut -o few.fac
-	failed_with few.fac "1600 different pairs of 4 groups" "of 5 groups"
-	incise train s1.csv --group cut --mf 5,4 -o big.fis >/dev/null 2>&1
-	run --separate-stderr incise train s1.csv --premises big.fis --group cut -o few.fac
-	failed_with few.fac "1250 different pairs of 5 groups" "1953 pairs"
-	sed 's/^cut/number/' s1.csv >plain.csv
-	run --separate-stderr incise train plain.csv --premises start.fis -o few.fac
-	failed_with few.fac "of 0 groups"
-	[ ! -e few.fac ]
-	# of before
-	sed 's/^incise factor 2/incise factor 1/' a.fac >old.fac
-	run --separate-stderr incise merge a.fac old.fac -o m.fis --overwrite
-	failed_with old.fac "form 1" "reveal their pairs"
-}
-
 @test "merge refuses what does not belong together, by name" {
 	shares
 	incise train s1.csv --mf 3,3 -o start.fis >/dev/null

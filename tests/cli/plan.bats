@@ -65,25 +65,6 @@ setup() {
 	[ "$(key r.json own_delay)" = 0 ]
 }
 
-@test "a rig whose tracker is faster holds more than the one that is taken without a rig" {
-	echo 'tissue = { reaction_N_mm = 0.6; };' >fast.scene
-	run --separate-stderr incise plan fast.scene
-	failed_with fast.scene "not stable" "120 Hz"
-	incise plan fast.scene --rig sim:tracker_hz=240,tracker_latency_ms=2 --json >r.json
-	holds "$(key r.json margin) > 1"
-	holds "$(key r.json tick_ns) > 0"
-}
-
-@test "a device that says how late it is holds what the tracker's lateness would not" {
-	echo 'tissue = { reaction_N_mm = 1.4; };' >late.scene
-	run --separate-stderr incise plan late.scene
-	failed_with late.scene "not stable" "120 Hz"
-	echo 'device = { delay_ticks = 0; };' >>late.scene
-	incise plan late.scene --json >r.json
-	[ "$(key r.json own_delay)" = 1 ]
-	holds "$(key r.json margin) > 1"
-}
-
 @test "a full plan keeps every stage" {
 	incise plan wall.scene --json >few.json
 	incise plan wall.scene --full --json >all.json

@@ -52,12 +52,6 @@ shows() {
 	[ "$(grep -cxE 'shallow|medium|deep|slow|fast' texts)" = 9 ]
 }
 
-@test "a compiled model has no functions to show" {
-	draws m.fx
-	shows "depth / mm" "velocity / (mm/s)" "force / N"
-	! grep -qE 'degree|residual' texts
-}
-
 @test "residuals are those of incise eval" {
 	draws m.fis --data pairs.csv
 	shows "residual of force / N" "quantile of the normal distribution / SD"

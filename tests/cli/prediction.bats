@@ -56,23 +56,6 @@ train() {
 	incise eval plain.fis points --uncertainty parts | awk '$5 != 0 { exit 1 }'
 }
 
-# tests/unit/learn/propagation.c has it without programs.
-# bats test_tags=slow
-@test "a calibration does not average out over rows, and does over rigs" {
-	incise train a.csv --group cut --mf 2,2 -o one.fis --json >one.json 2>err
-	incise train a.csv b.csv c.csv --group cut --mf 2,2 -o three.fis --json >three.json 2>err
-	one=$(key one.json uncertainty.calibration_N)
-	three=$(key three.json uncertainty.calibration_N)
-	# the same parts of three rigs: 1/√3 of one; the fits differ by some percent
-	holds "$one / $three > 1.6 && $one / $three < 1.87"
-	[ "$(key three.json uncertainty.calibrations)" = 3 ]
-	# a row in four has 0.4 N of its own, which the scatter hardly has
-	holds "$(key three.json uncertainty.least_weight) < 0.5"
-	# the rigs differ by 4 %, which is in the scatter of a model that knows no calibration
-	incise train a.csv b.csv c.csv --group cut --mf 2,2 -o none.fis --uncertainty none --json >none.json 2>err
-	holds "$(key three.json noise_N) < 0.95 * $(key none.json noise_N)"
-}
-
 @test "plan and status give the force of a model with its uncertainty" {
 	run_folder
 	train a.csv b.csv c.csv -o m.fis

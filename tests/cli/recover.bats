@@ -105,45 +105,6 @@ chunks() {
 	done
 }
 
-@test "an interrupted recording of an older form stays interrupted" {
-	for form in 2 3 4; do
-		# as of a recorder that was killed before it closed it; no head of form 4 is that of its end
-		sqlite3 old/$form.rec/recording.db "UPDATE meta SET value = 0 WHERE key = 'complete'; DELETE FROM ledger
-			WHERE stream LIKE 'table:%' OR count = 0;
-			PRAGMA journal_mode=WAL" >/dev/null
-		[ $form != 4 ] || sqlite3 old/4.rec/recording.db "DELETE FROM seal WHERE number > 18;
-			UPDATE seal SET force = 18, tracker = 18, wall = 3 WHERE number = 18"
-		run -0 --separate-stderr incise recover old/$form.rec -o new/$form.rec $([ $form != 4 ] || echo --damaged)
-		run -1 --separate-stderr incise verify new/$form.rec
-		[[ "$output" == *"interrupted, or being written"* ]]
-		[[ "$output" == *"force    180 expected, 180 present, 0 lost, in "* ]]
-		[[ "$output" == *"tracker  54 expected, 54 present, 0 lost, in "* ]]
-	done
-}
-
-@test "an altered recording of an older form is refused, and converted with --damaged, which is not forgotten" {
-	for form in 2 3 4; do
-		sqlite3 old/$form.rec/recording.db "UPDATE force SET code = code + 1 WHERE seq = 90"
-		run --separate-stderr incise recover old/$form.rec -o new/$form.rec
-		failed_with old/$form.rec "not as it was recorded: force: block 9 " "--damaged converts it as it is"
-		[ -z "$(ls new)" ]
-		run -0 --separate-stderr incise recover old/$form.rec -o new/$form.rec --damaged
-		[[ "$stderr" == *"warning: old/$form.rec: not as it was recorded: force: block 9 "* ]]
-		run -1 --separate-stderr incise verify new/$form.rec
-		[[ "$output" == *"it was converted with a finding: force: block 9 "* ]]
-		run --separate-stderr incise export new/$form.rec -o a.csv
-		failed_with new/$form.rec "not as it was recorded"
-		rm -r new/$form.rec
-	done
-	# a forged one, whose ledger agrees, and whose seal does not
-	sqlite3 old/4.rec/recording.db "UPDATE force SET code = code - 1 WHERE seq = 90;
-		UPDATE seal SET t_ns = t_ns + 1 WHERE number = 5"
-	run --separate-stderr incise recover old/4.rec -o new/4.rec
-	failed_with old/4.rec "not as it was recorded: seal: commit 5 differs"
-	run -0 --separate-stderr incise recover old/3.rec -o new/3.rec --damaged --json
-	[ "$(jq -c '[.converted_from, .seals_before, .altered[:15]]' <<<"$output")" = '[3,0,"force: block 9 "]' ]
-}
-
 @test "signatures of before are kept beside the new one, and do not count as its own" {
 	ssh-keygen -q -t ed25519 -N "" -C kim@lab -f kim
 	echo "kim@lab $(cat kim.pub)" >signers
@@ -182,17 +143,4 @@ chunks() {
 	"$INCISE_BUILD/tests/sql" old/4.rec/recording.db "UPDATE force SET code = code + 1 WHERE seq = 90"
 	run -1 --separate-stderr incise provenance old/a.csv
 	[[ "${lines[1]}" == *"not as it was recorded"* ]]
-}
-
-@test "a conversion that fails leaves nothing" {
-	mkdir new/there.rec
-	run --separate-stderr incise recover old/4.rec -o new/there.rec
-	failed_with new/there.rec "exists"
-	sqlite3 old/4.rec/recording.db "UPDATE tracker SET x_mm = 'here' WHERE seq = 20"
-	run --separate-stderr incise recover old/4.rec -o new/4.rec --damaged
-	failed_with old/4.rec "table tracker, row 20 is invalid"
-	run --separate-stderr bash -c "ulimit -f 8; trap '' XFSZ; exec incise recover old/3.rec -o new/3.rec"
-	[ "$status" = 1 ]
-	[ "$(ls new)" = there.rec ]
-	[ -z "$(ls new/there.rec)" ]
 }

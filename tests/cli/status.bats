@@ -85,19 +85,6 @@ runs() {
 	[[ "${lines[0]}" == "other: stopped since "* ]]
 }
 
-@test "a loop that runs is measured" {
-	play neck run
-	await runs neck
-	[ ! -s seen.err ]
-	[[ "$(head -n 1 seen)" == "neck: running since "*", process $played" ]]
-	grep -q "1000 Hz requested, 1000.00 Hz now" seen
-	# who is asked to stop says so
-	kill -TERM "$played"
-	wait "$played"
-	run -0 incise status neck
-	[[ "${lines[0]}" == "neck: stopped since "* ]]
-}
-
 @test "a real loop tells its state, by the name of its scene" {
 	incise haptic "$root/scenes/wall.scene" --rig sim: --no-rt --overruns 0 --duration 1h \
 		--state incise/wall.state >/dev/null 2>&1 3>&- &
@@ -175,16 +162,6 @@ runs() {
 	failed_with "no loop of that name"
 }
 
-@test "a loop without ticks yet is well" {
-	play neck start
-	run -0 incise status neck
-	[[ "${lines[0]}" == "neck: starting since "* ]]
-	[[ "$output" == *"ticks      0, 0 missed in 0 overruns"* ]]
-	incise status neck --json >report.json
-	[ "$(key report.json 'loops[0].mean_hz')" = "" ]
-	incise status neck --prometheus | "$root/tests/state/prometheus.py" >/dev/null
-}
-
 # bats test_tags=check
 @test "a fault is told with its reason, and is no success" {
 	"$loop" incise/neck.state fault || true
@@ -195,21 +172,6 @@ runs() {
 	run -1 incise status neck --json
 	run -1 incise status neck --prometheus
 	run -1 incise status neck --follow
-}
-
-@test "a loop that was killed is dead" {
-	play neck run
-	kill -KILL "$played"
-	wait "$played" || true
-	run -1 --separate-stderr incise status neck
-	[ -z "$stderr" ]
-	[[ "${lines[0]}" == "neck: dead: process $played exited without cleanup; it was running since "* ]]
-	incise status neck --json >report.json || true
-	[ "$(key report.json 'loops[0].state')" = dead ]
-	[ "$(key report.json 'loops[0].alive')" = 0 ]
-	# another takes its place
-	"$loop" incise/neck.state done
-	incise status neck
 }
 
 @test "a loop that lives and does not tick is not well" {
@@ -231,13 +193,6 @@ runs() {
 	kill -STOP "$played"
 	run -1 incise status frozen
 	[[ "${lines[0]}" == "frozen: running, but it does not tick, since "* ]]
-}
-
-@test "a second loop is refused in a place where one lives" {
-	play neck run
-	run -1 --separate-stderr "$loop" incise/neck.state done
-	[[ "$stderr" == *"another loop uses it, process $played; stop it"* ]]
-	await runs neck
 }
 
 @test "all loops are shown, by name, and one that is not well is said" {

@@ -31,17 +31,6 @@ until_it_says() {
 	[[ "$output" == *"limits     0 to 15 mm in steps of 0.625 um, up to 30 mm/s"* ]]
 }
 
-@test "status as JSON" {
-	incise stepper status --rig $quick --json >s.json
-	[ "$(key s.json command)" = status ]
-	[ "$(key s.json state)" = ready ]
-	[ "$(key s.json homed)" = 1 ]
-	[ "$(key s.json faults)" = '[]' ]
-	[ "$(key s.json inputs_wired)" = '[]' ]
-	holds "$(key s.json step_mm) == 0.000625 && $(key s.json deadman_s) == 0.1"
-	[ -z "$(key s.json jerk_max_mm_s3)" ]
-}
-
 @test "status --follow prints what changes, as text or as a line of JSON" {
 	run -0 --separate-stderr incise stepper status --follow --duration 1s --rig $quick
 	[ "${#lines[@]}" -eq 1 ] # nothing does

@@ -146,19 +146,6 @@ tampered() {
 	done
 }
 
-@test "verify without the module says that pictures are not verified" {
-	[ -e "$INCISE_BUILD/lib/incise/frames_mkv.so" ] || skip "frames_mkv.so is not built"
-	incise capture -o c.rec --rig sim:clock=simulated --camera frames --duration 200ms
-	INCISE_MODULE_PATH=$PWD run --separate-stderr incise verify c.rec
-	failed_with "c.rec:"
-	[[ "$output" == *"c.rec: camera: the frames are not verified: "*"no module frames_mkv.so"* ]]
-	INCISE_MODULE_PATH=$PWD run -1 --separate-stderr incise verify c.rec --json
-	echo "$output" >report.json
-	[ "$(key report.json unverified)" = 1 ]
-	[ "$(key report.json complete)" = 0 ]
-	[ "$(key report.json 'findings[0].kind')" = unverified ]
-}
-
 @test "verify of a page that went bad" {
 	dd if=/dev/urandom of=a.rec/recording.db bs=4096 seek=20 count=1 conv=notrunc 2>/dev/null
 	run --separate-stderr incise verify a.rec

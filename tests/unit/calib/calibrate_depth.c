@@ -191,24 +191,6 @@ static struct incise_depth_lengths pairs_of(const struct line_data *d, int n)
 		.depth_mm = d->mm, .length_px = d->px, .n = n};
 }
 
-/* Without noise: the line itself. */
-TEST(test_exact_line)
-{
-	struct line_data d;
-	struct incise_depth_lengths pairs = pairs_of(&d, 10);
-	struct incise_depth_fit fit;
-
-	for (int i = 0; i < 10; i++) {
-		d.mm[i] = 2 * i;
-		d.px[i] = 400 - d.mm[i] / 0.125;
-	}
-	assert_int_equal(incise_calibrate_depth_line(&pairs, NULL, &fit, NULL), 0);
-	assert_true(fabs(fit.mm_px - 0.125) < 1e-13);
-	assert_true(fabs(fit.full_px - 400) < 1e-10);
-	assert_true(fit.sd_mm < 1e-12);
-	assert_int_equal(fit.inliers, 10);
-}
-
 TEST(test_line_truth)
 {
 	static const struct {
@@ -347,44 +329,6 @@ TEST(test_line_refused)
 				 cases[i].code);
 		assert_says(err.text, cases[i].text);
 	}
-}
-
-/* Quantiles of a normal distribution, of sd 1: the table is exact but for its steps. */
-TEST(test_sd)
-{
-	double absolute[1000];
-
-	for (int spoilt = 0; spoilt <= 250; spoilt += 250) {
-		for (int i = 0; i < 1000; i++) {
-			double low = 0, high = 10, p = (i + 0.5) / 1000;
-
-			/* erf(x/√2) is the share within x */
-			for (int k = 0; k < 60; k++) {
-				double middle = (low + high) / 2;
-
-				*(erf(middle / M_SQRT2) < p ? &low : &high) = middle;
-			}
-			absolute[i] = i < spoilt ? 1e6 : low;
-		}
-		if (!spoilt)
-			/* 1.2 % is what is added for 1000 */
-			assert_true(fabs(repeats_sd(absolute, 1000) / 1.012 - 1) < 0.01);
-		else
-			/* a quarter of them gone: the median of the rest is higher up */
-			assert_true(repeats_sd(absolute, 1000) < 3);
-	}
-}
-
-/* Two values ± 1: sd √2, over √2; and Student's 13.97 over 2 for one degree of freedom. */
-TEST(test_two)
-{
-	const double residual[] = {1, -1};
-	int effective;
-
-	assert_true(fabs(repeats_u(residual, 2, 1, &effective) - 13.97 / 2) < 1e-12);
-	assert_int_equal(effective, 2);
-	assert_true(repeats_u(residual, 1, 1, &effective) == 0);
-	assert_int_equal(effective, 1);
 }
 
 /* Each value five times: a fifth of them count, which is √5 in the uncertainty. */

@@ -343,24 +343,6 @@ static struct calibrate_stepper_work make_lines(double noise_N)
 	};
 }
 
-TEST(exact_lines_are_found)
-{
-	struct calibrate_stepper_work w = make_lines(0);
-
-	assert_int_equal(fit_lines(&w, SKIP_MM), 0);
-	/* sums of some hundred doubles of size 1 */
-	assert_true(fabs(w.slope - SLOPE) < 1e-12);
-	assert_true(fabs(strokes[0].zero_N - 0.1) < 1e-12);
-	assert_true(fabs(strokes[1].zero_N - 0.3) < 1e-12);
-	assert_true(w.sd < 1e-12);
-	assert_int_equal(strokes[0].used, 90);
-	for (int i = 0; i < POINTS; i++) {
-		assert_int_equal(states[i], i <= 10 ? INCISE_CALIBRATE_STEPPER_TURN
-						    : INCISE_CALIBRATE_STEPPER_USED);
-		assert_true(i <= 10 || fabs(off_line(&w, &strokes[0], i)) < 1e-12);
-	}
-}
-
 /* A fifth of the points far off, all to one side; what is saturated is not even looked at. */
 TEST(outliers_do_not_bend_them)
 {

@@ -92,25 +92,6 @@ static int fit(int n, struct incise_tip_fit *out, struct incise_error *err)
 	return incise_calibrate_tip(poses, n, inlier, out, err);
 }
 
-/* Exact poses give the exact tip. */
-TEST(test_exact)
-{
-	struct motion m = usual;
-	struct incise_tip_fit f;
-
-	seed = 1;
-	m.noise_mm = m.noise_deg = 0;
-	move(&m, 100);
-	succeeds(!fit(100, &f, &err));
-	for (int k = 0; k < 3; k++) {
-		/* rounding: 1e-16 of 200 mm, times a condition of some 10 */
-		assert_true(fabs(f.tip_mm[k] - m.tip[k]) <= 1e-11);
-		assert_true(fabs(f.pivot_mm[k] - m.pivot[k]) <= 1e-11);
-	}
-	assert_int_equal(f.inliers, 100);
-	assert_true(f.cone_deg > 60 && f.cone_deg < 180);
-}
-
 /*
  * Over tools of 30 to 100 mm: the ellipsoid and the interval of each axis hold the truth in 95 %.
  * The three axes of a tool are not independent, so they count as one.

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Plant: closed forms, energy, a matrix exponential in long double, one step against many,
- * and a brute-force integration.
+ * Plant: closed forms, energy, a matrix exponential in long double, and one step against many.
  */
 #include "../unit.h"
 #include <float.h>
@@ -187,45 +186,6 @@ TEST(test_one_step_is_many)
 			many.velocity_mm_s = one.velocity_mm_s;
 		}
 		assert_true(meets >= 3);
-	}
-}
-
-/* Small steps of a scheme that knows of no events. */
-static void brute(struct incise_plant *p, double f, double period, int steps)
-{
-	double h = period / steps, m = p->mass_kg * G;
-
-	for (int i = 0; i < steps; i++) {
-		double net = f, friction;
-
-		if (p->tied || p->position_mm < p->wall_mm)
-			net -= p->wall_N_mm * (p->position_mm - p->wall_mm) +
-			       p->wall_N_s_mm * p->velocity_mm_s;
-		net -= p->damping_N_s_mm * p->velocity_mm_s;
-		p->velocity_mm_s += net / m * h;
-		friction = p->coulomb_N / m * h;
-		if (fabs(p->velocity_mm_s) <= friction)
-			p->velocity_mm_s = 0;
-		else
-			p->velocity_mm_s -= copysign(friction, p->velocity_mm_s);
-		p->position_mm += p->velocity_mm_s * h;
-	}
-}
-
-TEST(test_brute_force)
-{
-	for (size_t i = 0; i < N(kinds); i++) {
-		struct incise_plant exact = kinds[i], rough = kinds[i];
-
-		for (int tick = 0; tick < 60; tick++) {
-			incise_plant_step(&exact, force(tick), 1e-3);
-			brute(&rough, force(tick), 1e-3, 5000);
-			/* Steps of 0.2 µs at up to 1 m/s: 0.2 µm, some of them. */
-			near(exact.position_mm, rough.position_mm, 2e-3);
-			near(exact.velocity_mm_s, rough.velocity_mm_s,
-			     5e-3 * (1 + fabs(exact.velocity_mm_s)) +
-				     2e-3 * sqrt(kinds[i].wall_N_mm / (0.05 * G)));
-		}
 	}
 }
 

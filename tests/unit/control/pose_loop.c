@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * The limit of a wall felt through a tracker: against runs in time whose poses and ticks
- * have no common period, and against theory where the predictor only interpolates.
+ * have no common period.
  */
 #include "../unit.h"
 #include <incise/clock.h>
@@ -154,43 +154,6 @@ TEST(test_against_time)
 		/* Three digits are written down. */
 		assert_true(fabs(limit - row->ratio) < 0.002 * row->ratio + 0.0005);
 	}
-}
-
-/*
- * A filter that takes each pose for the truth and does not extrapolate: blending goes
- * from pose to pose in a straight line, which is the motion latency + P ago, but for its
- * curvature. So the limit is that of a delay, the nearer the slower it is at the limit.
- */
-TEST(test_interpolation_is_a_delay)
-{
-	static const struct {
-		double bT_m, within;
-	} cases[] = {{1e-4, 1e-3}, {1e-3, 1e-3}, {1e-2, 5e-3}, {1e-1, 0.04}};
-
-	for (size_t i = 0; i < N(cases); i++) {
-		struct incise_haptic_device device = device_of(0.05, cases[i].bT_m);
-		struct incise_predict predict;
-		double want;
-
-		set_predict(&predict, 125, 4e-3);
-		predict.alpha = 1;
-		predict.beta = predict.gamma = 0;
-		device.delay_ticks = 12;
-		want = incise_stability_limit(&device, 0);
-		assert_true(fabs(limit_of(&device, &predict, 0) - want) <
-			    cases[i].within * want);
-	}
-}
-
-/* More acceleration of the mass by the same force and time is the same wall. */
-TEST(test_units)
-{
-	struct incise_haptic_device a = device_of(0.05, 0.2), b = device_of(5, 0.2);
-	struct incise_predict predict;
-
-	set_predict(&predict, 120, 4.2e-3);
-	assert_true(fabs(limit_of(&b, &predict, 0) / limit_of(&a, &predict, 0) - 100) <
-		    1e-4);
 }
 
 static double margin_of(const struct incise_haptic_device *device,

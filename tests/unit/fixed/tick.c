@@ -1,40 +1,20 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * The stages of a tick in integers: each force compared with its formula, written out here in double;
- * start, limits and targets; then random plans at work, and numbers at their ends.
+ * The stages of a tick in integers: limits and targets; then random plans at work, and numbers at their
+ * ends. ../scene/forces.c compares each force with its formula.
  */
 #include "../unit.h"
 #include "trial_plan.h"
 
 #define CASES 20000
-#define ONE 65536.0
-#define UNIT 1073741824.0
-#define LSB (1 / ONE)
 
 static struct incise_fx_trial trial;
 static struct incise_fixed_state tick_state;
-
-static int32_t fixed(double v)
-{
-	return (int32_t)lrint(v * ONE);
-}
 
 static double any(double least, double most)
 {
 	return least +
 	       (most - least) * (incise_fx_trial_next(&trial.seed) >> 11) * 0x1p-53;
-}
-
-static void any_place(int32_t p[3], double most)
-{
-	for (int i = 0; i < 3; i++)
-		p[i] = fixed(any(-most, most));
-}
-
-static void from_unit(double to[3], const int32_t unit[3])
-{
-	for (int i = 0; i < 3; i++)
-		to[i] = unit[i] / UNIT;
 }
 
 static double dot(const double a[3], const double b[3])
@@ -48,127 +28,6 @@ static int begin(void **state)
 	if (!trial.seed)
 		trial.seed = 1;
 	return 0;
-}
-
-/* Run a stage; the force that it adds, N. */
-static void effect(double force[3], const struct incise_fixed_plan *plan,
-		   incise_fixed_stage_fn *stage, struct incise_fixed_tick *tick)
-{
-	int32_t was[3];
-
-	for (int i = 0; i < 3; i++)
-		was[i] = tick_state.force[i] = fixed(any(-4, 4));
-	stage(plan, &tick_state, tick);
-	for (int i = 0; i < 3; i++)
-		force[i] = (tick_state.force[i] - was[i]) / ONE;
-}
-
-static void assert_force(const double got[3], const double want[3], double most)
-{
-	for (int i = 0; i < 3; i++)
-		if (!(fabs(got[i] - want[i]) <= most))
-			fail_msg("part %d is %.9g N, not %.9g: off by %.3g of %.3g N", i,
-				 got[i], want[i], got[i] - want[i], most);
-}
-
-static struct incise_fixed_tick tick_in(enum incise_phase phase)
-{
-	return (struct incise_fixed_tick){.phase = phase};
-}
-
-/* A state and a place of the tool as any may be. */
-static struct incise_fixed_tick any_state(enum incise_phase phase)
-{
-	struct incise_fixed_tick tick = tick_in(phase);
-
-	any_place(tick.tool, 20);
-	any_place(tick_state.p0, 20);
-	any_place(tick_state.velocity, 500);
-	incise_fx_trial_unit(&trial, tick_state.normal, 3);
-	incise_fx_trial_unit(&trial, tick_state.entry, 3);
-	incise_fx_trial_unit(&trial, tick_state.side, 3);
-	incise_fx_trial_unit(&trial, tick_state.flat, 3);
-	incise_fx_trial_unit(&trial, tick_state.opening.along, 3);
-	tick_state.held = any(0, 3) < 1 ? INCISE_TOOL_TUBE : INCISE_TOOL_HANDLE;
-	tick_state.opening.in = any(0, 2) < 1;
-	tick_state.opening.depth_mm = fixed(any(0, 20));
-	tick_state.tightness = fixed(any(0, 1));
-	tick_state.depth = fixed(any(0, 30));
-	return tick;
-}
-
-/* Depth of skin that holds up as much: beside the cut all, in it Fort of that as deep as the cut is. */
-static double held_up_mm(double aligned, const double flat[3], const double along[3])
-{
-	double depth = tick_state.depth / ONE, cut = 0, eased;
-
-	if (tick_state.opening.in)
-		cut = fmin(depth, tick_state.opening.depth_mm / ONE);
-	eased = aligned + (1 - aligned) * (tick_state.tightness / ONE) *
-				  (tick_state.held == INCISE_TOOL_TUBE
-					   ? 1
-					   : fabs(dot(flat, along)));
-	return depth - cut + eased * cut;
-}
-
-/*
- * Each force within its roundings: of a reaction its product and each part; of the plane the stretch, the
- * product and each part; of a spread the part along n0, the vector across and the product; of an
- * insertion 2 LSB of Fort times 20 mm and 2 N/mm, and the rest by one each.
- */
-TEST(test_forces, begin)
-{
-	for (int k = 0; k < CASES; k++) {
-		double K = fixed(any(0, 2)) / ONE, aligned = fixed(any(0, 1)) / ONE;
-		double damping = lrint(any(0, 0.01) * 268435456) / 268435456.0;
-		double off[3], n[3], e[3], s[3], flat[3], along[3], depth, held,
-			want[5][3];
-		struct incise_fixed_tick cutting = any_state(INCISE_PHASE_CUTTING),
-					 inserting = cutting;
-		struct incise_fixed_plan plan = {
-			.numbers = {.reaction = fixed(K),
-				    .plane = fixed(K),
-				    .insertion = fixed(K),
-				    .aligned = fixed(aligned),
-				    .spread = fixed(K),
-				    .damping = (int32_t)lrint(damping * 268435456)}};
-		const struct {
-			incise_fixed_stage_fn *stage;
-			struct incise_fixed_tick *tick;
-			double most;
-		} forces[] = {
-			{incise_fixed_stage_reaction, &cutting, LSB},
-			{incise_fixed_stage_plane, &cutting, (K / 2 + 1) * LSB},
-			{incise_fixed_stage_damping, &cutting, LSB},
-			{incise_fixed_stage_insertion, &inserting,
-			 (2 * 20 * K + K + 1.5) * LSB},
-			{incise_fixed_stage_spread, &inserting, (K + 0.5) * LSB + 1e-9},
-		};
-
-		inserting.phase = INCISE_PHASE_INSERTION;
-		from_unit(n, tick_state.normal);
-		from_unit(e, tick_state.entry);
-		from_unit(s, tick_state.side);
-		from_unit(flat, tick_state.flat);
-		from_unit(along, tick_state.opening.along);
-		for (int i = 0; i < 3; i++)
-			off[i] = (cutting.tool[i] - tick_state.p0[i]) / ONE;
-		depth = tick_state.depth / ONE;
-		held = held_up_mm(aligned, flat, along);
-		for (int i = 0; i < 3; i++) {
-			want[0][i] = K * depth * n[i];
-			want[1][i] = -K * dot(off, s) * s[i];
-			want[2][i] = -damping * tick_state.velocity[i] / ONE;
-			want[3][i] = K * held * n[i];
-			want[4][i] = -K * (off[i] - dot(off, e) * e[i]);
-		}
-		for (int f = 0; f < 5; f++) {
-			double got[3];
-
-			effect(got, &plan, forces[f].stage, forces[f].tick);
-			assert_force(got, want[f], forces[f].most);
-		}
-	}
 }
 
 static double length_of(const int32_t v[3])

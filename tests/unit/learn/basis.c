@@ -114,28 +114,6 @@ TEST(test_derivative)
 	}
 }
 
-TEST(test_store)
-{
-	for (int type = 0; type < 2; type++) {
-		struct incise_model *a = paper_model(type, 5, 1);
-		struct incise_model *b = paper_model(type, 5, 1);
-		struct incise_basis basis;
-
-		paper_disturb(a, 9, 0.3);
-		assert_int_equal(incise_basis_init(&basis, a), 0);
-		incise_basis_store(&basis, b);
-		for (int i = 0; i < 2; i++)
-			for (int k = 0; k < incise_model_info(a)->n_mfs[i]; k++)
-				assert_memory_equal(incise_model_mf(a, i, k)->p,
-						    incise_model_mf(b, i, k)->p,
-						    (type ? 3 : 2) * sizeof(double));
-		assert_int_equal(incise_basis_set_consequents(b, (double[60]){NAN}),
-				 -EDOM);
-		incise_model_free(a);
-		incise_model_free(b);
-	}
-}
-
 /* A weight, an input left out, or rules in another order: not a plain grid. */
 TEST(test_what_is_no_grid)
 {

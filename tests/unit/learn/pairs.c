@@ -35,20 +35,6 @@ TEST(test_output)
 	}
 }
 
-/* A constant has no spread, whatever rounding makes of its mean. */
-TEST(test_constant_output)
-{
-	static const struct incise_variable in[] = {{"x", 0, 1}};
-	double rows[] = {0, 0.7, 0.3, 0.7, 1, 0.7}, row[2];
-	struct incise_pairs pairs = {rows, 3, 1};
-	struct incise_scaling scaling;
-
-	incise_scaling_find(&scaling, in, &pairs);
-	incise_scaling_row(&scaling, rows, row);
-	assert_true(fabs(row[1]) < 1e-14);
-	assert_true(scaling.scale[1] == 0.7);
-}
-
 /* Scaled premises fire as the raw ones do, and come back. */
 TEST(test_premises)
 {
@@ -166,18 +152,6 @@ TEST(test_r2)
 		rows[1] = rows[3] = rows[5] = 0.1 * sizes[s];
 		assert_true(isnan(incise_pairs_r2(&pairs, 0)));
 	}
-}
-
-TEST(test_rows)
-{
-	bool check[120];
-	int n = 0;
-
-	/* The paper's halves: just 60 of 120. */
-	assert_int_equal(incise_split(120, NULL, 0.5, 1, check, NULL), 0);
-	for (int i = 0; i < 120; i++)
-		n += check[i];
-	assert_int_equal(n, 60);
 }
 
 TEST(test_groups_stay_whole)

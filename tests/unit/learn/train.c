@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Training held against published tables (MATLAB's and Jang's), against a second
- * implementation of Jang's rule, against data where the right answer is known, and against
- * data where there is none.
+ * Training held against published tables (MATLAB's and Jang's), against data where the right
+ * answer is known, and against data where there is none.
  */
 #include "../unit.h"
 #include <incise/train.h>
@@ -133,156 +132,6 @@ TEST(test_matlab_mackey_glass)
 	assert_int_equal(report.parameters, 16 * 5 + 8 * 3);
 }
 
-/*
- * Jang's rule a second time, from the paper's equations and as MATLAB works: recursive
- * least squares that starts with S = 1e6·I, bells and products written out. It shares no
- * code with the library.
- */
-#define MG_RULES 16
-#define MG_UNKNOWNS (MG_RULES * 5)
-
-struct second {
-	double bell[4][2][3];
-	double s[MG_UNKNOWNS][MG_UNKNOWNS], p[MG_UNKNOWNS];
-	double step, rmse[5];
-	int changed[2]; /* epoch of the last growth and shrinking */
-};
-
-static double bell(const double *p, double x)
-{
-	return 1 / (1 + pow((x - p[2]) / p[0] * ((x - p[2]) / p[0]), p[1]));
-}
-
-static double strengths(const struct second *a, const double *x, double *w)
-{
-	double sum = 0;
-
-	for (int r = 0; r < MG_RULES; r++) {
-		w[r] = 1;
-		for (int i = 0; i < 4; i++)
-			w[r] *= bell(a->bell[i][r >> (3 - i) & 1], x[i]);
-		sum += w[r];
-	}
-	return sum;
-}
-
-static void recursive_least_squares(struct second *a, const double *rows, int n)
-{
-	static double sa[MG_UNKNOWNS];
-
-	memset(a->p, 0, sizeof(a->p));
-	memset(a->s, 0, sizeof(a->s));
-	for (int k = 0; k < MG_UNKNOWNS; k++)
-		a->s[k][k] = 1e6;
-	for (int t = 0; t < n; t++) {
-		const double *x = rows + 5 * t;
-		double w[MG_RULES], v[MG_UNKNOWNS], sum = strengths(a, x, w);
-		double gain = 1, error = x[4];
-
-		for (int k = 0; k < MG_UNKNOWNS; k++)
-			v[k] = w[k / 5] / sum * (k % 5 ? x[k % 5 - 1] : 1);
-		for (int k = 0; k < MG_UNKNOWNS; k++) {
-			sa[k] = 0;
-			for (int j = 0; j < MG_UNKNOWNS; j++)
-				sa[k] += a->s[k][j] * v[j];
-			gain += v[k] * sa[k];
-			error -= v[k] * a->p[k];
-		}
-		for (int k = 0; k < MG_UNKNOWNS; k++) {
-			for (int j = 0; j < MG_UNKNOWNS; j++)
-				a->s[k][j] -= sa[k] * sa[j] / gain;
-			a->p[k] += sa[k] / gain * error;
-		}
-	}
-}
-
-/* RMSE, and ∂E/∂(a, b, c) of each bell from ∂A/∂(a, b, c), rule by rule. */
-static double back_propagate(const struct second *a, const double *rows, int n,
-			     double g[4][2][3])
-{
-	double total = 0;
-
-	memset(g, 0, 4 * 2 * 3 * sizeof(double));
-	for (int t = 0; t < n; t++) {
-		const double *x = rows + 5 * t;
-		double w[MG_RULES], f[MG_RULES], sum = strengths(a, x, w), y = 0;
-
-		for (int r = 0; r < MG_RULES; r++) {
-			f[r] = a->p[5 * r];
-			for (int i = 0; i < 4; i++)
-				f[r] += a->p[5 * r + 1 + i] * x[i];
-			y += w[r] / sum * f[r];
-		}
-		total += (y - x[4]) * (y - x[4]);
-		for (int r = 0; r < MG_RULES; r++)
-			for (int i = 0; i < 4; i++) {
-				int k = r >> (3 - i) & 1;
-				const double *q = a->bell[i][k];
-				double d = x[i] - q[2], u = bell(q, x[i]);
-				/* ∂E/∂A */
-				double e = 2 * (y - x[4]) * (f[r] - y) / sum * w[r] / u;
-
-				if (d == 0)
-					continue;
-				g[i][k][0] += e * 2 * q[1] / q[0] * u * (1 - u);
-				g[i][k][1] -=
-					e * log(d * d / (q[0] * q[0])) * u * (1 - u);
-				g[i][k][2] += e * 2 * q[1] / d * u * (1 - u);
-			}
-	}
-	return sqrt(total / n);
-}
-
-static void move(struct second *a, double g[4][2][3], int epoch)
-{
-	const double *e = a->rmse;
-	double norm = 0;
-
-	for (int k = 0; k < 24; k++)
-		norm += pow(g[k / 6][k / 3 % 2][k % 3], 2);
-	for (int k = 0; k < 24; k++)
-		a->bell[k / 6][k / 3 % 2][k % 3] -=
-			a->step * g[k / 6][k / 3 % 2][k % 3] / sqrt(norm);
-	if (epoch - a->changed[1] >= 4 && e[0] < e[1] && e[1] > e[2] && e[2] < e[3] &&
-	    e[3] > e[4]) {
-		a->step *= 0.9;
-		a->changed[1] = epoch;
-	}
-	if (epoch - a->changed[0] >= 4 && e[0] < e[1] && e[1] < e[2] && e[2] < e[3] &&
-	    e[3] < e[4]) {
-		a->step *= 1.1;
-		a->changed[0] = epoch;
-	}
-}
-
-/* Two ways to the same 30 training errors, to 1e-9; the step has changed by then. */
-TEST(test_second_implementation)
-{
-	static double rows[500 * 5];
-	static struct second a;
-	static struct curve curve;
-	double min[4], max[4], g[4][2][3];
-
-	train_mackey_glass(117, 30, &curve, &report);
-	mackey_glass_pairs(rows, 117, 500);
-	ranges(rows, 500, 4, min, max);
-	a.step = 0.01;
-	for (int i = 0; i < 4; i++)
-		for (int k = 0; k < 2; k++) {
-			a.bell[i][k][0] = (max[i] - min[i]) / 2;
-			a.bell[i][k][1] = 2;
-			a.bell[i][k][2] = k ? max[i] : min[i];
-		}
-	for (int e = 0; e < 30; e++) {
-		recursive_least_squares(&a, rows, 500);
-		memmove(a.rmse + 1, a.rmse, 4 * sizeof(double));
-		a.rmse[0] = back_propagate(&a, rows, 500, g);
-		assert_true(fabs(a.rmse[0] - curve.train[e]) < 1e-9);
-		move(&a, g, e);
-	}
-	assert_true(a.step > 0.0101);
-}
-
 /* Jang 1993, example 4: 500 epochs; published .0016, .0015 and NDEI .007. */
 TEST(test_jang_example_4)
 {
@@ -357,36 +206,6 @@ TEST(test_jang_example_2)
 	assert_true(fabs(ape(model, rows, 216) - .0433) <= 0.5e-4);
 	assert_true(fabs(ape(model, check, 125) - 1.0658) <= 0.5e-4);
 	incise_model_free(model);
-}
-
-/* A plane lies within reach of any first-order model: both ways must find it. */
-TEST(test_plane_is_learnt)
-{
-	double rows[400 * 3];
-	const int mfs[] = {3, 2};
-	const double min[] = {0, 10}, max[] = {20, 60};
-	struct incise_pairs pairs = {rows, 400, 2};
-
-	for (int i = 0; i < 400; i++) {
-		double *row = rows + 3 * i;
-
-		row[0] = i % 20 * 20.0 / 19;
-		row[1] = 10 + i / 20 * 50.0 / 19;
-		row[2] = 0.3 + 0.1 * row[0] - 0.02 * row[1];
-	}
-	for (int classic = 0; classic < 2; classic++) {
-		struct incise_model *model = grid(2, min, max, mfs, INCISE_MF_GAUSS);
-
-		incise_train_options_init(&options);
-		options.classic = classic;
-		options.epochs = 5;
-		assert_int_equal(
-			incise_train(model, &pairs, NULL, &options, &report, NULL), 0);
-		/* What remains is the ridge's pull: at most 1e-4 of squared scaled
-		 * coefficients of order 1 against 400 pairs, output spread 0.7. */
-		assert_true(report.train_rmse < 1e-3);
-		incise_model_free(model);
-	}
 }
 
 /*

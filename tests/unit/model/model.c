@@ -1,63 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * The model in double against a plain long-double evaluation of eq. (3), and where that
- * one breaks down.
+ * The model in double against its formulas in long double, and where those break down.
  */
 #include "../unit.h"
 #include <float.h>
 #include "../cases.h"
 #include "../message.h"
 #include "any_model.h"
-
-/* Eq. (1)–(3) as printed, with σ = √2 s. */
-static long double plain(const struct incise_model *model, const double *x)
-{
-	const struct incise_model_info *info = incise_model_info(model);
-	long double sum = 0, weights = 0;
-
-	for (int r = 0; r < info->n_rules; r++) {
-		const double *p = incise_model_rule(model, r)->p;
-		long double w = 1, y = p[0];
-
-		for (int i = 0; i < info->n_inputs; i++) {
-			const struct incise_mf *mf = incise_model_mf(
-				model, i, incise_model_rule(model, r)->mf[i]);
-
-			if (mf->type == INCISE_MF_GAUSS)
-				w *= expl(-powl(x[i] - mf->p[1], 2) /
-					  powl(M_SQRT2 * (long double)mf->p[0], 2));
-			else
-				w /= 1 + powl(fabsl((x[i] - mf->p[2]) / mf->p[0]),
-					      2 * mf->p[1]);
-			y += p[i + 1] * (long double)x[i];
-		}
-		sum += w * y;
-		weights += w;
-	}
-	return sum / weights;
-}
-
-TEST(test_against_plain)
-{
-	for (int type = INCISE_MF_GAUSS; type <= INCISE_MF_GBELL; type++)
-		for (uint64_t seed = 1; seed <= 20; seed++) {
-			struct incise_model *model = paper_model(type, seed, 3);
-			uint64_t points = seed;
-
-			paper_disturb(model, seed, 0.3);
-			for (int n = 0; n < 500; n++) {
-				double x[] = {10 + 10 * paper_random(&points),
-					      25 + 25 * paper_random(&points)};
-				unsigned int flags = 99;
-				double y = incise_model_eval(model, x, &flags);
-
-				/* A few dozen roundings of terms up to 9. */
-				assert_true(fabsl(y - plain(model, x)) < 1e-13);
-				assert_int_equal(flags, 0);
-			}
-			incise_model_free(model);
-		}
-}
 
 /*
  * Any model within its ranges: all kinds, free lists, weights, prod and min, up to 8 inputs
@@ -220,24 +169,6 @@ TEST(test_grids_are_told_from_lists)
 	}
 }
 
-TEST(test_firing_adds_up_to_one)
-{
-	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 1, 1);
-	static const double xs[][2] = {{10, 25}, {0, 0}, {1e4, -1e4}, {1e300, 1e300}};
-
-	for (size_t i = 0; i < 4; i++) {
-		double w[20], sum = 0;
-
-		incise_model_firing(model, xs[i], w);
-		for (int r = 0; r < 20; r++) {
-			assert_true(w[r] >= 0 && w[r] <= 1);
-			sum += w[r];
-		}
-		assert_true(fabs(sum - 1) < 1e-14);
-	}
-	incise_model_free(model);
-}
-
 /* Far out every firing strength is zero: the nearest rule answers. */
 TEST(test_nearest_rule_takes_over)
 {
@@ -246,8 +177,6 @@ TEST(test_nearest_rule_takes_over)
 	const double *p = incise_model_rule(model, 19)->p;
 	unsigned int flags;
 
-	assert_true(isnan((double)plain(model, far)) ||
-		    !isfinite((double)plain(model, far)));
 	incise_model_set_clamp(model, false);
 	assert_true(fabs(incise_model_eval(model, far, &flags) -
 			 (p[0] + p[1] * 1000 + p[2] * 5000)) < 1e-9);
@@ -401,38 +330,6 @@ TEST(test_nearest_rule_by_min)
 	incise_model_free(model);
 }
 
-/* min is the least degree, not their product; a weight comes after it. */
-TEST(test_min_and_weights_by_hand)
-{
-	struct incise_model *model = with_gaps();
-	double w[4];
-
-	model->rule[1].weight = 0.5;
-	model->rule[2] = model->rule[0];
-	model->rule[2].mf[1] = -1; /* near alone */
-	model->rule[3].weight = 0;
-	model->info.and_method = INCISE_AND_MIN;
-	incise_model_classify(model);
-	/* near 0.5, wide exp(-1/50) = 0.98, narrow 0.6 */
-	incise_model_firing(model, (double[]){0.5, 4.6}, w);
-	assert_true(fabs(w[0] - 0.4) < 1e-15 && fabs(w[1] - 0.2) < 1e-15);
-	assert_true(fabs(w[2] - 0.4) < 1e-15 && w[3] == 0);
-	assert_int_equal(incise_model_info(model)->and_method, INCISE_AND_MIN);
-	assert_true(incise_model_rule(model, 1)->weight == 0.5);
-	assert_true(incise_model_rule(model, 3)->weight == 0);
-	/* As prod: 0.5 e^-1/50, 0.15, 0.5 */
-	model->info.and_method = INCISE_AND_PROD;
-	incise_model_classify(model);
-	incise_model_firing(model, (double[]){0.5, 4.6}, w);
-	assert_true(fabs(w[0] - 0.5 * exp(-0.02) / (0.65 + 0.5 * exp(-0.02))) < 1e-15);
-	assert_true(fabs(w[1] - 0.15 / (0.65 + 0.5 * exp(-0.02))) < 1e-15);
-	/* A rule of weight 0 does not even stand in where it is the only one to fire. */
-	model->info.n_rules = 4;
-	incise_model_firing(model, (double[]){11, 5}, w);
-	assert_true(w[3] == 0 && fabs(w[0] + w[1] + w[2] - 1) < 1e-15);
-	incise_model_free(model);
-}
-
 /* An input, hostile or plain. */
 static double any_input(uint64_t *seed)
 {
@@ -509,34 +406,6 @@ TEST(test_nothing_yields_nan)
 	}
 	assert_true(compared > 10000 && compared_far > 20 && nowhere > 10000);
 	free(model);
-}
-
-TEST(test_no_input_yields_nan)
-{
-	static const double hostile[] = {0,	   -0.0,     1e300,	-1e300,
-					 NAN,	   INFINITY, -INFINITY, DBL_MAX,
-					 -DBL_MAX, DBL_MIN,  5e-324};
-	static const double widths[] = {1e-12, 1e-6, 1, 1e6, 1e12};
-	int n = sizeof(hostile) / sizeof(*hostile);
-
-	for (size_t w = 0; w < 5; w++)
-		for (int clamp = 0; clamp < 2; clamp++) {
-			struct incise_model *model = paper_model(INCISE_MF_GAUSS, 3, 1e6);
-
-			incise_model_set_clamp(model, clamp);
-			for (int k = 0; k < 5; k++) {
-				double p[4] = {widths[w],
-					       incise_model_mf(model, 0, k)->p[1]};
-
-				assert_int_equal(incise_model_set_mf(model, 0, k, p), 0);
-			}
-			for (int i = 0; i < n * n; i++) {
-				double x[] = {hostile[i / n], hostile[i % n]};
-
-				assert_true(isfinite(incise_model_eval(model, x, NULL)));
-			}
-			incise_model_free(model);
-		}
 }
 
 TEST(test_grid_shape)
@@ -680,33 +549,6 @@ TEST(test_setters_refuse_what_is_no_number)
 			    24);
 	incise_model_free(model);
 	incise_model_free(copy);
-}
-
-/* A zero-order rule that is given slopes is one of first order, in the file too. */
-TEST(test_constant_rule_takes_slopes)
-{
-	char path[] = "/tmp/incise-model-XXXXXX";
-	static const char text[] =
-		"[System]\nName='c'\nType='sugeno'\nNumInputs=1\nNumOutputs=1\nNumRules=1\n"
-		"[Input1]\nName='x'\nRange=[0 10]\nNumMFs=1\nMF1='a':'gaussmf',[1 0]\n"
-		"[Output1]\nName='y'\nNumMFs=1\nMF1='c':'constant',[1]\n"
-		"[Rules]\n1, 1 (1) : 1\n";
-	struct incise_model *model;
-	int fd = mkstemp(path);
-
-	assert_int_equal(write(fd, text, sizeof(text) - 1), sizeof(text) - 1);
-	close(fd);
-	model = incise_model_load(path, NULL);
-	assert_non_null(model);
-	assert_int_equal(incise_model_set_consequent(model, 0, (double[]){1, 2}), 0);
-	assert_int_equal(incise_model_save(model, path, NULL), 0);
-	incise_model_free(model);
-	/* The output has no range: neither had it in the first file. */
-	model = incise_model_load(path, NULL);
-	assert_non_null(model);
-	assert_true(incise_model_eval(model, (double[]){5}, NULL) == 11);
-	incise_model_free(model);
-	unlink(path);
 }
 
 /* Of random points, some of them outside or not finite: the count, and the first that is bad. */

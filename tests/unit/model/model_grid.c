@@ -146,38 +146,6 @@ TEST(test_refusals)
 	refused(model, ERANGE, "low: its centre");
 }
 
-TEST(test_same_model)
-{
-	struct incise_model *models[] = {paper_model(INCISE_MF_GAUSS, 2, 3),
-					 line_model(3)};
-	struct incise_grid *grid = malloc(sizeof(*grid));
-	uint64_t seed = 1;
-
-	for (int m = 0; m < 2; m++) {
-		assert_int_equal(incise_grid_init(grid, models[m], NULL), 0);
-		assert_int_equal(grid->one, m);
-		for (int n = 0; n < 1000; n++) {
-			double x[] = {5 + 5 * paper_random(&seed),
-				      25 + 25 * paper_random(&seed)};
-			long double a[INCISE_FIXED_MFS_MAX], b[INCISE_FIXED_MFS_MAX],
-				y = 0;
-			double xb = m ? x[0] : x[1];
-
-			incise_axis_at(&grid->a, m ? 0 : x[0], a);
-			incise_axis_at(&grid->b, xb, b);
-			for (int i = 0; i < grid->a.n; i++)
-				for (int j = 0; j < grid->b.n; j++)
-					y += a[i] * b[j] *
-					     (grid->p[i][j][0] + grid->p[i][j][1] * x[0] +
-					      grid->p[i][j][2] * xb);
-			assert_true(fabsl(y - incise_model_eval(models[m], x, NULL)) <
-				    1e-13);
-		}
-		incise_model_free(models[m]);
-	}
-	free(grid);
-}
-
 TEST(test_sizes)
 {
 	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 1, 0);
@@ -352,21 +320,6 @@ TEST(test_ends_between_lsbs)
 		incise_model_free(model);
 	}
 	assert_true(compiled_models > 300);
-}
-
-/* A plane has no second derivative: interpolation is exact and the bound knows it. */
-TEST(test_plane_needs_no_cells)
-{
-	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 1, 1);
-	struct incise_fixed *fx;
-
-	for (int r = 0; r < 20; r++)
-		incise_model_set_consequent(model, r, (double[]){0.5, 0.05, 0.01});
-	fx = compiled(model, INCISE_FIXED_FORCE, 32);
-	/* Half an LSB of output and of inputs, and the table's. */
-	assert_true(incise_fixed_bound(fx) < 10e-6);
-	incise_fixed_free(fx);
-	incise_model_free(model);
 }
 
 TEST(test_finer_cells_lower_bound)

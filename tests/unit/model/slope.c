@@ -95,21 +95,6 @@ TEST(test_certified)
 	}
 }
 
-TEST(test_shipped_model)
-{
-	struct incise_model *model = incise_model_load("scenes/liver.fis", NULL);
-	struct incise_slope slopes[2], found[2];
-
-	assert_non_null(model);
-	assert_int_equal(incise_model_slopes(model, slopes), 0);
-	look(model, found);
-	for (int i = 0; i < 2; i++) {
-		assert_true(slopes[i].certified);
-		assert_encloses(&slopes[i], &found[i], TIGHT);
-	}
-	incise_model_free(model);
-}
-
 /* Whatever the functions are, rules that agree make a plane. */
 TEST(test_plane)
 {

@@ -296,25 +296,6 @@ TEST(test_own_delay)
 	}
 }
 
-/* A kick dies out at nine tenths of the limit. */
-TEST(test_rests_below_the_limit)
-{
-	static const struct wall walls[] = {
-		{.mass_kg = 0.05, .b = 0.01},
-		{.mass_kg = 0.05, .b = 0.005},
-		{.mass_kg = 0.2, .b = 0.04, .B = 0.002},
-	};
-
-	for (size_t i = 0; i < N(walls); i++) {
-		struct wall wall = walls[i];
-
-		wall.delay_ticks = -1;
-		wall.K = 0.9 * limit_of(&wall);
-		/* The kick is 0.03 mm or more; what stays is the fixed point's step, 15 µN. */
-		assert_true(press(&wall, 6).last_mm < 1e-3);
-	}
-}
-
 TEST(test_shipped_scenes)
 {
 	static const char *const names[] = {"liver", "neck", "wall"};

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * Each force of paper 2, in both kinds of numbers, compared with its formula, written out here by
- * components, and with what the paper's words ask for; where the print cannot be meant, its formula stands
- * here and shows why. Then the phases of each force.
+ * components. Then the phases of each force.
  */
 #include "../unit.h"
 #include "../../../lib/base/vector.h"
@@ -238,18 +237,6 @@ static void printed_fn(double f[3], double k, const double p[3], const double p0
 		f[i] = -k * along * sn[i];
 }
 
-/* Fxz = Kxz {[(Q - P) - (Q0 - P0)]·(Q - P)} (Q0 - P0) */
-static void printed_fxz(double f[3], double k, const double p[3], const double q[3],
-			const double p0[3], const double q0[3])
-{
-	double brace = 0;
-
-	for (int i = 0; i < 3; i++)
-		brace += ((q[i] - p[i]) - (q0[i] - p0[i])) * (q[i] - p[i]);
-	for (int i = 0; i < 3; i++)
-		f[i] = k * brace * (q0[i] - p0[i]);
-}
-
 /* Each adds to what is there already. */
 static void formulas(void)
 {
@@ -303,79 +290,6 @@ TEST(test_formulas)
 	formulas();
 }
 
-/* "The user feels greater resistance as the scalpel is penetrated deeper into the skin." */
-static void reaction_is_outward_and_grows(void)
-{
-	srand(2);
-	for (int c = 0; c < CASES; c++) {
-		double n[3], last = 0;
-
-		any_unit(n);
-		for (double depth = 0; depth < 8; depth += 0.5) {
-			double f[3] = {0};
-
-			reaction(f, 0.25 * depth, n);
-			assert_true(depth > 0 ? dot(f, n) > last : dot(f, n) == 0);
-			last = dot(f, n);
-		}
-	}
-}
-
-TEST(test_reaction_is_outward_and_grows)
-{
-	EACH_KIND
-	reaction_is_outward_and_grows();
-}
-
-/* "A correction force is applied whenever the scalpel drifts from the plane." */
-static void plane_is_free_within_and_opposes_leaving(void)
-{
-	srand(3);
-	for (int c = 0; c < CASES; c++) {
-		double side[3], p0[3], way[3], p[3], off = any(5);
-		double within[3] = {0}, beside[3] = {0};
-
-		any_unit(side);
-		any_vector(p0, 50);
-		any_vector(way, 20);
-		/* Any way within the plane of the cut. */
-		for (int i = 0; i < 3; i++)
-			p[i] = p0[i] + way[i] - dot(way, side) * side[i];
-		plane(within, 0.3, p, p0, side);
-		for (int i = 0; i < 3; i++) {
-			assert_true(fabs(within[i]) < ROUNDING);
-			p[i] += off * side[i];
-		}
-		plane(beside, 0.3, p, p0, side);
-		assert_true(fabs(dot(beside, side) + 0.3 * off) < ROUNDING);
-	}
-}
-
-TEST(test_plane_is_free_within_and_opposes_leaving)
-{
-	EACH_KIND
-	plane_is_free_within_and_opposes_leaving();
-}
-
-/* As printed, +Kd V, it would drive the blade on: F·v = Kd v² > 0. */
-static void damping_takes_power(void)
-{
-	srand(4);
-	for (int c = 0; c < CASES; c++) {
-		double v[3], f[3] = {0};
-
-		any_vector(v, 500);
-		damping(f, 0.001 * c, v);
-		assert_true(dot(f, v) <= 0);
-	}
-}
-
-TEST(test_damping_takes_power)
-{
-	EACH_KIND
-	damping_takes_power();
-}
-
 /*
  * "Easily inserted if it is oriented along the cut direction": the flat's normal is then
  * across the cut. Turned by t about the normal of the surface it is aligned +
@@ -405,121 +319,6 @@ TEST(test_orientation)
 {
 	EACH_KIND
 	turn_of_a_handle();
-}
-
-/* "Proportional to the distance of the instrument from its initial contact position." */
-static void spread_is_proportional(void)
-{
-	static const double n[3] = {0, 0, 1}, p0[3] = {3, -2, 0};
-
-	for (int i = -50; i <= 50; i++) {
-		double p[3] = {3 + 0.06 * i, -2 + 0.08 * i, -4}, f[3] = {0};
-
-		spread(f, 0.4, p, p0, n);
-		assert_true(fabs(f[0] + 0.4 * 0.06 * i) < ROUNDING);
-		assert_true(fabs(f[1] + 0.4 * 0.08 * i) < ROUNDING);
-		/* How deep it is does not count: that is Fy's. */
-		assert_true(f[2] == 0);
-	}
-}
-
-TEST(test_spread_is_proportional)
-{
-	EACH_KIND
-	spread_is_proportional();
-}
-
-/*
- * The print of Fxz: contact starts on the surface, Q(0) = P(0), so its last factor is 0
- * and the force is zero for ever, wherever the instrument goes. Ours is not.
- */
-static void printed_spread_is_zero_for_ever(void)
-{
-	static const double n[3] = {0, 0, 1}, p0[3] = {3, -2, 0};
-	double f[3], ours[3] = {0}, late[3] = {3, -2, -0.1};
-
-	srand(5);
-	for (int c = 0; c < CASES; c++) {
-		double p[3] = {any(10), any(10), -fabs(any(10))}, q[3] = {p[0], p[1], 0};
-
-		printed_fxz(f, 0.4, p, q, p0, p0);
-		assert_true(f[0] == 0 && f[1] == 0 && f[2] == 0);
-	}
-	spread(ours, 0.4, (double[]){4, -2, -3}, p0, n);
-	assert_true(fabs(ours[0] + 0.4) < ROUNDING);
-	/*
-	 * Nor would a contact that is seen late save it: 0.1 mm deep at first, 3 mm now, a
-	 * force of (3 - 0.1) · 3 · 0.1 along the normal, and none sideways however far it
-	 * is pushed.
-	 */
-	printed_fxz(f, 0.4, (double[]){13, -2, -3}, (double[]){13, -2, 0}, late, p0);
-	assert_true(f[0] == 0 && f[1] == 0);
-	assert_true(fabs(f[2] - 0.4 * 2.9 * 3 * 0.1) < ROUNDING);
-}
-
-TEST(test_printed_spread_is_zero_for_ever)
-{
-	EACH_KIND
-	printed_spread_is_zero_for_ever();
-}
-
-/* On a plane the printed depth is ours: P(0) lies in it, whatever the way. */
-static void printed_depth_on_a_plane(void)
-{
-	srand(6);
-	for (int c = 0; c < CASES; c++) {
-		double n[3], p0[3], way[3], p[3], depth = 4 + any(4);
-		double ours[3] = {0}, printed[3];
-
-		any_unit(n);
-		any_vector(p0, 50);
-		any_vector(way, 20);
-		for (int i = 0; i < 3; i++)
-			p[i] = p0[i] + way[i] - dot(way, n) * n[i] - depth * n[i];
-		reaction(ours, 0.25 * depth, n);
-		printed_fn(printed, 0.25, p, p0, n);
-		assert_vector(ours, printed);
-	}
-}
-
-TEST(test_printed_depth_on_a_plane)
-{
-	EACH_KIND
-	printed_depth_on_a_plane();
-}
-
-/*
- * On a neck of 55 mm radius a blade glides 20 mm around without pressing at all. The
- * print takes R (1 - cos(20/55)) = 3.60 mm for its depth, to the outside: it pulls the
- * blade in with 0.90 N. Pressed in by 3 mm there, it still pulls, with 0.15 N, where skin
- * pushes with 0.75 N.
- */
-static void printed_depth_on_a_sphere_pulls_in(void)
-{
-	static const struct {
-		double depth_mm, printed_N, ours_N;
-	} cases[] = {{0, -0.899, 0}, {3, -0.149, 0.75}};
-	const double r = 55, k = 0.25, turn = 20 / r;
-	const double n[3] = {sin(turn), 0, cos(turn)}, p0[3] = {0, 0, r};
-
-	for (size_t c = 0; c < sizeof(cases) / sizeof(*cases); c++) {
-		double d = cases[c].depth_mm, printed[3], ours[3] = {0};
-		double p[3] = {(r - d) * n[0], 0, (r - d) * n[2]};
-
-		printed_fn(printed, k, p, p0, n);
-		reaction(ours, k * d, n);
-		print_message("glided 20 mm, %g mm deep: printed %.3f N, ours %.3f N\n",
-			      d, dot(printed, n), dot(ours, n));
-		/* Half a unit of the last digit written here. */
-		assert_true(fabs(dot(printed, n) - cases[c].printed_N) < 5e-4);
-		assert_true(fabs(dot(ours, n) - cases[c].ours_N) < ROUNDING);
-	}
-}
-
-TEST(test_printed_depth_on_a_sphere_pulls_in)
-{
-	EACH_KIND
-	printed_depth_on_a_sphere_pulls_in();
 }
 
 /* 2 mm deep, 1 mm to both sides of where the contact began, at 10 mm/s along x. */

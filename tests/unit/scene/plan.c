@@ -35,21 +35,6 @@ static struct felt f;
 static struct incise_tick t;
 static struct incise_tracker_ops ops;
 
-TEST(test_stages)
-{
-	static const char *const want[] = {"pose",  "predict", "contact", "reaction",
-					   "start", "limit",   "actuate"};
-
-	for (int stepper = 0; stepper < 2; stepper++) {
-		felt_start(&f, "fixed", stepper ? BOTH : INCISE_RIG_TRACKER);
-		for (int i = 0; i < 6 + stepper; i++)
-			assert_string_equal(incise_plan_stage(f.plan, i), want[i]);
-		assert_null(incise_plan_stage(f.plan, 6 + stepper));
-		assert_null(incise_plan_stage(f.plan, -1));
-		felt_end(&f);
-	}
-}
-
 TEST(test_needs_a_tracker)
 {
 	struct incise_rig *none =
@@ -176,62 +161,6 @@ TEST(test_against_truth)
 }
 
 static uint64_t noise = 1;
-
-static int lying_tracker(struct incise_tracker *tracker,
-			 struct incise_tracker_sample *samples, int n)
-{
-	static int64_t t_ns = 1000000000;
-
-	for (int i = 0; i < 2 && i < n; i++) {
-		samples[i] = (struct incise_tracker_sample){.quaternion = {1}};
-		for (int k = 0; k < 3; k++) {
-			union {
-				uint64_t bits;
-				double value;
-			} u;
-
-			/* Any bit pattern, or a jump of some metres. */
-			incise_random_step(&noise);
-			u.bits = noise;
-			samples[i].position_mm[k] =
-				noise >> 63 ? u.value
-					    : (double)(noise >> 40) / 1000 - 8000;
-		}
-		t_ns += 500000;
-		samples[i].t_ns = noise % 50 ? t_ns : (int64_t)noise;
-	}
-	return 2;
-}
-
-TEST(test_any_pose_gives_a_force_within_limits)
-{
-	static const char *const evaluators[] = {"double", "fixed"};
-
-	for (int a = 0; a < 2; a++) {
-		double last = 0;
-		int contacts = 0;
-
-		felt_start(&f, evaluators[a], BOTH);
-		ops = *f.tracker_ops;
-		ops.read = lying_tracker;
-		incise_rig_tracker(f.rig)->ops = &ops;
-		for (int i = 0; i < 30000; i++) {
-			double force;
-
-			assert_int_equal(tick(&f, &t), 0);
-			force = size(t.command_N);
-			assert_true(isfinite(force) && force <= FELT_LIMIT_N);
-			assert_true(fabs(force - last) <= FELT_SLEW_N_S / 1000 + 1e-12);
-			assert_true(isfinite(t.depth_mm) && isfinite(t.velocity_mm_s));
-			assert_true(isfinite(t.rendered_N[0]));
-			last = force;
-			contacts += t.flags & INCISE_TICK_CONTACT;
-		}
-		/* The test did press on the tissue. */
-		assert_true(contacts > 1000);
-		felt_end(&f);
-	}
-}
 
 static int silent_tracker(struct incise_tracker *tracker,
 			  struct incise_tracker_sample *samples, int n)
@@ -463,25 +392,6 @@ TEST(test_attitude)
 			assert_true(fabs(t.quaternion[i] - turned[i]) < 1e-9);
 		fed_end(&fed);
 	}
-}
-
-/* A pose from the future is one of now: it does not keep the later ones out. */
-TEST(test_feed_from_the_future)
-{
-	struct fed fed = fed_start("scenes/wall.scene", true);
-	struct incise_tracker_sample pose = {.t_ns = INT64_MAX, .quaternion = {1}};
-
-	assert_int_equal(incise_plan_feed(fed.plan, &pose, 1), 1);
-	assert_int_equal(incise_plan_tick(fed.plan, 10000000, &t), 0);
-	for (int i = 1; i < 100; i++) {
-		pose.t_ns = 10000000 + i * INT64_C(8333333);
-		pose.position_mm[0] = 5;
-		assert_int_equal(incise_plan_feed(fed.plan, &pose, 1), 1);
-		assert_int_equal(incise_plan_tick(fed.plan, pose.t_ns, &t), 0);
-	}
-	/* The filter has come to rest there. */
-	assert_true(fabs(t.position_mm[0] - 5) < 1e-6);
-	fed_end(&fed);
 }
 
 TEST(test_set_tool)

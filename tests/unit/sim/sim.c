@@ -111,20 +111,6 @@ static bool tracker_equal(const struct log *a, const struct log *b, int n)
 	return true;
 }
 
-TEST(same_seed_same_samples)
-{
-	run(1, 4, &plain, &first);
-	run(1, 4, &plain, &second);
-	assert_int_equal(first.n_force, 40000);
-	assert_int_equal(second.n_force, 40000);
-	assert_int_equal(first.n_tracker, second.n_tracker);
-	assert_true(force_equal(&first, &second, 40000));
-	assert_true(tracker_equal(&first, &second, first.n_tracker));
-	run(2, 4, &plain, &second);
-	assert_false(force_equal(&first, &second, 40000));
-	assert_false(tracker_equal(&first, &second, first.n_tracker));
-}
-
 TEST(reading_changes_nothing)
 {
 	static const struct manner row[] = {
@@ -288,35 +274,6 @@ TEST(truth_is_the_law_without_disturbance)
 {
 	look_at_truth(INCISE_TISSUE_PAPER);
 	look_at_truth(INCISE_TISSUE_DISSIPATIVE);
-}
-
-TEST(tooth_goes_on_between_ticks)
-{
-	struct incise_clock *clock = incise_clock_new_simulated(START_NS);
-	struct incise_sim_config config;
-	struct incise_sim_truth truth;
-	struct incise_sim *sim;
-	double before = 0;
-
-	incise_sim_config_init(&config);
-	config.boundary = 0;
-	config.tooth = 0.9;
-	config.tooth_mm = 1000; /* no fracture in sight: the factor only rises */
-	sim = incise_sim_new(&config, clock, NULL);
-	for (int i = 0; i < 100; i++) {
-		double factor;
-
-		/* A quarter of a tick each, in the middle of the first cut. */
-		incise_clock_wait_until(clock,
-					START_NS + 5 * INCISE_NS_PER_S + i * 25000);
-		incise_sim_truth(sim, &truth);
-		factor = truth.force_N / incise_sim_mean_force(&config, truth.depth_mm,
-							       truth.velocity_mm_s);
-		assert_true(i == 0 || factor > before);
-		before = factor;
-	}
-	incise_sim_free(sim);
-	incise_clock_free(clock);
 }
 
 TEST(bad_configuration_is_refused)

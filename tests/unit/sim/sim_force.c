@@ -116,26 +116,6 @@ TEST(codes_stay_in_range)
 	}
 }
 
-TEST(info_names_the_channel)
-{
-	struct incise_clock *clock = incise_clock_new_simulated(START_NS);
-	struct incise_sim_config config;
-	struct incise_force_info info;
-	struct incise_force *force;
-	struct incise_sim *sim;
-
-	incise_sim_config_init(&config);
-	sim = incise_sim_new(&config, clock, NULL);
-	force = incise_sim_force_new(sim);
-	incise_force_info(force, &info);
-	assert_true(info.rate_hz == 10000 && info.full_scale_V == 5);
-	assert_int_equal(info.bits, 12);
-	assert_string_equal(info.name, "simulated force channel");
-	force->ops->close(force);
-	incise_sim_free(sim);
-	incise_clock_free(clock);
-}
-
 /* A weight takes the place of the blade, until it is taken off and the blade is back. */
 TEST(a_weight_hangs_in_place_of_the_blade)
 {

@@ -156,18 +156,6 @@ TEST(noise_is_as_configured, begin)
 	rig_free();
 }
 
-TEST(info_is_nominal, begin)
-{
-	struct incise_tracker_info info;
-
-	rig_new();
-	incise_tracker_info(rig.tracker, &info);
-	assert_true(info.rate_hz == 120); /* the drift is not reported */
-	assert_int_equal(info.latency_ns, 4200000);
-	assert_string_equal(info.name, "virtual tracker");
-	rig_free();
-}
-
 /*
  * With a tube the two stations take turns at the same rate. The tube goes down from above to below
  * and back; the scalpel is where it is without it.
