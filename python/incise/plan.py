@@ -68,6 +68,7 @@ class TrackerStruct(ctypes.Structure):
         ("scalpel_station", ctypes.c_uint8),
         ("tube_station", ctypes.c_uint8),
         ("network", c_bool),
+        ("lost_unsure", c_bool),
     ]
     c_name = "struct incise_tracker_info"
 

@@ -242,6 +242,7 @@ static void take_igtl_poses(struct igtl_poses *poses, const double (*matrix)[4],
 	poses->last_ns = sample.t_ns;
 	if (poses->counts)
 		lose(poses, incise_pace_add(&poses->pace, sample.t_ns, t_ns));
+	atomic_store_explicit(&poses->unsure, poses->pace.unsure, memory_order_relaxed);
 	sample.seq = poses->seq++;
 	sample.restarted = poses->restarted;
 	if (incise_ring_put(&poses->ring, &sample))

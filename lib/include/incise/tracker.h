@@ -65,6 +65,8 @@ struct incise_tracker_info {
 	uint8_t scalpel_station;
 	uint8_t tube_station; /**< station at the end of the tube; 0: no such station */
 	bool network;	      /**< poses come over a network, whose delay has no bound */
+	/** Records come in blocks or chunks, so that the count of losses may lack some. */
+	bool lost_unsure;
 };
 
 /** Counts of poses and of their flags. */
