@@ -30,6 +30,7 @@
  *   from then on all are as late as if one had been lost. Nothing tells these apart: it is no
  *   loss, and @unsure is set, as where chunks scatter by more than 1.5 T.
  * - A loss of one next to lateness of single samples by T or more.
+ * - A program that sends by sleeping has no period: where it slips, a loss counts.
  */
 #ifndef INCISE_DEVICE_PACE_H
 #define INCISE_DEVICE_PACE_H
