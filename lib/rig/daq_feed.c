@@ -116,6 +116,13 @@ void daq_feed_lose(struct daq_feed *feed, uint64_t n)
 	count_daq_feed(&feed->overflows, 1);
 }
 
+void daq_feed_pace(struct daq_feed *feed, struct incise_pace *pace, int64_t t_ns,
+		   int64_t arrival_ns)
+{
+	daq_feed_lose(feed, incise_pace_add(pace, t_ns, arrival_ns));
+	atomic_store_explicit(&feed->unsure, pace->unsure, memory_order_relaxed);
+}
+
 void daq_feed_end(struct daq_feed *feed, int error, const char *what)
 {
 	if (error == -ENODEV)
@@ -144,6 +151,7 @@ void daq_feed_info(const struct incise_force *force, struct incise_force_info *i
 	*info = feed->info;
 	info->clipped = atomic_load_explicit(&feed->clipped, memory_order_relaxed);
 	info->overflows = atomic_load_explicit(&feed->overflows, memory_order_relaxed);
+	info->lost_unsure = atomic_load_explicit(&feed->unsure, memory_order_relaxed);
 }
 
 uint64_t daq_feed_lost(const struct incise_force *force)

@@ -14,6 +14,7 @@
 #include <stdatomic.h>
 #include <incise/backend.h>
 #include "../base/ring.h"
+#include "pace.h"
 
 /* Capacity of the ring: the longest pause of a reader without loss, s. */
 #define DAQ_FEED_CAPACITY_S 4
@@ -23,7 +24,8 @@ struct daq_feed {
 	struct incise_force_info info; /* constant after opening */
 	struct incise_ring ring;
 	_Atomic uint64_t clipped, lost, overflows;
-	atomic_int error; /* 0, or -errno once the card is gone: then cause is there */
+	_Atomic bool unsure; /* lost may lack some */
+	atomic_int error;    /* 0, or -errno once the card is gone: then cause is there */
 	struct incise_error cause;
 	/* The thread's. */
 	uint64_t seq; /* of the next sample */
@@ -55,6 +57,9 @@ enum daq_wait daq_feed_wait(struct daq_feed *feed, int fd, int ms);
 void daq_feed_put(struct daq_feed *feed, int64_t t_ns, int32_t code);
 /* @n samples are missing before the next; counted as one overflow, unless @n is 0. */
 void daq_feed_lose(struct daq_feed *feed, uint64_t n);
+/* The next sample has @t_ns, and arrived at @arrival_ns: loses those that @pace finds missing. */
+void daq_feed_pace(struct daq_feed *feed, struct incise_pace *pace, int64_t t_ns,
+		   int64_t arrival_ns);
 /*
  * The last word: 0 (it was to stop), -ENODEV, or -EIO because of @what; reported to readers once
  * they have read all.

@@ -24,12 +24,13 @@
  *
  * Limits:
  * - The period may be off by 5 %; if a host looks at times of its own, by 0.2 %, and the caller says so.
- * - In the first three windows, and in the last three, a loss may be missing in the count; a source
+ * - In the first five windows, and in the last three, a loss may be missing in the count; a source
  *   that loses some in each of the first is slow.
  * - A host that looks at a multiple of T, or nearly, now and then finds a sample one look later;
  *   from then on all are as late as if one had been lost. Nothing tells these apart: it is no
  *   loss, and @unsure is set, as where chunks scatter by more than 1.5 T.
  * - A loss of one next to lateness of single samples by T or more.
+ * - A program that sends by sleeping has no period: where it slips, a loss counts.
  */
 #ifndef INCISE_DEVICE_PACE_H
 #define INCISE_DEVICE_PACE_H

@@ -69,6 +69,7 @@ class TrackerStruct(ctypes.Structure):
         ("tube_station", ctypes.c_uint8),
         ("network", c_bool),
         ("note", c_char * 300),
+        ("lost_unsure", c_bool),
     ]
     c_name = "struct incise_tracker_info"
 

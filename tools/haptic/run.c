@@ -344,7 +344,8 @@ static int write_log(struct incise_outfile *file, const struct incise_tick *tick
 }
 
 /* Memory for all ticks of a run; at most half of the machine's. */
-static void make_log(double duration_s, struct incise_loop_options *loop)
+static void make_log(const char *path, double duration_s,
+		     struct incise_loop_options *loop)
 {
 	double most = 0.5 * (double)sysconf(_SC_PHYS_PAGES) *
 		      (double)sysconf(_SC_PAGESIZE) / sizeof(*loop->log);
@@ -353,9 +354,9 @@ static void make_log(double duration_s, struct incise_loop_options *loop)
 	if (ticks <= most)
 		loop->log = calloc((size_t)ticks, sizeof(*loop->log));
 	if (!loop->log)
-		cli_fail("--output: not enough memory for %.0f ticks; give a --duration "
+		cli_fail("%s: not enough memory for %.0f ticks; give a --duration "
 			 "of up to %.0f s, which takes half of it",
-			 ticks, floor(most / loop->rate_hz));
+			 path, ticks, floor(most / loop->rate_hz));
 	loop->log_size = (size_t)ticks;
 	/* Touch the pages now: a page fault in the loop is a late tick. */
 	memset(loop->log, 0xff, loop->log_size * sizeof(*loop->log));
@@ -637,7 +638,7 @@ int haptic_run(struct haptic_job *job)
 		file = incise_outfile_open(job->log, &err);
 		if (!file)
 			fail_run(job, &err);
-		make_log(job->duration, &haptic->loop);
+		make_log(job->log, job->duration, &haptic->loop);
 	}
 	open_session(job);
 	cli_catch_signals();

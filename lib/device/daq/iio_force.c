@@ -11,7 +11,6 @@
 #include "../../base/monotonic.h"
 #include "../../rig/backends.h"
 #include "../../rig/daq_feed.h"
-#include "../../rig/pace.h"
 #include "iio_source.h"
 
 /* Nanoseconds since boot; more than this (146 years) is impossible. */
@@ -42,7 +41,7 @@ static void take_iio_force(struct iio_force *f, int64_t t_ns, int32_t code,
 	/* An impossible timestamp is replaced by the expected one. */
 	if (t_ns < 0 || t_ns > TIMESTAMP_MAX)
 		t_ns = f->pace.last_ns + (int64_t)f->pace.period_ns;
-	daq_feed_lose(&f->feed, incise_pace_add(&f->pace, t_ns, now_ns));
+	daq_feed_pace(&f->feed, &f->pace, t_ns, now_ns);
 	daq_feed_put(&f->feed, t_ns - incise_pace_spread_ns(&f->pace), code);
 }
 

@@ -23,6 +23,7 @@
 #define WINDOW_NS INT64_C(5000000000)
 #define DELAY_MAX_NS INT64_C(1000000000) /* more is another clock, not a delay */
 #define POSES_LEAST 5
+#define SLIP 2 /* periods */
 
 #define UNSEEN '!'
 #define INVALID '~'
@@ -205,6 +206,7 @@ static void take_igtl_poses(struct igtl_poses *poses, const double (*matrix)[4],
 	struct incise_tracker_sample sample = {
 		.t_ns = t_ns, .status = INVALID, .station = 1, .quaternion = {1}};
 	double offset[3];
+	uint64_t missing = 0;
 
 	/* The same pose with the same timestamp is sent again; another one has a clock of coarse steps. */
 	if (stamp_ns && stamp_ns == poses->stamp_ns) {
@@ -241,7 +243,11 @@ static void take_igtl_poses(struct igtl_poses *poses, const double (*matrix)[4],
 		poses->first_ns = sample.t_ns;
 	poses->last_ns = sample.t_ns;
 	if (poses->counts)
-		lose(poses, incise_pace_add(&poses->pace, sample.t_ns, t_ns));
+		missing = incise_pace_add(&poses->pace, sample.t_ns, t_ns);
+	/* A program that sends by sleeping slips, and nothing is missing. */
+	if (missing > SLIP)
+		lose(poses, missing);
+	atomic_store_explicit(&poses->unsure, poses->pace.unsure, memory_order_relaxed);
 	sample.seq = poses->seq++;
 	sample.restarted = poses->restarted;
 	if (incise_ring_put(&poses->ring, &sample))

@@ -36,10 +36,11 @@ struct igtl_poses {
 	struct incise_pace pace;
 	uint64_t seq; /* of the next sample */
 	_Atomic uint64_t lost;
-	uint64_t messages; /* whole ones, of any type and device */
-	bool counts;	   /* igtl_poses_start() was called */
-	bool restarted;	   /* the next sample is marked so */
-	bool refused;	   /* the device's last STATUS was an error */
+	_Atomic bool unsure; /* that may lack some */
+	uint64_t messages;   /* whole ones, of any type and device */
+	bool counts;	     /* igtl_poses_start() was called */
+	bool restarted;	     /* the next sample is marked so */
+	bool refused;	     /* the device's last STATUS was an error */
 	/* Names of devices that sent poses. */
 	char names[IGTL_NAMES][IGTL_HEADER_NAME_SIZE + 1];
 	int n_names;

@@ -210,6 +210,7 @@ static void tracker_info(const struct incise_tracker *tracker,
 		.scalpel_station = 1,
 		.external_sync = true, /* the sender decides when */
 		.network = true,
+		.lost_unsure = atomic_load(&igtl_tracker_of(tracker)->poses.unsure),
 	};
 	snprintf(info->name, sizeof(info->name), "%s", igtl_tracker_of(tracker)->name);
 }

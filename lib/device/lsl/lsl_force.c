@@ -18,7 +18,6 @@
 #include <string.h>
 #include "../../rig/backends.h"
 #include "../../rig/daq_feed.h"
-#include "../../rig/pace.h"
 #include "liblsl.h"
 
 #define FIND_S 5.0
@@ -86,7 +85,6 @@ static void take_lsl_force(struct lsl_force *f, double value, double stamp_s,
 			   int64_t now_ns)
 {
 	double t_s = stamp_s + f->correction_s, now_s = (double)now_ns * 1e-9;
-	uint64_t missing;
 	int64_t t_ns;
 
 	/* No sample in the queue can have this time: it is lost, like a force that is no number. */
@@ -110,8 +108,7 @@ static void take_lsl_force(struct lsl_force *f, double value, double stamp_s,
 	f->taken++;
 	f->last_ns = t_ns;
 	f->last_value = value;
-	missing = incise_pace_add(&f->pace, t_ns, now_ns);
-	daq_feed_lose(&f->feed, missing);
+	daq_feed_pace(&f->feed, &f->pace, t_ns, now_ns);
 	if (isfinite(value))
 		daq_feed_put(&f->feed, t_ns, code_of(f, value));
 	else

@@ -333,6 +333,9 @@ static void count_polhemus_stream(struct polhemus_stream *stream, uint64_t silen
 	atomic_store_explicit(&stream->lost,
 			      stream->gaps.lost + stream->overflowed + silent,
 			      memory_order_relaxed);
+	atomic_store_explicit(&stream->unsure,
+			      stream->gaps.pace.unsure && !stream->gaps.counts,
+			      memory_order_relaxed);
 }
 
 void polhemus_stream_silent(struct polhemus_stream *stream, int64_t t_ns)

@@ -77,6 +77,7 @@ struct polhemus_stream {
 	uint64_t overflowed; /* samples lost because the ring was full */
 	bool restarted;	     /* the next sample is marked so */
 	_Atomic uint64_t lost;
+	_Atomic bool unsure; /* that may lack some */
 };
 
 /* 0, -ENOMEM. @setup is copied. */

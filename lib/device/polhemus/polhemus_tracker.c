@@ -138,6 +138,7 @@ static void tracker_info(const struct incise_tracker *tracker,
 			polhemus_family_latency_ns(layout->family) +
 			(int64_t)polhemus_layout_length(layout) * t->line->ns_per_byte,
 		.grain_ns = t->line->grain_ns,
+		.lost_unsure = atomic_load(&t->stream.unsure),
 	};
 	snprintf(info->name, sizeof(info->name), "%s", t->identity.name);
 	snprintf(info->note, sizeof(info->note), "%s", t->identity.note);

@@ -33,6 +33,8 @@ struct incise_force_info {
 	uint64_t overflows;  /**< overflows of the device or the kernel so far */
 	/** It measures newtons itself: full_scale_V and offset_V are in N, not in V. */
 	bool newtons;
+	/** Samples come in blocks or chunks, so that the count of losses may lack some. */
+	bool lost_unsure;
 	int64_t t_sd_ns; /**< standard deviation of its timestamps; 0: not known */
 	char note[300];	 /**< a setting that its user should check; empty: none */
 };

@@ -66,6 +66,8 @@ struct incise_tracker_info {
 	uint8_t tube_station; /**< station at the end of the tube; 0: no such station */
 	bool network;	      /**< poses come over a network, whose delay has no bound */
 	char note[300];	      /**< a setting that its user should check; empty: none */
+	/** Records come in blocks or chunks, so that the count of losses may lack some. */
+	bool lost_unsure;
 };
 
 /** Counts of poses and of their flags. */

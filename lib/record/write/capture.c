@@ -279,6 +279,21 @@ static void check_poses(struct capture *capture, int64_t now_ns)
 	capture->warned = true;
 }
 
+/* Losses that nothing shows. */
+static void warn_unsure(struct capture *capture)
+{
+	const struct incise_recorder *recorder = capture->state.recorder;
+
+	for (int i = INCISE_LEDGER_FORCE; i <= INCISE_LEDGER_TRACKER; i++)
+		if (incise_recorder_unsure(recorder, i))
+			put_warning(
+				capture->options,
+				"%s: samples come in blocks, so that a lost one may be "
+				"missing in the count; connect it without a hub or a "
+				"network, or send in smaller blocks",
+				recorder->streams[i].device);
+}
+
 /* --- recording ----------------------------------------------------------------------------- */
 
 /* Whether it waits for something before it records. */
@@ -402,6 +417,7 @@ static int end_capture(struct capture *capture, const char *path, int rc,
 					      path);
 		return rc;
 	}
+	warn_unsure(capture);
 	closed = incise_recorder_close(recorder, rc ? NULL : err);
 	if (rc || closed)
 		return rc ? rc : closed;

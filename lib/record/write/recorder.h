@@ -191,6 +191,8 @@ void incise_recorder_start_streams(struct incise_recorder *rec);
 
 /* Losses by the numbers, or by the device's own count, which includes the last ones. */
 uint64_t incise_recorder_lost(const struct incise_recorder *rec, int stream);
+/* Whether that count may lack some, as the device says. */
+bool incise_recorder_unsure(const struct incise_recorder *rec, int stream);
 
 /*
  * Losses that no later sample shows: of force and tracker, where the recording is longer than their

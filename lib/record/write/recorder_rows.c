@@ -144,6 +144,20 @@ static uint64_t missing_in(int64_t silent_ns, double rate_hz)
 		       : 0;
 }
 
+bool incise_recorder_unsure(const struct incise_recorder *rec, int stream)
+{
+	struct incise_tracker *tracker = incise_rig_tracker(rec->rig);
+	struct incise_force *force = incise_rig_force(rec->rig);
+	struct incise_tracker_info tracker_info = {0};
+	struct incise_force_info force_info = {0};
+
+	if (tracker && stream == INCISE_LEDGER_TRACKER)
+		incise_tracker_info(tracker, &tracker_info);
+	if (force && stream == INCISE_LEDGER_FORCE)
+		incise_force_info(force, &force_info);
+	return tracker_info.lost_unsure || force_info.lost_unsure;
+}
+
 int incise_recorder_find_silence(struct incise_recorder *rec, struct incise_error *err)
 {
 	const struct incise_tracker_info *tracker = &rec->tracker_info;
@@ -166,6 +180,12 @@ int incise_recorder_find_silence(struct incise_recorder *rec, struct incise_erro
 
 		if (!stream->rows || *stream->ended || !began_ns)
 			continue;
+		if (incise_recorder_unsure(rec, i))
+			rc |= incise_recorder_note(
+				rec, "lost",
+				"%s: samples came in blocks: single losses may be missing "
+				"in the count",
+				stream->device);
 		/* The device may have counted some of the rows that are missing at an end. */
 		counted = stream->device_lost > since ? stream->device_lost - since : 0;
 		late = missing_in(stream->first_row_ns - began_ns, rates_hz[i]);
