@@ -10,6 +10,7 @@
  *   echo 0 >bench/live                  unbinds
  *
  * A line is LABEL:OFFSET[:active-low][:pull-up|:pull-down], or nothing where it is not wired.
+ * debounce_ns and cpu of a motor are those of its config until a program sets others.
  * While live nothing can be changed (EBUSY) and nothing removed.
  */
 #include <linux/configfs.h>
@@ -197,11 +198,54 @@ STEPPER_MOTOR_LINE(limit_max, LIMIT_MAX);
 STEPPER_MOTOR_LINE(home, HOME);
 STEPPER_MOTOR_LINE(fault, FAULT);
 
+static ssize_t stepper_number_store(struct config_item *item, u32 *number,
+				    const char *page, size_t n)
+{
+	struct stepper_folder *folder = motor_folder_of(item);
+	u32 value;
+	int ret;
+
+	ret = kstrtou32(page, 10, &value);
+	if (ret)
+		return ret;
+	mutex_lock(&folder->mutex);
+	if (folder->live)
+		ret = -EBUSY;
+	else
+		WRITE_ONCE(*number, value);
+	mutex_unlock(&folder->mutex);
+	return ret ? ret : (ssize_t)n;
+}
+
+#define STEPPER_MOTOR_NUMBER(_name)                                                 \
+	static u32 *stepper_motor_##_name##_of(struct config_item *item)            \
+	{                                                                           \
+		struct stepper_motor_folder *motor = to_motor_folder(item);         \
+		return &motor->folder->wires._name[motor->motor];                   \
+	}                                                                           \
+	static ssize_t stepper_motor_##_name##_show(struct config_item *item,       \
+						    char *page)                     \
+	{                                                                           \
+		return sysfs_emit(page, "%u\n",                                     \
+				  READ_ONCE(*stepper_motor_##_name##_of(item)));    \
+	}                                                                           \
+	static ssize_t stepper_motor_##_name##_store(struct config_item *item,      \
+						     const char *page, size_t n)    \
+	{                                                                           \
+		return stepper_number_store(item, stepper_motor_##_name##_of(item), \
+					    page, n);                               \
+	}                                                                           \
+	CONFIGFS_ATTR(stepper_motor_, _name)
+
+STEPPER_MOTOR_NUMBER(debounce_ns);
+STEPPER_MOTOR_NUMBER(cpu);
+
 static struct configfs_attribute *stepper_motor_attrs[] = {
 	&stepper_motor_attr_step,      &stepper_motor_attr_dir,
 	&stepper_motor_attr_enable,    &stepper_motor_attr_limit_min,
 	&stepper_motor_attr_limit_max, &stepper_motor_attr_home,
-	&stepper_motor_attr_fault,     NULL,
+	&stepper_motor_attr_fault,     &stepper_motor_attr_debounce_ns,
+	&stepper_motor_attr_cpu,       NULL,
 };
 
 static void stepper_motor_folder_release(struct config_item *item)
@@ -264,6 +308,8 @@ static void stepper_motor_folder_drop(struct config_group *group,
 
 	mutex_lock(&folder->mutex);
 	folder->motor[motor->motor] = NULL;
+	folder->wires.debounce_ns[motor->motor] = 0;
+	folder->wires.cpu[motor->motor] = 0;
 	for (i = 0; i < STEPPER_MOTOR_WIRES; i++) {
 		kfree(folder->wires.motor[motor->motor][i].label);
 		folder->wires.motor[motor->motor][i] = (struct stepper_wire){};

@@ -9,6 +9,9 @@
  *                    and the step that arrives at it may be the last
  *   home             the position at its leading edge is kept
  *
+ * With debounce_ns, and power, a level counts when the looks have found it for so long; a pulse that is
+ * shorter is none.
+ *
  * All under motor->lock. A line that cannot be read counts as active, except home, which
  * keeps its state.
  */
@@ -66,9 +69,34 @@ static void stepper_inputs_changed(struct stepper_motor *motor, enum stepper_inp
 	event.value = motor->inputs;
 	stepper_event_put(motor->stepper, &event);
 	if (input == STEPPER_HOME && active) {
-		motor->home_position = motor->position;
+		motor->home_position =
+			motor->since_ns[input] ? motor->since_position : motor->position;
 		motor->flags |= INCISE_STEPPER_FLAG_HOME_SEEN;
 	}
+	motor->since_ns[input] = 0;
+}
+
+/* Whether what is seen is not to count yet. Without power nobody would look again. */
+static bool stepper_inputs_bounces(struct stepper_motor *motor, enum stepper_input input,
+				   bool differs, s64 now, bool edge)
+{
+	const struct incise_stepper_config *config = &motor->config;
+	s64 *since = &motor->since_ns[input];
+
+	if (!config->debounce_ns || !motor->powered ||
+	    (input == STEPPER_ESTOP &&
+	     !(config->flags & INCISE_STEPPER_CONFIG_DEBOUNCE_ESTOP)))
+		return false;
+	if (!differs) {
+		*since = 0;
+		return edge;
+	}
+	if (!*since || edge) {
+		*since = now;
+		if (input == STEPPER_HOME)
+			motor->since_position = motor->position;
+	}
+	return now - *since < config->debounce_ns;
 }
 
 /**
@@ -96,6 +124,8 @@ void stepper_inputs_one(struct stepper_motor *motor, enum stepper_input input, s
 		stepper_stop_fault(motor, INCISE_STEPPER_FAULT_LINE, now);
 		value = input == STEPPER_HOME ? was : 1;
 	}
+	if (stepper_inputs_bounces(motor, input, !!value != was, now, edge))
+		return;
 	if (edge && !value && !was &&
 	    (input == STEPPER_ESTOP || input == STEPPER_DRIVER)) {
 		stepper_inputs_changed(motor, input, true, now);

@@ -34,7 +34,9 @@ static const struct cli_option options[] = {
 	{0, "priority", "N", "priority of fifo, 1 to 84 (default: 80)",
 	 CLI_INTEGER(struct haptic_job, realtime.priority, 1,
 		     INCISE_REALTIME_PRIORITY_MAX)},
-	{0, "cpu", "N", "run the loop's thread on this CPU only (default: any)",
+	{0, "cpu", "N",
+	 "run the loop's thread, or with --in-kernel the module's timers, on this CPU "
+	 "only (default: any)",
 	 CLI_INTEGER(struct haptic_job, realtime.cpu, 0, 1023)},
 	{0, "no-rt", NULL, "run with normal scheduling: ticks may be late",
 	 CLI_FLAG(struct haptic_job, no_rt)},
@@ -82,9 +84,8 @@ static void watch_kernel(struct haptic_job *job)
 	if (haptic->argument.arith && strcmp(haptic->argument.arith, "fixed"))
 		cli_usage("--arith does not go with --in-kernel: the kernel computes "
 			  "in fixed point");
-	if (job->realtime.cpu != INCISE_REALTIME_ANY_CPU || job->realtime.policy ||
-	    job->realtime.priority != INCISE_REALTIME_PRIORITY)
-		cli_usage("--cpu, --policy and --priority do not go with --in-kernel: "
+	if (job->realtime.policy || job->realtime.priority != INCISE_REALTIME_PRIORITY)
+		cli_usage("--policy and --priority do not go with --in-kernel: "
 			  "this program then only watches");
 	haptic->mode = HAPTIC_WATCH;
 	/* A watcher that is late takes no force away. */
@@ -100,6 +101,9 @@ static void watch_kernel(struct haptic_job *job)
 	if (job->state)
 		arguments[n++] = cli_text("--state=%s", job->state);
 	arguments[n++] = cli_text("--tool=%s", loop_tool_names[haptic->tool]);
+	if (job->realtime.cpu != INCISE_REALTIME_ANY_CPU)
+		arguments[n++] = cli_text("--cpu=%d", job->realtime.cpu);
+	job->realtime.cpu = INCISE_REALTIME_ANY_CPU;
 	if (job->home)
 		arguments[n++] = cli_text("--home");
 	if (job->recover)
