@@ -76,6 +76,11 @@ struct stepper_irq {
 	int motor; /* -1: of the controller */
 	enum stepper_input input;
 	int irq;
+	/* A storm */
+	s64 window_ns; /* its edges since … */
+	u32 edges;
+	bool masked;
+	u64 storms;
 };
 
 struct stepper_lines {
@@ -111,11 +116,15 @@ struct stepper_motor {
 	u32 faults;
 	u32 inputs;
 	u32 flags;
+	int cpu;  /* of the timer, while it has power */
+	u32 load; /* of it, see stepper_setup_load() */
 	bool powered;
 	bool disabling; /* comes to rest to be disabled */
 	s64 position;	/* sum of steps, and the origin */
 	s64 home_position;
 	struct incise_home_edge edge;
+	s64 since_ns[STEPPER_INPUTS]; /* of an input that may bounce; 0: as in inputs */
+	s64 since_position;	      /* then, of home */
 	u64 steps_up, steps_down, late, shifted_ns;
 	u64 shifted_then_ns; /* at the begin of a window, see stepper_motor_lag() */
 	s64 window_ns;	     /* … which was then */
@@ -188,11 +197,13 @@ struct stepper {
 	struct stepper_plan *plan; /* NULL: there is none */
 
 	struct incise_stepper_controller info;
+	u32 firing_ns; /* self-test: an edge is late by it where the one before was just then */
 	u32 tick_cost_ns; /* self-test: a step behind the ticks of all motors is late by it */
 	struct incise_stepper_setpoint *setpoints;  /* page 0: untrusted */
 	struct incise_stepper_motor_status *status; /* page 1 */
 	struct gpio_desc *estop;
 	struct stepper_irq estop_irq;
+	struct delayed_work calm; /* interrupts of a storm may come back */
 	struct stepper_sync_line sync;
 	struct stepper_events events;
 	wait_queue_head_t wait;
@@ -268,6 +279,7 @@ int stepper_setup_position(struct stepper_motor *motor,
 void stepper_setup_fault(struct stepper_motor *motor, u32 fault);
 bool stepper_setup_any_powered(struct stepper *stepper);
 void stepper_setup_halt(struct stepper_motor *motor);
+void stepper_setup_unload(struct stepper_motor *motor); /* motor->lock held */
 
 /* stepper_inputs.c: motor->lock held */
 void stepper_inputs_sample(struct stepper_motor *motor, s64 now);
@@ -287,6 +299,7 @@ bool stepper_node_push_pull(const struct fwnode_handle *node, const char *name);
 int stepper_lines_get(struct stepper *stepper, struct device *dev);
 int stepper_lines_listen(struct stepper *stepper);
 void stepper_lines_ignore(struct stepper *stepper);
+void stepper_lines_init(struct stepper *stepper);
 
 /* stepper_event.c */
 void stepper_event_init(struct stepper *stepper);

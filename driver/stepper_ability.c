@@ -10,25 +10,26 @@
  *
  * Then it fires SHOTS times more, each PULSE_NS behind the write of the one before, as edges
  * of pulses do, and computes when the next one is due: with C the median of what a firing costs then,
- * from when it is due to its write, and a 16th more, a step takes
+ * from when it is due to its write, and a 16th more, and W the least lateness, the way into the interrupt
+ * and about that out of it, a step takes
  *
- *   high + low + 2C        with two firings
- *   high + low + C + E     with one that waits for the end of the pulse
+ *   high + low + 2(C + 2W)     with two firings
+ *   high + low + C + W + E     with one that waits for the end of the pulse
  *
  * With L the lateness that 99 % of shots keep, M its median and E the median cost of a
  * shot, the shortest pulse is p = E + M: below that most edges would be late by more than
  * their own length. The largest rate is
  *
  *                   10⁹
- *   rate = ────────────────────────       n motors
- *          max(2p + S, 2n(S + p))
+ *   rate = ────────────────────────       n motors: k = 2; one: k = 7/4
+ *          max(2p + S, kn(S + p))
  *
  * with S the shorter of the two costs of a step. First: high and low last p each. Second: n motors share
- * one processor, and their steps, with a pulse that is waited for, shall take half of it at most.
+ * one processor, and their steps, with a pulse that is waited for, shall take half of it at most; four
+ * sevenths where no motor waits for another.
  *
  * Motors that stand cost ticks. With T the median cost of a shot and of what a tick
- * computes, and W the least lateness, the way into the interrupt and about that out of it, the
- * ticks of n motors shall take a quarter of the processor at most:
+ * computes, the ticks of n motors shall take a quarter of the processor at most:
  *
  *   tick = 4n(T + 2W)
  *
@@ -159,7 +160,8 @@ int stepper_ability_measure(struct stepper *stepper)
 		.jerk = 0,
 	};
 	struct incise_stepper_controller *info = &stepper->info;
-	u64 pulse = U32_MAX, tick = U32_MAX, late = U32_MAX, close = U32_MAX, period;
+	u64 pulse = U32_MAX, tick = U32_MAX, late = U32_MAX, close = U32_MAX, way = 0;
+	u64 period, share;
 	struct stepper_trial *trial;
 	int round, ret = 0;
 	unsigned int i;
@@ -191,16 +193,20 @@ int stepper_ability_measure(struct stepper *stepper)
 		late = trial->late_ns[SHOTS * 99 / 100];
 		info->edge_ns = trial->edge_ns[SHOTS / 2];
 		pulse = (u64)info->edge_ns + trial->late_ns[SHOTS / 2];
-		tick = (u64)trial->tick_ns[SHOTS / 2] + 2ULL * trial->late_ns[0];
+		way = trial->late_ns[0];
+		tick = (u64)trial->tick_ns[SHOTS / 2] + 2 * way;
 		close = (u64)trial->close_ns[SHOTS / 2] * 17 / 16;
 	}
 	stepper_latency_release(stepper);
 	kfree(trial);
 
-	info->step_ns = min(2 * close, (u64)U32_MAX);
-	info->wait_step_ns = min(close + info->edge_ns, (u64)U32_MAX);
+	stepper->firing_ns = min(close, (u64)U32_MAX);
+	info->step_ns = min(2 * (close + 2 * way), (u64)U32_MAX);
+	info->wait_step_ns = min(close + way + info->edge_ns, (u64)U32_MAX);
 	period = min(info->step_ns, info->wait_step_ns);
-	period = max(2 * pulse + period, 2 * stepper->n_motors * (period + pulse));
+	share = 2 * stepper->n_motors * (period + pulse);
+	period = max(2 * pulse + period,
+		     stepper->n_motors > 1 ? share : share - (share >> 3));
 	info->rate_max = clamp(div64_u64(NSEC_PER_SEC, max(period, 1ULL)), 1ULL,
 			       (u64)INCISE_PROFILE_VELOCITY_MAX);
 	info->resolution_ns = hrtimer_resolution;

@@ -9,8 +9,8 @@
  *   echo 1 >bench/live                  binds; cdev says which node it is
  *   echo 0 >bench/live                  unbinds
  *
- * lost_steps_max of a motor is that of its config until a program sets another.
  * A line is LABEL:OFFSET[:active-low][:pull-up|:pull-down], or nothing where it is not wired.
+ * Numbers of a motor are those of its config until a program sets others.
  * While live nothing can be changed (EBUSY) and nothing removed.
  */
 #include <linux/configfs.h>
@@ -198,19 +198,10 @@ STEPPER_MOTOR_LINE(limit_max, LIMIT_MAX);
 STEPPER_MOTOR_LINE(home, HOME);
 STEPPER_MOTOR_LINE(fault, FAULT);
 
-static ssize_t stepper_motor_lost_steps_max_show(struct config_item *item, char *page)
+static ssize_t stepper_number_store(struct config_item *item, u32 *number,
+				    const char *page, size_t n)
 {
-	struct stepper_motor_folder *motor = to_motor_folder(item);
-
-	return sysfs_emit(page, "%u\n",
-			  READ_ONCE(motor->folder->wires.lost_steps_max[motor->motor]));
-}
-
-static ssize_t stepper_motor_lost_steps_max_store(struct config_item *item,
-						  const char *page, size_t n)
-{
-	struct stepper_motor_folder *motor = to_motor_folder(item);
-	struct stepper_folder *folder = motor->folder;
+	struct stepper_folder *folder = motor_folder_of(item);
 	u32 value;
 	int ret;
 
@@ -221,21 +212,41 @@ static ssize_t stepper_motor_lost_steps_max_store(struct config_item *item,
 	if (folder->live)
 		ret = -EBUSY;
 	else
-		WRITE_ONCE(folder->wires.lost_steps_max[motor->motor], value);
+		WRITE_ONCE(*number, value);
 	mutex_unlock(&folder->mutex);
 	return ret ? ret : (ssize_t)n;
 }
-CONFIGFS_ATTR(stepper_motor_, lost_steps_max);
+
+#define STEPPER_MOTOR_NUMBER(_name)                                                 \
+	static u32 *stepper_motor_##_name##_of(struct config_item *item)            \
+	{                                                                           \
+		struct stepper_motor_folder *motor = to_motor_folder(item);         \
+		return &motor->folder->wires._name[motor->motor];                   \
+	}                                                                           \
+	static ssize_t stepper_motor_##_name##_show(struct config_item *item,       \
+						    char *page)                     \
+	{                                                                           \
+		return sysfs_emit(page, "%u\n",                                     \
+				  READ_ONCE(*stepper_motor_##_name##_of(item)));    \
+	}                                                                           \
+	static ssize_t stepper_motor_##_name##_store(struct config_item *item,      \
+						     const char *page, size_t n)    \
+	{                                                                           \
+		return stepper_number_store(item, stepper_motor_##_name##_of(item), \
+					    page, n);                               \
+	}                                                                           \
+	CONFIGFS_ATTR(stepper_motor_, _name)
+
+STEPPER_MOTOR_NUMBER(lost_steps_max);
+STEPPER_MOTOR_NUMBER(debounce_ns);
+STEPPER_MOTOR_NUMBER(cpu);
 
 static struct configfs_attribute *stepper_motor_attrs[] = {
-	&stepper_motor_attr_step,
-	&stepper_motor_attr_dir,
-	&stepper_motor_attr_enable,
-	&stepper_motor_attr_limit_min,
-	&stepper_motor_attr_limit_max,
-	&stepper_motor_attr_home,
-	&stepper_motor_attr_fault,
-	&stepper_motor_attr_lost_steps_max,
+	&stepper_motor_attr_step,      &stepper_motor_attr_dir,
+	&stepper_motor_attr_enable,    &stepper_motor_attr_limit_min,
+	&stepper_motor_attr_limit_max, &stepper_motor_attr_home,
+	&stepper_motor_attr_fault,     &stepper_motor_attr_debounce_ns,
+	&stepper_motor_attr_cpu,       &stepper_motor_attr_lost_steps_max,
 	NULL,
 };
 
@@ -300,6 +311,8 @@ static void stepper_motor_folder_drop(struct config_group *group,
 	mutex_lock(&folder->mutex);
 	folder->motor[motor->motor] = NULL;
 	folder->wires.lost_steps_max[motor->motor] = 0;
+	folder->wires.debounce_ns[motor->motor] = 0;
+	folder->wires.cpu[motor->motor] = 0;
 	for (i = 0; i < STEPPER_MOTOR_WIRES; i++) {
 		kfree(folder->wires.motor[motor->motor][i].label);
 		folder->wires.motor[motor->motor][i] = (struct stepper_wire){};

@@ -93,12 +93,13 @@ DEFINE_SHOW_ATTRIBUTE(plan);
 static int counters_show(struct seq_file *file, void *data)
 {
 	struct stepper *stepper = file->private;
+	enum stepper_input input;
 	unsigned long flags;
 	unsigned int i;
 
 	for (i = 0; i < stepper->n_motors; i++) {
 		struct stepper_motor *motor = &stepper->motor[i];
-		u64 edges, up, down, late, shifted, waits;
+		u64 edges, up, down, late, shifted, waits, storms;
 		u32 faults;
 
 		raw_spin_lock_irqsave(&motor->lock, flags);
@@ -109,11 +110,16 @@ static int counters_show(struct seq_file *file, void *data)
 		shifted = motor->shifted_ns;
 		waits = motor->waits;
 		faults = motor->faults;
+		storms = stepper->estop_irq.storms;
+		for (input = 0; input < STEPPER_INPUTS; input++)
+			storms += motor->lines.irq[input].storms;
 		raw_spin_unlock_irqrestore(&motor->lock, flags);
 		seq_printf(file, "motor=%u edges=%llu steps_up=%llu steps_down=%llu", i,
 			   edges, up, down);
-		seq_printf(file, " late=%llu shifted_ns=%llu waits=%llu faults=%#x\n",
-			   late, shifted, waits, faults);
+		seq_printf(
+			file,
+			" late=%llu shifted_ns=%llu waits=%llu storms=%llu faults=%#x\n",
+			late, shifted, waits, storms, faults);
 	}
 	return 0;
 }

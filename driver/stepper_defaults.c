@@ -90,6 +90,7 @@ static int stepper_defaults_of(struct stepper_defaults *from,
 	c->velocity = stepper_defaults_u32(from, "incise,velocity", 10000);
 	c->acceleration = stepper_defaults_u32(from, "incise,acceleration", 100000);
 	c->jerk = stepper_defaults_u64(from, "incise,jerk", 0);
+	c->debounce_ns = stepper_defaults_u32(from, "incise,debounce-ns", c->debounce_ns);
 	c->late_max = stepper_defaults_u32(from, "incise,late-max", 100);
 	c->lost_steps_max =
 		stepper_defaults_u32(from, "incise,lost-steps-max", c->lost_steps_max);
@@ -143,17 +144,24 @@ static void stepper_defaults_fit(struct stepper_motor *motor,
 /* Configs of all motors; errors are reported. */
 int stepper_defaults(struct stepper *stepper, struct device *dev)
 {
-	u32 lost_steps_max[INCISE_STEPPER_MOTORS_MAX] = {};
+	u32 lost_steps_max[INCISE_STEPPER_MOTORS_MAX] = {},
+	    debounce_ns[INCISE_STEPPER_MOTORS_MAX] = {},
+	    cpu[INCISE_STEPPER_MOTORS_MAX] = {};
 	unsigned int i;
 	int ret;
 
 	/* configfs makes no nodes of motors. */
 	device_property_read_u32_array(dev, "incise,lost-steps-max", lost_steps_max,
 				       stepper->n_motors);
+	device_property_read_u32_array(dev, "incise,debounce-ns", debounce_ns,
+				       stepper->n_motors);
+	device_property_read_u32_array(dev, "incise,cpu", cpu, stepper->n_motors);
 	for (i = 0; i < stepper->n_motors; i++) {
 		struct incise_stepper_config config = {
 			.motor = i,
 			.lost_steps_max = lost_steps_max[i],
+			.debounce_ns = debounce_ns[i],
+			.cpu = cpu[i],
 		};
 		struct stepper_defaults from = {.dev = dev, .motor = i};
 		struct fwnode_handle *node;

@@ -101,6 +101,7 @@ struct stepper *stepper_device_new(struct device *parent, unsigned int n_motors)
 	stepper_event_init(stepper);
 	stepper_sync_init(stepper);
 	stepper_latency_init(stepper);
+	stepper_lines_init(stepper);
 	for (i = 0; i < n_motors; i++) {
 		stepper->motor[i].stepper = stepper;
 		stepper->motor[i].index = i;

@@ -10,6 +10,9 @@
  *   home             the position at its leading edge is kept, and with power compared with that
  *                    at homing. Without a home input, the lower limit is the home
  *
+ * With debounce_ns, and power, a level counts when the looks have found it for so long; a pulse that is
+ * shorter is none.
+ *
  * All under motor->lock. A line that cannot be read counts as active, except home, which
  * keeps its state.
  */
@@ -53,12 +56,19 @@ static void stepper_inputs_act(struct stepper_motor *motor, enum stepper_input i
 	}
 }
 
+/* The input whose edge is home. */
+static enum stepper_input stepper_inputs_home(const struct stepper_motor *motor)
+{
+	return motor->lines.input[STEPPER_HOME] ? STEPPER_HOME : STEPPER_LIMIT_MIN;
+}
+
 /* The place of the home edge, as it is passed or where it is due. */
-static void stepper_inputs_compare(struct stepper_motor *motor, bool passed, s64 now)
+static void stepper_inputs_compare(struct stepper_motor *motor, bool passed, s64 position,
+				   s64 now)
 {
 	if (motor->powered &&
 	    incise_home_edge_look(&motor->edge, motor->flags & INCISE_STEPPER_FLAG_HOMED,
-				  passed && motor->direction, motor->position,
+				  passed && motor->direction, position,
 				  motor->direction, motor->config.lost_steps_max))
 		stepper_stop_fault(motor, INCISE_STEPPER_FAULT_STEPS, now);
 }
@@ -72,18 +82,41 @@ static void stepper_inputs_changed(struct stepper_motor *motor, enum stepper_inp
 		.type = INCISE_STEPPER_EVENT_INPUT,
 		.motor = motor->index,
 	};
+	s64 position = motor->since_ns[input] ? motor->since_position : motor->position;
 
 	motor->inputs ^= 1U << input;
 	event.value = motor->inputs;
 	stepper_event_put(motor->stepper, &event);
 	if (input == STEPPER_HOME && active) {
-		motor->home_position = motor->position;
+		motor->home_position = position;
 		motor->flags |= INCISE_STEPPER_FLAG_HOME_SEEN;
 	}
-	if (input == (motor->lines.input[STEPPER_HOME] ? STEPPER_HOME
-						       : STEPPER_LIMIT_MIN) &&
-	    active)
-		stepper_inputs_compare(motor, true, now);
+	if (input == stepper_inputs_home(motor) && active)
+		stepper_inputs_compare(motor, true, position, now);
+	motor->since_ns[input] = 0;
+}
+
+/* Whether what is seen is not to count yet. Without power nobody would look again. */
+static bool stepper_inputs_bounces(struct stepper_motor *motor, enum stepper_input input,
+				   bool differs, s64 now, bool edge)
+{
+	const struct incise_stepper_config *config = &motor->config;
+	s64 *since = &motor->since_ns[input];
+
+	if (!config->debounce_ns || !motor->powered ||
+	    (input == STEPPER_ESTOP &&
+	     !(config->flags & INCISE_STEPPER_CONFIG_DEBOUNCE_ESTOP)))
+		return false;
+	if (!differs) {
+		*since = 0;
+		return edge;
+	}
+	if (!*since || edge) {
+		*since = now;
+		if (input == stepper_inputs_home(motor))
+			motor->since_position = motor->position;
+	}
+	return now - *since < config->debounce_ns;
 }
 
 /**
@@ -111,6 +144,8 @@ void stepper_inputs_one(struct stepper_motor *motor, enum stepper_input input, s
 		stepper_stop_fault(motor, INCISE_STEPPER_FAULT_LINE, now);
 		value = input == STEPPER_HOME ? was : 1;
 	}
+	if (stepper_inputs_bounces(motor, input, !!value != was, now, edge))
+		return;
 	if (edge && !value && !was &&
 	    (input == STEPPER_ESTOP || input == STEPPER_DRIVER)) {
 		stepper_inputs_changed(motor, input, true, now);
@@ -130,5 +165,7 @@ void stepper_inputs_sample(struct stepper_motor *motor, s64 now)
 
 	for (input = 0; input < STEPPER_INPUTS; input++)
 		stepper_inputs_one(motor, input, now, false);
-	stepper_inputs_compare(motor, false, now);
+	/* An edge that may bounce may be there. */
+	if (!motor->since_ns[stepper_inputs_home(motor)])
+		stepper_inputs_compare(motor, false, motor->position, now);
 }

@@ -147,6 +147,60 @@ int stepper_lines_get(struct stepper *stepper, struct device *dev)
 	return 0;
 }
 
+/* More edges in a time than a contact has: the ticks look at the input, until it has calmed down. */
+#define STORM_EDGES 32
+#define STORM_NS NSEC_PER_MSEC
+#define CALM_MS 100
+
+static void stepper_lines_bound(struct stepper_irq *from, int irq, s64 now)
+{
+	if (now - from->window_ns > STORM_NS) {
+		from->window_ns = now;
+		from->edges = 0;
+	}
+	if (++from->edges < STORM_EDGES)
+		return;
+	disable_irq_nosync(irq);
+	from->storms++;
+	WRITE_ONCE(from->masked, true);
+	schedule_delayed_work(&from->stepper->calm, msecs_to_jiffies(CALM_MS));
+}
+
+static void stepper_lines_unmask(struct stepper_irq *irq)
+{
+	if (!READ_ONCE(irq->masked))
+		return;
+	irq->edges = 0;
+	WRITE_ONCE(irq->masked, false);
+	enable_irq(irq->irq);
+}
+
+static void stepper_lines_calm(struct work_struct *work)
+{
+	struct stepper *stepper =
+		container_of(to_delayed_work(work), struct stepper, calm);
+	enum stepper_input input;
+	unsigned long flags;
+	unsigned int i;
+
+	stepper_lines_unmask(&stepper->estop_irq);
+	for (i = 0; i < stepper->n_motors; i++) {
+		struct stepper_motor *motor = &stepper->motor[i];
+
+		for (input = 0; input < STEPPER_INPUTS; input++)
+			stepper_lines_unmask(&motor->lines.irq[input]);
+		raw_spin_lock_irqsave(&motor->lock, flags);
+		stepper_inputs_sample(motor, ktime_get_ns());
+		stepper_status_publish(motor, ktime_get_ns());
+		raw_spin_unlock_irqrestore(&motor->lock, flags);
+	}
+}
+
+void stepper_lines_init(struct stepper *stepper)
+{
+	INIT_DELAYED_WORK(&stepper->calm, stepper_lines_calm);
+}
+
 static irqreturn_t stepper_lines_interrupt(int irq, void *data)
 {
 	struct stepper_irq *from = data;
@@ -165,6 +219,7 @@ static irqreturn_t stepper_lines_interrupt(int irq, void *data)
 		stepper_status_publish(motor, now);
 		raw_spin_unlock_irqrestore(&motor->lock, flags);
 	}
+	stepper_lines_bound(from, irq, now);
 	return IRQ_HANDLED;
 }
 
@@ -241,6 +296,12 @@ int stepper_lines_listen(struct stepper *stepper)
 	return ret;
 }
 
+static void stepper_lines_silence(struct stepper_irq *irq)
+{
+	if (irq->irq)
+		disable_irq(irq->irq);
+}
+
 static void stepper_lines_release(struct stepper_irq *irq)
 {
 	if (irq->irq)
@@ -254,6 +315,12 @@ void stepper_lines_ignore(struct stepper *stepper)
 	enum stepper_input input;
 	unsigned int i;
 
+	/* Then no storm begins, and then none is waited for. */
+	stepper_lines_silence(&stepper->estop_irq);
+	for (i = 0; i < stepper->n_motors; i++)
+		for (input = 0; input < STEPPER_INPUTS; input++)
+			stepper_lines_silence(&stepper->motor[i].lines.irq[input]);
+	cancel_delayed_work_sync(&stepper->calm);
 	stepper_lines_release(&stepper->estop_irq);
 	for (i = 0; i < stepper->n_motors; i++)
 		for (input = 0; input < STEPPER_INPUTS; input++)

@@ -13,7 +13,7 @@
  * Due times come from the profile's time line, never from now: lateness does not
  * add up. But high, low, set-up, hold and the interval at the largest velocity
  * count from the actual times of edges, taken after the write, when the line has
- * changed for sure. So a late edge shortens nothing but the interval, by what a firing costs or
+ * changed for sure. So a late edge shortens nothing but the interval, by what a firing costs and
  * an eighth of it (catch_ns): the usual lateness of a timer (lag_ns) is caught up, or a motor would
  * never reach its largest velocity; where it is more, the time line is put off. There is never a
  * burst, and no acceleration that the profile does not know of.

@@ -3,7 +3,7 @@
  * From the wires that configfs names to a platform device whose driver finds them: by a
  * lookup table, whose chips go by their labels.
  *
- *   incise-stepper.N { label, incise,motors, incise,lost-steps-max }
+ *   incise-stepper.N { label, incise,motors, incise,lost-steps-max, incise,debounce-ns, incise,cpu }
  *   lookup table of incise-stepper.N:  estop, sync, motor0-step, motor0-dir, …
  */
 #include <linux/gpio/machine.h>
@@ -66,6 +66,9 @@ static int stepper_nodes_bind(struct stepper_nodes *nodes,
 		PROPERTY_ENTRY_U32("incise,motors", wires->n_motors),
 		PROPERTY_ENTRY_U32_ARRAY_LEN("incise,lost-steps-max",
 					     wires->lost_steps_max, wires->n_motors),
+		PROPERTY_ENTRY_U32_ARRAY_LEN("incise,debounce-ns", wires->debounce_ns,
+					     wires->n_motors),
+		PROPERTY_ENTRY_U32_ARRAY_LEN("incise,cpu", wires->cpu, wires->n_motors),
 		{},
 	};
 	const struct platform_device_info info = {

@@ -111,14 +111,26 @@ static bool stepper_page_within(__u64 value, __u64 min, __u64 max)
 	return value >= min && value <= max;
 }
 
+static bool stepper_page_waits(const struct incise_stepper_config *config)
+{
+	return config->high_ns <= INCISE_STEPPER_WAIT_MAX_NS &&
+	       !(config->flags & INCISE_STEPPER_CONFIG_NO_WAIT);
+}
+
+/* The time that a step takes of the processor. */
+__u32 stepper_page_busy_ns(const struct incise_stepper_config *config,
+			   const struct incise_stepper_controller *info)
+{
+	return stepper_page_waits(config) ? config->high_ns + info->wait_step_ns
+					  : info->step_ns;
+}
+
 /* The largest velocity with the pulses of a config: steps/s. */
 __u32 stepper_page_velocity(const struct incise_stepper_config *config,
 			    const struct incise_stepper_controller *info)
 {
-	bool waits = config->high_ns <= INCISE_STEPPER_WAIT_MAX_NS &&
-		     !(config->flags & INCISE_STEPPER_CONFIG_NO_WAIT);
 	__u64 step = (__u64)config->high_ns + config->low_ns +
-		     (waits ? info->wait_step_ns : info->step_ns);
+		     (stepper_page_waits(config) ? info->wait_step_ns : info->step_ns);
 
 	return div64_u64(1000000000ULL, step ? step : 1);
 }
@@ -138,7 +150,8 @@ int stepper_page_config(const struct incise_stepper_config *config,
 {
 	const __u32 flags = INCISE_STEPPER_CONFIG_INVERT | INCISE_STEPPER_CONFIG_RETRACT |
 			    INCISE_STEPPER_CONFIG_VOLATILE_HOME |
-			    INCISE_STEPPER_CONFIG_NO_WAIT;
+			    INCISE_STEPPER_CONFIG_NO_WAIT |
+			    INCISE_STEPPER_CONFIG_DEBOUNCE_ESTOP;
 	const __s64 most = INCISE_PROFILE_POSITION_MAX;
 	unsigned int i;
 
@@ -146,6 +159,7 @@ int stepper_page_config(const struct incise_stepper_config *config,
 		if (config->reserved[i])
 			return -EINVAL;
 	if (config->motor >= info->n_motors || config->flags & ~flags ||
+	    config->debounce_ns > 100000000 ||
 	    !stepper_page_within(config->tick_ns, INCISE_PROFILE_TICK_MIN_NS,
 				 INCISE_PROFILE_TICK_MAX_NS) ||
 	    !config->velocity || !config->acceleration ||

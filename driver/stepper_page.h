@@ -37,6 +37,8 @@ __s64 stepper_page_clamp(const struct stepper_setpoint *setpoint,
 			 const struct incise_stepper_config *config);
 __u32 stepper_page_velocity(const struct incise_stepper_config *config,
 			    const struct incise_stepper_controller *info);
+__u32 stepper_page_busy_ns(const struct incise_stepper_config *config,
+			   const struct incise_stepper_controller *info);
 int stepper_page_config(const struct incise_stepper_config *config,
 			const struct incise_stepper_controller *info);
 

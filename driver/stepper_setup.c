@@ -7,9 +7,13 @@
  *       ▲                     └──(disable)──▶ STOPPING ──▶ DISABLED
  *       └──(clear)── FAULT
  */
+#include <linux/atomic.h>
+#include <linux/cpumask.h>
 #include <linux/ktime.h>
-#include <linux/minmax.h>
 #include <linux/math64.h>
+#include <linux/minmax.h>
+#include <linux/percpu.h>
+#include <linux/smp.h>
 
 #include "compat.h"
 #include "stepper.h"
@@ -71,12 +75,63 @@ int stepper_setup_ready(struct stepper_motor *motor)
 	return ret;
 }
 
+/* Loads of the motors that have power, by processor; 2^20 is about all of its time. */
+static DEFINE_PER_CPU(atomic_t, stepper_loads);
+/* As motors of one controller may take: half for steps, and an eighth for ticks. */
+#define LOAD_MAX (5 << 17)
+
+/* The time that steps at the largest velocity, and ticks, take of a processor: 2^10 ns a second. */
+static u32 stepper_setup_load(const struct stepper_motor *motor)
+{
+	const struct stepper *stepper = motor->stepper;
+	const struct incise_stepper_config *config = &motor->config;
+	u64 steps = (u64)stepper_page_busy_ns(config, &stepper->info) * config->velocity;
+	u64 ticks = (u64)(stepper->tick_cost_ns / stepper->n_motors) *
+		    (NSEC_PER_SEC / config->tick_ns);
+
+	return (steps + ticks) >> 10;
+}
+
+/* On the processor of its timer. A controller alone is not refused: SET_CONFIG has bounded it. */
+static int stepper_setup_take(struct stepper_motor *motor)
+{
+	const struct stepper *stepper = motor->stepper;
+	int cpu = smp_processor_id();
+	u32 load = stepper_setup_load(motor), own = load, all;
+	unsigned int i;
+
+	all = atomic_add_return(load, this_cpu_ptr(&stepper_loads));
+	for (i = 0; i < stepper->n_motors; i++)
+		if (READ_ONCE(stepper->motor[i].cpu) == cpu)
+			own += READ_ONCE(stepper->motor[i].load);
+	if (all > LOAD_MAX && all > own) {
+		atomic_sub(load, this_cpu_ptr(&stepper_loads));
+		return -ENOSPC;
+	}
+	motor->cpu = cpu;
+	motor->load = load;
+	return 0;
+}
+
+void stepper_setup_unload(struct stepper_motor *motor)
+{
+	atomic_sub(motor->load, per_cpu_ptr(&stepper_loads, motor->cpu));
+	motor->load = 0;
+}
+
+struct stepper_enabling {
+	struct stepper_motor *motor;
+	int ret;
+};
+
 /*
  * Power, and the deadman from now on: 1. A motor that has power already goes on as it is:
- * 0. Else a negative errno.
+ * 0. Else a negative errno. On the processor of its timer, with interrupts off.
  */
-int stepper_setup_enable(struct stepper_motor *motor)
+static void stepper_setup_power(void *data)
 {
+	struct stepper_enabling *enabling = data;
+	struct stepper_motor *motor = enabling->motor;
 	struct incise_profile_limits limits;
 	unsigned long flags;
 	int ret = 0;
@@ -92,12 +147,16 @@ int stepper_setup_enable(struct stepper_motor *motor)
 		goto unlock;
 	limits = stepper_setup_limits(&motor->config);
 	ret = incise_profile_init(&motor->profile, &limits, motor->position);
+	if (!ret)
+		ret = stepper_setup_take(motor);
 	if (ret)
 		goto unlock;
 	ret = compat_gpiod_set_value(motor->lines.enable, 1);
 	now = ktime_get_ns();
-	if (ret < 0)
+	if (ret < 0) {
+		stepper_setup_unload(motor);
 		goto unlock;
+	}
 	trace_incise_stepper_edge(motor->stepper->id, motor->index, STEPPER_ENABLE, 1,
 				  now, now);
 
@@ -108,6 +167,7 @@ int stepper_setup_enable(struct stepper_motor *motor)
 	motor->slot = (struct incise_profile_slot){.tick_ns = motor->config.tick_ns};
 	motor->given = 0;
 	motor->late_row = 0;
+	memset(motor->since_ns, 0, sizeof(motor->since_ns));
 	motor->direction = 0; /* written before the first step, whatever it is */
 	motor->target = motor->position;
 	motor->asked = false;
@@ -123,7 +183,17 @@ int stepper_setup_enable(struct stepper_motor *motor)
 	ret = 1;
 unlock:
 	raw_spin_unlock_irqrestore(&motor->lock, flags);
-	return ret;
+	enabling->ret = ret;
+}
+
+/* stepper_setup_power() where the motor's timer is to fire. Sleeps not, and has interrupts on. */
+int stepper_setup_enable(struct stepper_motor *motor)
+{
+	struct stepper_enabling enabling = {.motor = motor};
+	int cpu = motor->config.cpu ? motor->config.cpu - 1 : raw_smp_processor_id();
+	int ret = smp_call_function_single(cpu, stepper_setup_power, &enabling, true);
+
+	return ret ? ret : enabling.ret;
 }
 
 void stepper_setup_disable(struct stepper_motor *motor)
@@ -180,6 +250,8 @@ int stepper_setup_config(struct stepper_motor *motor,
 	unsigned long flags;
 	int ret;
 
+	if (config->cpu > nr_cpu_ids)
+		return -EINVAL;
 	raw_spin_lock_irqsave(&motor->lock, flags);
 	if (motor->powered || motor->plan) {
 		ret = -EBUSY;
@@ -191,9 +263,8 @@ int stepper_setup_config(struct stepper_motor *motor,
 		motor->config = *config;
 		motor->interval_ns =
 			div_u64(NSEC_PER_SEC + config->velocity - 1, config->velocity);
-		/* A firing is late by what the one before costs, and an eighth of a step is not felt. */
-		motor->catch_ns = max(motor->interval_ns >> 3,
-				      (s64)motor->stepper->info.step_ns >> 1);
+		/* An edge is late by what its firing costs: only more catches up. An eighth of a step is not felt. */
+		motor->catch_ns = (motor->interval_ns >> 3) + motor->stepper->firing_ns;
 		motor->lag_ns =
 			max(motor->catch_ns, (s64)motor->stepper->info.lateness_ns) +
 			motor->stepper->tick_cost_ns;

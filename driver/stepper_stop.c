@@ -37,6 +37,7 @@ void stepper_stop_off(struct stepper_motor *motor, s64 now)
 {
 	motor->powered = false;
 	motor->disabling = false;
+	stepper_setup_unload(motor);
 	if (motor->config.flags & INCISE_STEPPER_CONFIG_VOLATILE_HOME)
 		motor->flags &= ~INCISE_STEPPER_FLAG_HOMED;
 	compat_gpiod_set_value(motor->lines.enable, 0);

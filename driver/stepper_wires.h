@@ -42,6 +42,7 @@ struct stepper_wires {
 	int n_motors;
 	struct stepper_wire motor[INCISE_STEPPER_MOTORS_MAX][STEPPER_MOTOR_WIRES];
 	u32 lost_steps_max[INCISE_STEPPER_MOTORS_MAX];
+	u32 debounce_ns[INCISE_STEPPER_MOTORS_MAX], cpu[INCISE_STEPPER_MOTORS_MAX];
 };
 
 struct stepper_nodes *stepper_nodes_make(const struct stepper_wires *wires);

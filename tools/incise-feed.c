@@ -17,6 +17,8 @@ static const struct cli_option options[] = {
 	 "tool in the hand at the start: auto, blade, handle or tube (default: auto)",
 	 CLI_CHOICE(struct haptic_job, haptic.tool, loop_tool_names)},
 	HAPTIC_HOLD_OPTIONS,
+	{0, "cpu", "N", "let the module's timers fire on this CPU (default: any)",
+	 CLI_INTEGER(struct haptic_job, timer_cpu, 0, 1023)},
 	{0, "no-rt", NULL, "run with normal scheduling: poses may be late",
 	 CLI_FLAG(struct haptic_job, no_rt)},
 	{0, "state", "FILE",
@@ -49,6 +51,7 @@ int main(int argc, char **argv)
 	struct haptic_job job = {
 		.haptic.mode = HAPTIC_FEED,
 		.haptic.loop.overruns_most = 0,
+		.timer_cpu = -1,
 		.realtime = {.priority = INCISE_REALTIME_PRIORITY,
 			     .cpu = INCISE_REALTIME_ANY_CPU},
 	};

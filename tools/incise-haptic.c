@@ -45,7 +45,9 @@ static const struct cli_option options[] = {
 	{0, "policy", "POLICY",
 	 "fifo, fifo:N of priority N, 1 to 84, or deadline (default: fifo:80)",
 	 CLI_PARSED(struct haptic_job, realtime, parse_policy)},
-	{0, "cpu", "N", "run the loop's thread on this CPU only (default: any)",
+	{0, "cpu", "N",
+	 "run the loop's thread, or with --in-kernel the module's timers, on this CPU "
+	 "only (default: any)",
 	 CLI_INTEGER(struct haptic_job, realtime.cpu, 0, 1023)},
 	{0, "no-rt", NULL, "run with normal scheduling: ticks may be late",
 	 CLI_FLAG(struct haptic_job, no_rt)},
@@ -94,9 +96,8 @@ static void watch_kernel(struct haptic_job *job)
 	if (haptic->argument.arith && strcmp(haptic->argument.arith, "fixed"))
 		cli_usage("--arith does not go with --in-kernel: the kernel computes "
 			  "in fixed point");
-	if (job->realtime.cpu != INCISE_REALTIME_ANY_CPU || job->realtime.policy ||
-	    job->realtime.priority != INCISE_REALTIME_PRIORITY)
-		cli_usage("--cpu, --policy and --priority do not go with --in-kernel: "
+	if (job->realtime.policy || job->realtime.priority != INCISE_REALTIME_PRIORITY)
+		cli_usage("--policy and --priority do not go with --in-kernel: "
 			  "this program then only watches");
 	haptic->mode = HAPTIC_WATCH;
 	/* A watcher that is late takes no force away. */
@@ -112,6 +113,9 @@ static void watch_kernel(struct haptic_job *job)
 	if (job->state)
 		arguments[n++] = cli_text("--state=%s", job->state);
 	arguments[n++] = cli_text("--tool=%s", loop_tool_names[haptic->tool]);
+	if (job->realtime.cpu != INCISE_REALTIME_ANY_CPU)
+		arguments[n++] = cli_text("--cpu=%d", job->realtime.cpu);
+	job->realtime.cpu = INCISE_REALTIME_ANY_CPU;
 	if (job->home)
 		arguments[n++] = cli_text("--home");
 	if (job->recover)

@@ -338,6 +338,8 @@ struct incise_stepper_controller {
 /* The timer ends each pulse; else it waits for the end of one of at most INCISE_STEPPER_WAIT_MAX_NS. */
 #define INCISE_STEPPER_CONFIG_NO_WAIT (1U << 3)
 #define INCISE_STEPPER_WAIT_MAX_NS 2000
+/* debounce_ns is the e-stop's too. */
+#define INCISE_STEPPER_CONFIG_DEBOUNCE_ESTOP (1U << 4)
 
 /**
  * struct incise_stepper_config - a motor's limits and times, 128 bytes
@@ -361,6 +363,10 @@ struct incise_stepper_controller {
  *            a plan's first motor also ticks of the plan in a row, each late by its tick_ns, or
  *            taking more than half of it
  * @lost_steps_max: more |lost_steps| of the status are the fault STEPS, which brakes; 0: never
+ * @cpu: 1 + the number of the processor on which its timer fires, and that of a plan it leads; 0: that
+ *       which calls ENABLE
+ * @debounce_ns: with power, limits, home and ALARM change when a level was seen for so long, at most
+ *               100000000: it is looked at at each tick and step. home_position is that of the edge. 0: at once
  * @reserved: zero
  *
  * SET_CONFIG gives EBUSY while the motor is enabled, EINVAL for a value out of its range
@@ -387,7 +393,9 @@ struct incise_stepper_config {
 	__u32 hold_ns;
 	__u64 enable_ns;
 	__u64 lost_steps_max;
-	__u64 reserved[4];
+	__u32 cpu;
+	__u32 debounce_ns;
+	__u64 reserved[3];
 };
 
 /**
@@ -470,7 +478,8 @@ struct incise_stepper_plan {
 	_IOW(INCISE_STEPPER_IOC, 2, struct incise_stepper_config)
 /*
  * A mask of motors, not 0: all get power or no motor does, and motors that had power keep it. The
- * timers of those that get it, and of their plan, fire on the processor that this call runs on.
+ * timers of those that get it, and of their plan, fire on the processor of their config, or that this call
+ * runs on. ENXIO: it is off. ENOSPC: motors of other controllers leave it no time for this one's largest velocity.
  * ENOTRECOVERABLE: a fault is latched, until CLEAR; EBUSY: an input forbids it, e-stop say, or it is still coming to rest;
  * ERANGE: it stands outside of its position limits; ESHUTDOWN: the machine goes down.
  */

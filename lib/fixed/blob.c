@@ -7,8 +7,8 @@
 #include "layout.h"
 
 /* Without errno.h, which a kernel does not have in this form. */
-#define BAD (-22)	  /* -EINVAL */
-#define UNSUPPORTED (-95) /* -ENOTSUP */
+#define BAD (-EINVAL)
+#define UNSUPPORTED (-EOPNOTSUPP)
 
 #ifdef __KERNEL__
 #include <linux/crc32c.h>

@@ -12,7 +12,7 @@
 #include "layout.h"
 #include "vector.h"
 
-#define BAD (-22)
+#define BAD (-EINVAL)
 #define HEIGHT_MAX (1 << 28)
 #define SLOPE_BITS 24
 #define SETTLED 2 /* a step so short, 30 nm, is rounding */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later OR GPL-2.0-only */
 /*
- * Integer types, their limits as C names them, and divisions of 64 bits as a kernel names
+ * Integer types, their limits as C names them, error numbers, and divisions of 64 bits as a kernel names
  * them: a kernel has the types, other names for the limits, and on a processor of 32 bits no
  * other divisions.
  */
@@ -8,6 +8,7 @@
 #define INCISE_FX_INTEGERS_H
 
 #ifdef __KERNEL__
+#include <linux/errno.h>
 #include <linux/limits.h>
 #include <linux/math64.h>
 #include <linux/types.h>
@@ -19,6 +20,7 @@
 #define INT64_MAX S64_MAX
 #endif
 #else
+#include <errno.h>
 #include <stdbool.h>
 #include <stdint.h>
 

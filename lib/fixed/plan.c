@@ -8,8 +8,8 @@
 #include "vector.h"
 
 /* Without errno.h, which a kernel does not have in this form. */
-#define BAD (-22)	  /* -EINVAL */
-#define UNSUPPORTED (-95) /* -ENOTSUP */
+#define BAD (-EINVAL)
+#define UNSUPPORTED (-EOPNOTSUPP)
 
 #define ONE (1 << 16)
 #define LENGTH_MAX (1 << 28) /* 4096 mm */

@@ -20,8 +20,8 @@
 #include "ramp.h"
 
 /* Without errno.h, which a kernel does not have in this form. */
-#define BAD (-22)	   /* -EINVAL */
-#define OUT_OF_RANGE (-34) /* -ERANGE */
+#define BAD (-EINVAL)
+#define OUT_OF_RANGE (-ERANGE)
 
 #define STEP ((int64_t)1 << 32)
 #define SECOND_NS 1000000000u

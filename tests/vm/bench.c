@@ -13,7 +13,7 @@
 
 #include "bench.h"
 
-#define FOLDER "/sys/kernel/config/incise-stepper/bench"
+#define FOLDER "/sys/kernel/config/incise-stepper/bench%u"
 #define PAGE 4096
 #define AT_ONCE 4096 /* edges that are read at a time */
 
@@ -43,12 +43,12 @@ void bench_nap(int64_t ns)
 		  NULL);
 }
 
-static int put(const char *name, const char *text)
+static int put(const struct bench *bench, const char *name, const char *text)
 {
 	char path[160];
 	int fd, ret = 0;
 
-	snprintf(path, sizeof(path), FOLDER "/%s", name);
+	snprintf(path, sizeof(path), FOLDER "/%s", bench->number, name);
 	fd = open(path, O_WRONLY | O_CLOEXEC);
 	if (fd < 0)
 		return -errno;
@@ -58,13 +58,13 @@ static int put(const char *name, const char *text)
 	return ret;
 }
 
-static int get(const char *name, char *text, size_t size)
+static int get(const struct bench *bench, const char *name, char *text, size_t size)
 {
 	char path[160];
 	ssize_t n;
 	int fd;
 
-	snprintf(path, sizeof(path), FOLDER "/%s", name);
+	snprintf(path, sizeof(path), FOLDER "/%s", bench->number, name);
 	fd = open(path, O_RDONLY | O_CLOEXEC);
 	n = fd < 0 ? -1 : read(fd, text, size - 1);
 	if (fd >= 0)
@@ -75,26 +75,27 @@ static int get(const char *name, char *text, size_t size)
 	return 0;
 }
 
-static int wire(const char *name, unsigned int line, bool low)
+static int wire(const struct bench *bench, const char *name, unsigned int line, bool low)
 {
 	char text[64];
 
 	snprintf(text, sizeof(text), INCISE_SIM_LABEL ":%u%s", line,
 		 low ? ":active-low" : "");
-	return put(name, text);
+	return put(bench, name, text);
 }
 
-static int wire_motor(unsigned int motor)
+static int wire_motor(const struct bench *bench, unsigned int motor, unsigned int n_lines)
 {
+	const unsigned int chip_motor = bench->number * INCISE_STEPPER_MOTORS_MAX + motor;
 	char name[160];
 	int ret = 0;
 
-	snprintf(name, sizeof(name), FOLDER "/motor%u", motor);
+	snprintf(name, sizeof(name), FOLDER "/motor%u", bench->number, motor);
 	if (mkdir(name, 0755) && errno != EEXIST)
 		return -errno;
-	for (unsigned int i = 0; i < BENCH_LINES && !ret; i++) {
+	for (unsigned int i = 0; i < n_lines && !ret; i++) {
 		snprintf(name, sizeof(name), "motor%u/%s", motor, line_names[i]);
-		ret = wire(name, bench_line(motor, i), i == BENCH_ENABLE);
+		ret = wire(bench, name, bench_line(chip_motor, i), i == BENCH_ENABLE);
 	}
 	return ret;
 }
@@ -102,52 +103,71 @@ static int wire_motor(unsigned int motor)
 int bench_name(struct bench *bench)
 {
 	char text[64];
-	int ret = get("cdev", text, sizeof(text));
+	int ret = get(bench, "cdev", text, sizeof(text));
 
 	if (ret)
 		return ret;
 	snprintf(bench->cdev, sizeof(bench->cdev), "/dev/%.50s", text);
-	return get("dev_name", bench->dev_name, sizeof(bench->dev_name));
+	return get(bench, "dev_name", bench->dev_name, sizeof(bench->dev_name));
+}
+
+static int bind_wires(struct bench *bench, unsigned int n_motors, unsigned int n_lines)
+{
+	char path[160];
+	int ret = 0;
+
+	bench->n_motors = n_motors;
+	bench->fd = -1;
+	snprintf(path, sizeof(path), FOLDER, bench->number);
+	if (mkdir(path, 0755) && errno != EEXIST)
+		return -errno;
+	for (unsigned int i = 0; i < n_motors && !ret; i++)
+		ret = wire_motor(bench, i, n_lines);
+	if (!ret && n_lines == BENCH_LINES) {
+		ret = wire(bench, "estop", BENCH_ESTOP, true);
+		ret = ret ? ret : wire(bench, "sync", BENCH_SYNC, false);
+	}
+	ret = ret ? ret : put(bench, "live", "1");
+	return ret ? ret : bench_name(bench);
 }
 
 int bench_bind(struct bench *bench, unsigned int n_motors)
 {
-	int ret = 0;
+	int ret;
 
 	memset(bench, 0, sizeof(*bench));
-	bench->n_motors = n_motors;
-	bench->fd = -1;
 	/* All inputs inactive, e-stop is so when it is high. */
 	simulator_write("scripts", "clear");
 	simulator_write("carriage", "off");
 	for (unsigned int i = 0; i <= BENCH_SYNC; i++)
 		simulator_write("inputs", "%u %d", i, i == BENCH_ESTOP);
-	if (mkdir(FOLDER, 0755) && errno != EEXIST)
-		return -errno;
-	for (unsigned int i = 0; i < n_motors && !ret; i++)
-		ret = wire_motor(i);
-	ret = ret ? ret : wire("estop", BENCH_ESTOP, true);
-	ret = ret ? ret : wire("sync", BENCH_SYNC, false);
-	ret = ret ? ret : put("live", "1");
-	ret = ret ? ret : bench_name(bench);
+	ret = bind_wires(bench, n_motors, BENCH_LINES);
 	/* What binding did to the lines is not a motion. */
 	simulator_write("edges", "reset");
 	return ret;
 }
 
+int bench_bind_bare(struct bench *bench, unsigned int number, unsigned int n_motors)
+{
+	memset(bench, 0, sizeof(*bench));
+	bench->number = number;
+	return bind_wires(bench, n_motors, BENCH_ENABLE + 1);
+}
+
 int bench_unbind(struct bench *bench)
 {
 	char path[160];
-	int ret = put("live", "0");
+	int ret = put(bench, "live", "0");
 
 	/* It never went live: only its folders are left. */
 	if (ret == -EPERM)
 		ret = 0;
 	for (unsigned int i = 0; i < bench->n_motors && !ret; i++) {
-		snprintf(path, sizeof(path), FOLDER "/motor%u", i);
+		snprintf(path, sizeof(path), FOLDER "/motor%u", bench->number, i);
 		ret = rmdir(path) ? -errno : 0;
 	}
-	return ret ? ret : rmdir(FOLDER) ? -errno : 0;
+	snprintf(path, sizeof(path), FOLDER, bench->number);
+	return ret ? ret : rmdir(path) ? -errno : 0;
 }
 
 int bench_open(struct bench *bench)
@@ -217,10 +237,10 @@ int bench_configure(struct bench *bench, const struct incise_stepper_config *con
 	struct incise_stepper_origin origin = {
 		.motor = m, .homed = 1, .position = position};
 	const bool timed = !strcmp(getenv("INCISE_VM_PROFILE") ?: "", "deterministic");
-	/* An eighth of a step, or what a firing costs. */
+	/* An eighth of a step, and what a firing costs. */
 	const int64_t eighth_ns = INT64_C(125000000) / config->velocity + 1;
 	const int64_t firing_ns = bench->info.step_ns / 2;
-	const int64_t catch_ns = eighth_ns > firing_ns ? eighth_ns : firing_ns;
+	const int64_t catch_ns = eighth_ns + firing_ns;
 	struct edge_log_motor motor = {
 		.step = bench_line(m, BENCH_STEP),
 		.dir = bench_line(m, BENCH_DIR),

@@ -38,7 +38,7 @@ static inline unsigned int bench_line(unsigned int motor, unsigned int which)
 }
 
 struct bench {
-	unsigned int n_motors;
+	unsigned int number, n_motors;
 	char cdev[64];	   /* in /dev */
 	char dev_name[64]; /* on the platform bus */
 	int fd;		   /* < 0: not open */
@@ -50,8 +50,15 @@ struct bench {
 	uint64_t edges; /* judged so far, of all lines */
 };
 
-/* By configfs, under the name "bench"; the simulator and the module are loaded. */
+/* By configfs, under the name "bench0"; the simulator and the module are loaded. */
 int bench_bind(struct bench *bench, unsigned int n_motors);
+
+/*
+ * With step, dir and enable alone, as controller @number of several: its motor m has the lines of motor
+ * m + @number * INCISE_STEPPER_MOTORS_MAX. Its edges are not judged.
+ */
+int bench_bind_bare(struct bench *bench, unsigned int number, unsigned int n_motors);
+
 int bench_unbind(struct bench *bench);
 
 /* Asks again for the names of the node and the device: they may be others after a bind. */

@@ -4,6 +4,7 @@
  * feeds or watches; see run.h.
  */
 #include <errno.h>
+#include <sched.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -268,6 +269,23 @@ static void set_up_run(struct haptic_job *job)
 		advise(&job->realtime);
 }
 
+/* The module's timers fire on the processor that enables: be there until they are. */
+static int prepare_on_cpu(struct haptic_job *job, struct incise_error *err)
+{
+	cpu_set_t one, before;
+	int rc;
+
+	CPU_ZERO(&one);
+	CPU_SET(job->timer_cpu, &one);
+	if (sched_getaffinity(0, sizeof(before), &before) ||
+	    sched_setaffinity(0, sizeof(one), &one))
+		return incise_error_set(err, errno, "CPU %d: %s; name one of `nproc`'s",
+					job->timer_cpu, strerror(errno));
+	rc = hold_prepare(job->haptic.rig, job->home, job->recover, err);
+	sched_setaffinity(0, sizeof(before), &before);
+	return rc;
+}
+
 /* Actuators with power, and poses on their way. Returns 0 or a negative errno. */
 static int begin_force(struct haptic_job *job, struct incise_error *err)
 {
@@ -276,7 +294,9 @@ static int begin_force(struct haptic_job *job, struct incise_error *err)
 
 	if (haptic->mode == HAPTIC_WATCH)
 		return 0;
-	rc = hold_prepare(haptic->rig, job->home, job->recover, err);
+	rc = haptic->mode == HAPTIC_FEED && job->timer_cpu >= 0
+		     ? prepare_on_cpu(job, err)
+		     : hold_prepare(haptic->rig, job->home, job->recover, err);
 	return rc ? rc : hold_take(haptic->rig, err);
 }
 

@@ -19,6 +19,7 @@ struct haptic_job {
 	const char *rig, *log, *calibration, *state;
 	struct session_options session;
 	double duration;
+	int timer_cpu; /* of HAPTIC_FEED: where the module's timers fire; < 0: any */
 	bool json, home, recover, no_rt, verbose, scripted, in_kernel;
 	struct procedure procedure; /* scripted */
 	char **feeder;		    /* arguments of incise feed; with HAPTIC_WATCH */

@@ -58,7 +58,12 @@ static int kernel_enable(struct incise_motor *motor, struct incise_error *err)
 {
 	int rc = on_mask(motor, INCISE_STEPPER_ENABLE);
 
-	(void)err;
+	if (rc == -ENOSPC)
+		return incise_error_set(
+			err, ENOSPC,
+			"%s: cannot be enabled: motors of other controllers leave no time on "
+			"its CPU; give a smaller velocity_mm_s, or another CPU (--cpu)",
+			motor->name);
 	/* A latched fault, as incise_stepper_enable() names it. */
 	return rc == -ENOTRECOVERABLE ? -EPERM : rc;
 }
@@ -444,7 +449,7 @@ static int configure(struct kernel_stepper *k,
 		     const struct incise_backend_request *asked, struct incise_error *err)
 {
 	uint32_t high_ns = k->motor.actuator.high_ns;
-	struct incise_stepper_config config;
+	struct incise_stepper_config config, bound = {.motor = k->index};
 	int rc;
 
 	rc = incise_motor_fit(&k->motor.actuator, asked->where, info->rate_max,
@@ -463,6 +468,11 @@ static int configure(struct kernel_stepper *k,
 			"motors (by its self-test); correct it in rig.conf",
 			asked->where, config.tick_ns / 1e3, info->tick_min_ns / 1e3,
 			info->n_motors);
+	/* The wiring has these, rig.conf has not. */
+	if (!request(k, INCISE_STEPPER_GET_CONFIG, &bound)) {
+		config.cpu = bound.cpu;
+		config.debounce_ns = bound.debounce_ns;
+	}
 	rc = request(k, INCISE_STEPPER_SET_CONFIG, &config);
 	/* A motor that the last owner left in motion is still coming to rest. */
 	for (int i = 0; rc == -EBUSY && i < REST_POLLS; i++) {

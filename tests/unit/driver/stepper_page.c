@@ -232,8 +232,8 @@ TEST(test_config)
 #define FIELD(name) offsetof(struct incise_stepper_config, name), sizeof(good.name)
 		{FIELD(motor), 0, 0},
 		{FIELD(motor), 2, -EINVAL},
-		{FIELD(flags), 15, 0},
-		{FIELD(flags), 16, -EINVAL},
+		{FIELD(flags), 31, 0},
+		{FIELD(flags), 32, -EINVAL},
 		{FIELD(tick_ns), 60000, 0}, /* what the self-test found */
 		{FIELD(tick_ns), 59999, -ERANGE},
 		{FIELD(tick_ns), 50000, -ERANGE},
@@ -286,9 +286,11 @@ TEST(test_config)
 		{FIELD(enable_ns), 1000000000, 0},
 		{FIELD(enable_ns), -1, -EINVAL},
 		{FIELD(reserved[0]), 1, -EINVAL},
-		{FIELD(reserved[3]), 1, -EINVAL},
+		{FIELD(reserved[2]), 1, -EINVAL},
 		{FIELD(lost_steps_max), 1000000000, 0},
 		{FIELD(lost_steps_max), 1000000001, -EINVAL},
+		{FIELD(debounce_ns), 100000000, 0},
+		{FIELD(debounce_ns), 100000001, -EINVAL},
 	};
 
 	struct incise_stepper_config brief = good;
@@ -296,8 +298,11 @@ TEST(test_config)
 	/* A short pulse is waited for, unless that is switched off. */
 	brief.high_ns = brief.low_ns = INCISE_STEPPER_WAIT_MAX_NS;
 	assert_int_equal(stepper_page_velocity(&brief, &machine), 200000);
+	assert_int_equal(stepper_page_busy_ns(&brief, &machine),
+			 INCISE_STEPPER_WAIT_MAX_NS + machine.wait_step_ns);
 	brief.flags |= INCISE_STEPPER_CONFIG_NO_WAIT;
 	assert_int_equal(stepper_page_velocity(&brief, &machine), 142857);
+	assert_int_equal(stepper_page_busy_ns(&brief, &machine), machine.step_ns);
 	assert_int_equal(stepper_page_config(&good, &machine), 0);
 	for (size_t i = 0; i < sizeof(rows) / sizeof(*rows); i++) {
 		struct incise_stepper_config config = good;

@@ -5,6 +5,8 @@
  * does: every time, not now and then.
  */
 #include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/ioctl.h>
@@ -206,6 +208,98 @@ static void interrupts_are_missing(void)
 	simulator_write("faults", "none");
 }
 
+#define DEBOUNCE_NS (5 * TICK_NS)
+#define BURSTS 100
+
+/* A contact that bounces is no limit, one that stays is; the e-stop waits for nothing. */
+static void limit_bounces(void)
+{
+	struct incise_stepper_config config = config_of(0);
+	bool moves;
+
+	config.debounce_ns = DEBOUNCE_NS;
+	if (!check(!bench_configure(&bench, &config, 0) &&
+			   !bench_command(&bench, INCISE_STEPPER_ENABLE, 1),
+		   "a motor with debounce_ns has power"))
+		return;
+	bench_until(&bench, 0, 1U << INCISE_STEPPER_STATE_MOVING,
+		    INCISE_STEPPER_MODE_POSITION, 100000, LONG);
+	for (int i = 0; i < 20; i++) {
+		simulator_write("inputs", "%u 1", bench_line(0, BENCH_MAX));
+		simulator_write("inputs", "%u 0", bench_line(0, BENCH_MAX));
+	}
+	moves = bench_until(&bench, 0, 1U << INCISE_STEPPER_STATE_MOVING,
+			    INCISE_STEPPER_MODE_POSITION, 100000, LONG);
+	check(moves && !bench_look(&bench, 0).faults, "a limit that bounces is no fault");
+	simulator_write("inputs", "%u 1", bench_line(0, BENCH_MAX));
+	check(bench_until(&bench, 0, 1U << INCISE_STEPPER_STATE_FAULT,
+			  INCISE_STEPPER_MODE_POSITION, 100000, LONG) &&
+		      bench_look(&bench, 0).faults == INCISE_STEPPER_FAULT_LIMIT_MAX,
+	      "a limit that stays is one");
+	simulator_write("inputs", "%u 0", bench_line(0, BENCH_MAX));
+	bench_command(&bench, INCISE_STEPPER_CLEAR, 1);
+	bench_command(&bench, INCISE_STEPPER_ENABLE, 1);
+	simulator_write("inputs", "%u 0", BENCH_ESTOP);
+	simulator_write("inputs", "%u 1", BENCH_ESTOP);
+	check(bench_until(&bench, 0, 1U << INCISE_STEPPER_STATE_FAULT,
+			  INCISE_STEPPER_MODE_POSITION, 0, LONG) &&
+		      bench_look(&bench, 0).faults == INCISE_STEPPER_FAULT_ESTOP,
+	      "an e-stop is not debounced");
+	bench_command(&bench, INCISE_STEPPER_CLEAR, 1);
+	config.debounce_ns = 0;
+	bench_configure(&bench, &config, 0);
+}
+
+static int64_t storms(void)
+{
+	char text[512] = "", path[160];
+	const char *at;
+	FILE *file;
+
+	snprintf(path, sizeof(path), "/sys/kernel/debug/incise_stepper/%s/counters",
+		 strrchr(bench.cdev, '/') + 1);
+	file = fopen(path, "r");
+	if (!file || !fgets(text, sizeof(text), file))
+		text[0] = '\0';
+	if (file)
+		fclose(file);
+	at = strstr(text, " storms=");
+	return at ? strtoll(at + 8, NULL, 10) : -1;
+}
+
+/* A line that never rests takes no more than its bound: the motor goes on, and hears it again later. */
+static void line_storms(void)
+{
+	int fd = open(INCISE_SIM_DIR "/inputs", O_WRONLY | O_CLOEXEC);
+	char edge[2][16];
+	bool heard;
+
+	for (int k = 0; k < 2; k++)
+		snprintf(edge[k], sizeof(edge[k]), "%u %d", HOME, !k);
+	check(!bench_command(&bench, INCISE_STEPPER_ENABLE, 1), "power in a storm");
+	for (int i = 0; i < BURSTS; i++) {
+		if (!(i % 10))
+			bench_want(&bench, 0, INCISE_STEPPER_MODE_POSITION, 50);
+		for (int k = 0; k < 40; k++)
+			if (write(fd, edge[k & 1], strlen(edge[k & 1])) < 0)
+				break;
+	}
+	close(fd);
+	note("%lld storms", (long long)storms());
+	if (!strcmp(getenv("INCISE_VM_PROFILE") ?: "", "deterministic"))
+		check(storms() > 0, "a storm is bounded, and counted");
+	check(goes_to(100), "the motor moves on");
+	/* After the pause a press has an interrupt again. */
+	simulator_write("inputs", "%u 0", HOME);
+	bench_until(&bench, 0, 0, INCISE_STEPPER_MODE_POSITION, 100, 300 * TICK_NS);
+	changes();
+	simulator_write("inputs", "%u 1", HOME);
+	heard = seen(INCISE_STEPPER_LINE_HOME, true);
+	check(heard && changes() == 1, "a press is heard after it");
+	simulator_write("inputs", "%u 0", HOME);
+	bench_rest(&bench, 1);
+}
+
 int main(void)
 {
 	if (!starts(3))
@@ -215,6 +309,9 @@ int main(void)
 	short_press_stops();
 	unreadable_forbids();
 	enable_takes_back_its_own();
+	bench_rest(&bench, 3);
+	limit_bounces();
+	line_storms();
 	ends();
 	interrupts_are_missing();
 	return tap_failures != 0;
