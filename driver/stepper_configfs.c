@@ -242,11 +242,16 @@ STEPPER_MOTOR_NUMBER(debounce_ns);
 STEPPER_MOTOR_NUMBER(cpu);
 
 static struct configfs_attribute *stepper_motor_attrs[] = {
-	&stepper_motor_attr_step,      &stepper_motor_attr_dir,
-	&stepper_motor_attr_enable,    &stepper_motor_attr_limit_min,
-	&stepper_motor_attr_limit_max, &stepper_motor_attr_home,
-	&stepper_motor_attr_fault,     &stepper_motor_attr_debounce_ns,
-	&stepper_motor_attr_cpu,       &stepper_motor_attr_lost_steps_max,
+	&stepper_motor_attr_step,
+	&stepper_motor_attr_dir,
+	&stepper_motor_attr_enable,
+	&stepper_motor_attr_limit_min,
+	&stepper_motor_attr_limit_max,
+	&stepper_motor_attr_home,
+	&stepper_motor_attr_fault,
+	&stepper_motor_attr_debounce_ns,
+	&stepper_motor_attr_cpu,
+	&stepper_motor_attr_lost_steps_max,
 	NULL,
 };
 
