@@ -68,8 +68,8 @@ static void stepper_inputs_compare(struct stepper_motor *motor, bool passed, s64
 {
 	if (motor->powered &&
 	    incise_home_edge_look(&motor->edge, motor->flags & INCISE_STEPPER_FLAG_HOMED,
-				  passed && motor->direction, position,
-				  motor->direction, motor->config.lost_steps_max))
+				  passed && motor->direction, position, motor->direction,
+				  motor->config.lost_steps_max))
 		stepper_stop_fault(motor, INCISE_STEPPER_FAULT_STEPS, now);
 }
 
