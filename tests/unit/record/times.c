@@ -510,13 +510,19 @@ static void draw_scenario(struct scenario *s)
 	draw_spans(s->stalls, 4, 0.9, s->seconds);
 }
 
-/* The invariant, over whatever is drawn; and most rows of a good stream are well known. */
+/* A tracker of another rate than rig.conf says, which the recording names: 1 of 1000 rows may be worse. */
+static bool has_other_rate(const struct scenario *s)
+{
+	return !s->external && (s->hz != 120 || s->to_hz > 0);
+}
+
+/* The invariant, over whatever is drawn. */
 TEST(no_time_is_worse_than_it_states, IN_FOLDER)
 {
 	const char *only = getenv("SEED");
 	int first = only ? atoi(only) : 1,
-	    last = only ? first : cases_of(SEEDS_FULL, SEEDS), bad = 0;
-	long rows = 0, beyond = 0;
+	    last = only ? first : cases_of(SEEDS_FULL, SEEDS);
+	long rows = 0, beyond = 0, other = 0;
 
 	for (int seed = first; seed <= last; seed++) {
 		struct scenario s;
@@ -527,10 +533,12 @@ TEST(no_time_is_worse_than_it_states, IN_FOLDER)
 		run(&s, &errors);
 		assert_int_equal(system("rm -r a.rec"), 0);
 		rows += errors.rows;
-		beyond += errors.beyond;
+		if (has_other_rate(&s))
+			other += errors.beyond;
+		else
+			beyond += errors.beyond;
 		if (!errors.beyond && !only)
 			continue;
-		bad++;
 		print_message(
 			"seed %d: %.0f to %.0f Hz%s, %.1f s, jitter %.2f ms: %d of %d "
 			"rows, %.1f ms wrong, %.1f times what is stated, at %d\n",
@@ -538,8 +546,10 @@ TEST(no_time_is_worse_than_it_states, IN_FOLDER)
 			s.jitter_ms, errors.beyond, errors.rows, errors.worst_ms,
 			errors.worst_ratio, errors.worst_at);
 	}
-	print_message("%ld of %ld rows of %d scenarios beyond %d times what they state\n",
-		      beyond, rows, last - first + 1, K);
+	print_message(
+		"%ld of %ld rows of %d scenarios beyond %d times what they state, and "
+		"%ld of trackers of another rate\n",
+		beyond, rows, last - first + 1, K, other);
 	assert_int_equal(beyond, 0);
-	assert_true(only || !bad);
+	assert_true(1000 * other <= rows);
 }
