@@ -12,7 +12,7 @@ setup() {
 
 # The paths of all attributes that the sources declare.
 attributes() {
-	sed -nE "s/^(STEPPER_MOTOR_LINE\(|CONFIGFS_ATTR\(stepper_motor_, )(\w+)[,)].*/\2/p" \
+	sed -nE "s/^STEPPER_MOTOR_(LINE|NUMBER)\((\w+)[,)].*/\2/p" \
 		"$root"/driver/stepper_configfs.c | sed "s|^|$groups/<controller>/motor<M>/|"
 	sed -nE "s|^CONFIGFS_ATTR(_RO\|_WO)?\(stepper_folder_, (\w+)\);|$groups/<controller>/\2|p" \
 		"$root"/driver/stepper_configfs.c
