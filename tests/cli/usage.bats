@@ -117,7 +117,7 @@ table() {
 		view neck --procedure --rig sim:|--procedure
 		view neck --procedure --from x.rec|--procedure
 		view neck -o f|
-		view neck -o x.png.png|
+		view neck -o x.png|
 		view neck --at 1s|--at
 		view neck --procedure --at 2s,1s -o x.png|--at
 		view neck --procedure -o x.mkv --size 641x480|
