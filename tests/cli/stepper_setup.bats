@@ -90,7 +90,7 @@ refused() {
 # bats test_tags=check
 @test "a line that is none is refused with its number" {
 	line=" is not CONTROLLER/LINE=... or CONTROLLER/motorN/LINE=..."
-	value=" is not LABEL:OFFSET[:active-low][:pull-up|:pull-down]"
+	value=" is not LABEL:OFFSET[:active-low][:pull-up|:pull-down], nor a number"
 	while IFS='|' read -r text expected; do
 		cp stepper.conf whole.conf
 		echo "$text" >>stepper.conf
