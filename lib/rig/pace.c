@@ -230,16 +230,18 @@ static uint64_t end_window(struct incise_pace *pace)
 /* Whether the window shows what it can. */
 static bool is_full(const struct incise_pace *pace)
 {
-	double scatter =
-		fmin(usual_scatter(pace), window_scatter(pace)) / pace->period_ns;
-	double enough = fmin(FRESH_MIN + FRESH_PER_PERIOD * scatter, FRESH_MAX);
+	double scatter, enough;
 
+	/* Of most samples there is no more to compute. */
+	if (pace->window.samples * pace->period_ns < WINDOW_NS)
+		return false;
+	scatter = fmin(usual_scatter(pace), window_scatter(pace)) / pace->period_ns;
+	enough = fmin(FRESH_MIN + FRESH_PER_PERIOD * scatter, FRESH_MAX);
 	/* Two of each show all of a beat. */
 	if (pace->blocks == 3 && pace->window.wraps && pace->window.wraps < WRAPS &&
 	    !(pace->longer & 1) && scatter < 1)
 		enough *= WRAPS_WINDOWS;
-	return pace->window.shown + pace->window.fresh / 32 >= enough &&
-	       pace->window.samples * pace->period_ns >= WINDOW_NS;
+	return pace->window.shown + pace->window.fresh / 32 >= enough;
 }
 
 static bool is_even(const struct incise_pace *pace)
@@ -295,19 +297,19 @@ static uint64_t judge_fresh(struct incise_pace *pace)
 	struct incise_pace_window *window = &pace->window;
 	bool first = !pace->fresh && !window->fresh;
 	double rise_ns = first ? 0 : pace->late_ns - window->fresh_ns;
-	double rise = rise_ns / pace->period_ns;
+	double change_ns = fabs(rise_ns), half_ns = pace->period_ns / 2;
 	double late_ns = pace->late_ns, n = (double)pace->n;
 	uint64_t missing;
 
 	window->fresh++;
 	window->blocks += pace->run > 1;
-	window->sum_ns += fabs(rise_ns);
-	window->most_ns = fmax(window->most_ns, fabs(rise_ns));
+	window->sum_ns += change_ns;
+	window->most_ns = fmax(window->most_ns, change_ns);
 	/* In a chunk that is late as a whole, one sample shows as much as all. */
-	window->shown += 4 * fabs(rise_ns) * window->fresh >= window->sum_ns ||
-			 8 * fabs(rise_ns) >= usual_scatter(pace);
-	window->wraps += fabs(rise) >= 0.5 && fabs(rise) < 1.5;
-	pace->longer |= rise >= 0.5 && pace->run == pace->runs[0];
+	window->shown += 4 * change_ns * window->fresh >= window->sum_ns ||
+			 8 * change_ns >= usual_scatter(pace);
+	window->wraps += change_ns >= half_ns && change_ns < 3 * half_ns;
+	pace->longer |= rise_ns >= half_ns && pace->run == pace->runs[0];
 	for (int i = 0; i < 2; i++)
 		if (late_ns < window->low_ns[i]) {
 			swap(&late_ns, &window->low_ns[i]);

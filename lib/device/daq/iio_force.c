@@ -5,6 +5,8 @@
  *   trigger ─▶ converter ─▶ kernel's buffer (half a second) ─▶ thread, every 5 ms ─▶ feed
  */
 #include <errno.h>
+#include <pthread.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -28,7 +30,20 @@ struct iio_force {
 	struct daq_feed feed; /* first */
 	struct iio_source source;
 	struct incise_pace pace;
+	pthread_t watch; /* of the scale, by normal scheduling */
+	bool watches;
+	atomic_bool changed;
 };
+
+/* A read of sysfs may take longer than a sample: the thread that samples leaves it to another one. */
+static void *watch_scale(void *argument)
+{
+	struct iio_force *f = argument;
+
+	while (!f->changed && daq_feed_wait(&f->feed, -1, 1000) != DAQ_STOP)
+		f->changed = iio_source_changed(&f->source);
+	return NULL;
+}
 
 /*
  * IIO drops samples when its buffer is full, without a word: their times show it. Samples of a
@@ -63,9 +78,7 @@ static void *run_iio_force(void *argument)
 		quiet_ms = got > 0 ? 0 : quiet_ms + QUIET_MS;
 		if (got < 0 && got != -EAGAIN && got != -EINTR)
 			break;
-		got = quiet_ms > dead_ms	       ? -ETIME
-		      : iio_source_changed(&f->source) ? -ESTALE
-						       : 0;
+		got = quiet_ms > dead_ms ? -ETIME : f->changed ? -ESTALE : 0;
 		if (got)
 			break;
 	}
@@ -88,6 +101,8 @@ static void force_close(struct incise_force *force)
 	struct iio_force *f = (struct iio_force *)force;
 
 	daq_feed_stop(&f->feed);
+	if (f->watches)
+		pthread_join(f->watch, NULL);
 	iio_source_stop(&f->source);
 	iio_source_close(&f->source);
 	daq_feed_free(&f->feed);
@@ -143,6 +158,10 @@ static int start_iio_force(struct iio_force *f, struct incise_error *err)
 	if (rc)
 		return rc;
 	rc = daq_feed_start(&f->feed, run_iio_force, f);
+	if (!rc) {
+		rc = -pthread_create(&f->watch, NULL, watch_scale, f);
+		f->watches = !rc;
+	}
 	return rc ? incise_error_set(err, -rc, "%s: no thread to read it: %s", s->where,
 				     strerror(-rc))
 		  : 0;
