@@ -13,6 +13,7 @@
 #include "../../base/monotonic.h"
 #include "../../rig/backends.h"
 #include "../../rig/daq_feed.h"
+#include "../../rig/thread.h"
 #include "iio_source.h"
 
 /* Nanoseconds since boot; more than this (146 years) is impossible. */
@@ -159,7 +160,7 @@ static int start_iio_force(struct iio_force *f, struct incise_error *err)
 		return rc;
 	rc = daq_feed_start(&f->feed, run_iio_force, f);
 	if (!rc) {
-		rc = -pthread_create(&f->watch, NULL, watch_scale, f);
+		rc = incise_thread_start(&f->watch, watch_scale, f, NULL);
 		f->watches = !rc;
 	}
 	return rc ? incise_error_set(err, -rc, "%s: no thread to read it: %s", s->where,
