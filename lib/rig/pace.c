@@ -232,7 +232,7 @@ static bool is_full(const struct incise_pace *pace)
 {
 	double scatter, enough;
 
-	/* Of most samples there is no more to compute. */
+	/* Most samples end here. */
 	if (pace->window.samples * pace->period_ns < WINDOW_NS)
 		return false;
 	scatter = fmin(usual_scatter(pace), window_scatter(pace)) / pace->period_ns;
