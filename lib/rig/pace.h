@@ -32,8 +32,8 @@
  * - A loss of one next to lateness of single samples by T or more.
  * - A program that sends by sleeping has no period: where it slips, a loss counts.
  */
-#ifndef INCISE_DEVICE_PACE_H
-#define INCISE_DEVICE_PACE_H
+#ifndef INCISE_RIG_PACE_H
+#define INCISE_RIG_PACE_H
 
 #include <stdbool.h>
 #include <stdint.h>

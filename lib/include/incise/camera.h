@@ -40,7 +40,7 @@ struct incise_camera_info {
 	int64_t exposure_ns; /**< 0: unknown; then t_ns is the device's timestamp */
 	uint64_t
 		damaged; /**< frames that are corrupt or too short; also counted as lost */
-	/** How much the age of frames at their arrival, the least of many, changed so far. */
+	/** Change so far of the age of frames at their arrival, the least of many. */
 	int64_t clock_ns;
 	char note[300]; /**< a doubt of its timestamps; empty: none */
 };

@@ -62,7 +62,7 @@ TEST(no_step_of_the_start_hangs_or_gives_power)
 		}
 }
 
-/* What is refused of the drive, and names what to do. */
+/* The refusals of a drive name what to do. */
 TEST(a_drive_that_does_not_fit_is_refused)
 {
 	static const struct {

@@ -345,7 +345,7 @@ TEST(test_refused_units, setup)
 		{"608F=4000/1 6091=1/0", "counts_per_turn"},
 		/* More than a position can hold. */
 		{"608F=4294967294/1 6091=4294967294/1", "counts_per_turn"},
-		/* Which of the two it counts by, nobody knows. */
+		/* Nobody knows by which of the two it counts. */
 		{"6092=1/1 608F=51200/1", "counts_per_turn"},
 		{"6092=12000/1 608F=4000/1 6091=2/1", "counts_per_turn"},
 		{"6092=1000/1 608F=4000/1 6091=1/1 60A8=00AA0000", "counts_per_turn"},

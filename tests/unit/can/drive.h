@@ -425,7 +425,7 @@ static inline void drive_refresh(struct drive *d)
 	d->od[OD_INPUTS].value = d->inputs;
 }
 
-/* What it reports of an object. */
+/* The value that it reports of an object. */
 static inline uint32_t drive_shown(const struct drive *d, const struct drive_object *o)
 {
 	bool hidden = d->mode_never || (d->mode_late && d->state != CIA402_ENABLED);

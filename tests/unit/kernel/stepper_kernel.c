@@ -316,7 +316,7 @@ TEST(a_watcher_only_looks)
 	assert_int_equal(incise_stepper_jog(watcher, 1), -EPERM);
 	assert_error(incise_stepper_enable(watcher, &err), EPERM, &err, "watch");
 	assert_int_equal(incise_stepper_clear(watcher, &err), -EPERM);
-	/* Whoever may look may stop. */
+	/* A watcher may stop the motor. */
 	assert_true(module.machine.enable);
 	assert_int_equal(incise_stepper_disable(watcher, &err), 0);
 	assert_false(module.machine.enable);

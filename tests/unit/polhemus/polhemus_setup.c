@@ -99,7 +99,7 @@ TEST(all_is_set, NULL, end)
 	}
 }
 
-/* What another program left is read, of each station that is used, and nothing is set. */
+/* The setup reads the settings that another program left, of each station in use, and changes none. */
 TEST(settings_that_alter_poses, NULL, end)
 {
 	static const struct {

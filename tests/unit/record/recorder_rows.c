@@ -309,7 +309,7 @@ static void doubt(const struct incise_camera *camera, struct incise_camera_info 
 	strcpy(info->note, "its clock drifts");
 }
 
-/* What a camera's clock drifted by is part of the uncertainty, and its note is kept. */
+/* The drift of a camera's clock is part of the uncertainty, and its note is kept. */
 TEST(camera_with_a_doubtful_clock, WITH_MODULES)
 {
 	struct incise_rig *rig = open_camera(SIM);
