@@ -115,6 +115,11 @@ opened() {
 	[ -n "$(find "/proc/$1/fd" -lname "$2")" ]
 }
 
+# is_drained FD: whether all that was written to that pipe was read.
+is_drained() {
+	! read -r -t 0 -u "$1"
+}
+
 # bats test_tags=check
 @test "standard input and pipes with a writer are read" {
 	[ "$(incise eval m.fis - <<<'5 20')" = "$(incise eval m.fis <(sleep 0.2; echo '5 20'))" ]
@@ -124,6 +129,8 @@ opened() {
 	incise eval m.fis late >got 3>&- 5>&- &
 	await opened $! "$PWD/late"
 	echo '5 20' >&5
+	# It looks for a writer, then reads.
+	await is_drained 5
 	exec 5>&-
 	wait $!
 	[ "$(cat got)" = "$(incise eval m.fis <<<'5 20')" ]
