@@ -91,7 +91,7 @@ static void compare(struct row *row, long ticks)
 	int strokes = (int)(ticks / incise_scene_rate_hz(row->scene[0])) + 1;
 	struct trajectory trajectory;
 	struct walk walk[2];
-	struct apart apart = {0};
+	struct apart apart = {.plan = row->plan};
 
 	row->most_mN = row->apart_most_mN = 0;
 	trajectory_make(&trajectory, row->scene[0], row->plan[0], strokes,

@@ -74,18 +74,6 @@ struct pair {
 	struct apart apart;
 };
 
-/* A tip that breaks through to what is torn, or goes on to another line, does so at one tick: here its way is some parts of a place. */
-#define BREAKS_MM 0.05
-
-static bool tears_alike(const struct pair *p)
-{
-	const struct incise_double_tears *a = &p->plan[0]->doubles.state.tears;
-	const struct incise_fixed_tears *b = &p->plan[1]->integers->state.tears;
-
-	return a->in == b->in &&
-	       fabs(a->tip - b->tip / (double)INCISE_FIXED_ONE) < BREAKS_MM;
-}
-
 static void walk(struct pair *p, uint64_t seed, const struct drawn *d, struct met *met)
 {
 	struct hand hand = hand_of(seed, d, p->scene[1], p->plan);
@@ -102,7 +90,6 @@ static void walk(struct pair *p, uint64_t seed, const struct drawn *d, struct me
 		met->ticks++;
 		met->unpaid += !!((tick[0].flags | tick[1].flags) & INCISE_TICK_UNPAID);
 		off_N = apart_N(&p->apart, &tick[0], &tick[1], p->bound_N);
-		p->apart.is = p->apart.is || !tears_alike(p);
 		if (p->apart.is) {
 			met->apart++;
 			met->apart_beyond += off_N > p->bound_N;
@@ -136,6 +123,7 @@ static void compare(uint64_t seed, const struct drawn *d, struct met *met)
 	}
 	for (int i = 0; kind >= 0 && i < INCISE_MODEL_INPUT_KINDS; i++)
 		p.plan[1]->input_slope[i] = p.plan[1]->gain * steepest[kind][i];
+	p.apart.plan = p.plan;
 	p.bound_N = incise_plan_bound(p.plan[1], REACH_MM);
 	met->scenes++;
 	met->unbounded += !(p.bound_N < INFINITY);
