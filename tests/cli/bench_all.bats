@@ -42,9 +42,7 @@ report_of() {
 	for benchmark in $benchmarks; do
 		case $(key "$r/report.json" "runs.$benchmark.state") in
 		measured)
-			cmp <(sqlite3 :memory: "SELECT json_extract(readfile('$r/report.json'),
-				'\$.benchmarks.$benchmark')") <(sqlite3 :memory: "SELECT json(readfile(
-				'$r/data/$benchmark.json'))")
+			cmp <(jq ".benchmarks.$benchmark" "$r/report.json") <(jq . "$r/data/$benchmark.json")
 			grep -qF "(data/$benchmark.json)" "$r/report.md" ;;
 		failed | "left out")
 			grep -qE "^- $benchmark: (failed|left out): .{10}" "$r/report.md" ;;
@@ -212,8 +210,7 @@ report_of() {
 	run --separate-stderr incise bench all --quick -o r --only training
 	failed_with r/report.html exists --overwrite
 	incise bench all --quick -o r --overwrite --only training --json >r.json
-	cmp <(sqlite3 :memory: "SELECT json(readfile('r.json'))") \
-		<(sqlite3 :memory: "SELECT json(readfile('r/report.json'))")
+	cmp r.json r/report.json
 	[ "$(ls r)" = "$(printf '%s\n' data plots report.html report.json report.md)" ]
 	[ "$(ls r/data)" = training.json ]
 }

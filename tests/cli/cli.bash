@@ -220,6 +220,15 @@ ask() {
 	sqlite3 "$1/recording.db" "$2"
 }
 
+# A recording as the version of its time wrote it: old_form RECORDING FORM, of tests/forms.
+old_form() {
+	local files=("$root/tests/forms/$2.sql")
+
+	[ "$2" -gt 4 ] || files+=("$root"/tests/forms/[1-"$2"]-4.sql)
+	mkdir "$1"
+	cat "${files[@]}" | sqlite3 "$1/recording.db"
+}
+
 # Whether a comparison of numbers holds: holds "$a < 0.1". An empty value is an error.
 holds() {
 	awk "BEGIN { exit !($1) }" || complain "does not hold: $1"

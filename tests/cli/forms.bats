@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 # Recordings of each form that there was, as the versions of their time wrote them (6d1dcf0a,
-# 2c8c1c32, 963d420e, 9da18e94, f8772be0): tests/forms/FORM.sql are their databases, by `.dump`, of
+# 2c8c1c32, 963d420e, 9da18e94, f8772be0): tests/forms/FORM.sql are their databases, by `.dump`, with the rows
+# that forms have alike in A-B.sql, of
 #
 #   incise capture -o FORM.rec --duration 1800ms --rig \
 #       sim:clock=simulated,seed=1,force_hz=100,tracker_hz=30,cut_s=0.5,pause_s=0.3 \
@@ -14,8 +15,7 @@ load cli
 setup() {
 	work_folder
 	for form in 1 2 3 4 5; do
-		mkdir $form.rec
-		sqlite3 $form.rec/recording.db <"$root/tests/forms/$form.sql"
+		old_form $form.rec $form
 	done
 }
 

@@ -8,8 +8,7 @@ setup() {
 	work_folder
 	mkdir old new
 	for form in 1 2 3 4; do
-		mkdir old/$form.rec
-		sqlite3 old/$form.rec/recording.db <"$root/tests/forms/$form.sql"
+		old_form old/$form.rec $form
 	done
 }
 

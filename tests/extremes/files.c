@@ -259,21 +259,46 @@ static struct bytes take(void (*write)(FILE *out))
 	return bytes;
 }
 
+static bool is_number(char c)
+{
+	return (c >= '0' && c <= '9') || c == '.' || c == '-';
+}
+
+/* The number at or after a place becomes another value, which leaves the syntax whole more often. */
+static size_t replace_number(struct bytes *bytes, size_t n, size_t from,
+			     const char *value)
+{
+	size_t size = strlen(value), to;
+
+	while (from < n && !is_number(bytes->broken[from]))
+		from++;
+	for (to = from; to < n && is_number(bytes->broken[to]);)
+		to++;
+	if (n - (to - from) + size > 2 * bytes->n)
+		return n;
+	memmove(bytes->broken + from + size, bytes->broken + to, n - to);
+	memcpy(bytes->broken + from, value, size);
+	return n - (to - from) + size;
+}
+
 /* Flipped bits, other bytes, a stretch that is gone, twice there, or cut off; numbers. */
 static void break_bytes(struct bytes *bytes)
 {
-	static const char *const bits[] = {"1e999", "-1e308", "nan",	    "-1",
-					   "0",	    "1e-320", "2147483648", "\"\"",
-					   "[",	    "}",      "/*",	    "\n"};
+	static const char *const bits[] = {
+		"1e999",      "-1e308",	   "nan",	   "-1",
+		"0",	      "1e-320",	   "2147483648",   "\"\"",
+		"[",	      "}",	   "/*",	   "\n",
+		"0.5",	      "20.0",	   "[1.0, 2.0]",   "\"fixed\"",
+		"\"double\"", "\"plane\"", "\"liver.fis\""};
 	size_t n = bytes->n, from, many;
 
 	memcpy(bytes->broken, bytes->whole, n);
 	for (uint32_t k = 1 + (below(2) ? 0 : below(4)); k && n > 40; k--) {
-		const char *bit = bits[below(12)];
+		const char *bit = bits[below(sizeof(bits) / sizeof(*bits))];
 
 		from = below((uint32_t)n - 20);
 		many = below(20);
-		switch (below(6)) {
+		switch (below(7)) {
 		case 0:
 			bytes->broken[from] = (char)any();
 			break;
@@ -291,6 +316,9 @@ static void break_bytes(struct bytes *bytes)
 			break;
 		case 3:
 			memcpy(bytes->broken + from, bit, strlen(bit));
+			break;
+		case 4:
+			n = replace_number(bytes, n, from, bit);
 			break;
 		default:
 			bytes->broken[from] ^= (char)(1 << below(8));
@@ -469,15 +497,9 @@ static void try_recordings(struct extremes_row *row, const struct property *prop
 	free(bytes.broken);
 }
 
-/* ---- scenes whose values are others, or those of another scene ---- */
+/* ---- scenes with files beside them ---- */
 
-#define TEXT_MAX 4000
 #define MODELS 6 /* plans with a model of each scene: compiling one takes some 20 ms */
-
-struct text {
-	size_t n;
-	char c[TEXT_MAX];
-};
 
 /* Whole scenes; no shipped one has heights or a mesh. */
 static const struct {
@@ -505,122 +527,10 @@ static const struct {
 };
 #define SCENES (sizeof(scenes) / sizeof(*scenes))
 
-static const char *any_value(void)
-{
-	static const char *const values[] = {"1e999",
-					     "-1e999",
-					     "nan",
-					     "-1",
-					     "0",
-					     "0.0",
-					     "1e-320",
-					     "\"\"",
-					     "[]",
-					     "{}",
-					     "()",
-					     "true",
-					     "2147483648",
-					     "9223372036854775808L",
-					     "0x7fffffff",
-					     "0.5",
-					     "3.0",
-					     "20.0",
-					     "1e300",
-					     "\"\\x00\"",
-					     "\"/\"",
-					     "\"%s%n\"",
-					     "((((((((",
-					     "[1.0, 2.0]",
-					     "[1e5, -1e5, 1e5]",
-					     "{ a = { b = ( 1, [ 2 ] ); }; }",
-					     "@include \"x.scene\"\n",
-					     "\"fixed\"",
-					     "\"double\"",
-					     "\"plane\"",
-					     "\"mesh\"",
-					     "\"s.asc\"",
-					     "\"liver.fis\"",
-					     "/*",
-					     "#",
-					     "\n",
-					     "\xff\xfe"};
-
-	return values[below(sizeof(values) / sizeof(*values))];
-}
-
-/* Put @n characters in the place of those from @from to @to. */
-static void replace(struct text *text, size_t from, size_t to, const char *c, size_t n)
-{
-	if (text->n - (to - from) + n > sizeof(text->c))
-		return;
-	memmove(text->c + from + n, text->c + to, text->n - to);
-	memcpy(text->c + from, c, n);
-	text->n += n - (to - from);
-}
-
-static bool is_number(char c)
-{
-	return (c >= '0' && c <= '9') || c == '.' || c == '-';
-}
-
-/* The value at or after a random place becomes another. */
-static void replace_number(struct text *text)
-{
-	const char *value = any_value();
-	size_t from = below((uint32_t)text->n), to;
-
-	while (from < text->n && !is_number(text->c[from]))
-		from++;
-	for (to = from; to < text->n && is_number(text->c[to]);)
-		to++;
-	replace(text, from, to, value, strlen(value));
-}
-
-/* Copy some characters of a text to a random place of another, or of the same. */
-static void copy_some(struct text *text, const struct text *other, uint32_t most)
-{
-	size_t from = below((uint32_t)other->n), n = below(most), to;
-	char copy[400];
-
-	n = n < other->n - from ? n : other->n - from;
-	memcpy(copy, other->c + from, n);
-	to = below((uint32_t)text->n);
-	replace(text, to, to, copy, n);
-}
-
-static void mutate(struct text *text, const struct text *other)
-{
-	size_t from = below((uint32_t)text->n), to = from + below(40);
-	const char *value;
-
-	to = to < text->n ? to : text->n;
-	switch (below(7)) {
-	case 0:
-		text->c[from] ^= (char)(1 << below(8));
-		break;
-	case 1:
-		replace(text, from, to, "", 0);
-		break;
-	case 2:
-		copy_some(text, text, 40);
-		break;
-	case 3:
-		copy_some(text, other, 400);
-		break;
-	case 4:
-		value = any_value();
-		replace(text, from, from, value, strlen(value));
-		break;
-	default:
-		/* The likeliest: it leaves the syntax whole more often. */
-		replace_number(text);
-	}
-}
-
 struct mutants {
 	struct extremes_row *row;
 	char folder[PATH_MAX - 80], path[PATH_MAX - 60];
-	struct text whole[SCENES];
+	struct bytes whole[SCENES];
 	int loaded, planned, models; /* of a scene */
 };
 
@@ -642,27 +552,28 @@ static void take_whole(struct mutants *m)
 	struct incise_error err = {0};
 
 	for (size_t k = 0; k < SCENES; k++) {
-		struct text *text = &m->whole[k];
+		struct bytes *scene = &m->whole[k];
 		char path[PATH_MAX];
 
-		if (!scenes[k].shipped) {
-			text->n = strlen(scenes[k].text);
-			memcpy(text->c, scenes[k].text, text->n);
-			continue;
-		}
+		scene->whole = calloc(1, SIZE_MAX_BYTES);
+		scene->broken = calloc(1, 2 * SIZE_MAX_BYTES + 64);
+		if (!scene->whole || !scene->broken)
+			cli_fail("no memory");
 		snprintf(path, sizeof(path), "%s/%s.scene", m->row->setup->scenes,
 			 scenes[k].shipped);
-		if (read_whole(path, text->c, sizeof(text->c), &text->n, &err))
+		if (!scenes[k].shipped)
+			scene->n = strlen(strcpy(scene->whole, scenes[k].text));
+		else if (read_whole(path, scene->whole, SIZE_MAX_BYTES, &scene->n, &err))
 			cli_fail_with(&err);
 	}
 }
 
-static void try_mutant(struct mutants *m, const struct text *text)
+static void try_mutant(struct mutants *m, const char *text, size_t n)
 {
 	struct incise_error err = {0};
 	struct incise_scene *scene;
 
-	if (write_whole(m->path, text->c, text->n, &err))
+	if (write_whole(m->path, text, n, &err))
 		cli_fail_with(&err);
 	scene = incise_scene_load(m->path, NULL, &err);
 	m->loaded += !!scene;
@@ -690,17 +601,15 @@ static void try_mutants(struct extremes_row *row, const struct property *propert
 	write_in(m, "s.asc", write_heights);
 	take_whole(m);
 	for (size_t k = 0; k < SCENES; k++) {
+		struct bytes *scene = &m->whole[k];
+
 		m->loaded = m->planned = m->models = 0;
 		/* The first one is whole. */
-		try_mutant(m, &m->whole[k]);
+		try_mutant(m, scene->whole, scene->n);
 		extremes_check(row, m->planned == 1, "scene %zu is refused", k);
 		for (int i = 0; i < n; i++) {
-			struct text text = m->whole[k];
-			int times = below(3) ? 1 : 2 + (int)below(3);
-
-			while (times-- && text.n > 1)
-				mutate(&text, &m->whole[below(SCENES)]);
-			try_mutant(m, &text);
+			break_bytes(scene);
+			try_mutant(m, scene->broken, scene->n_broken);
 		}
 		/* Both ways are walked, many times; few mutants make few plans. */
 		extremes_check(row,
@@ -708,6 +617,8 @@ static void try_mutants(struct extremes_row *row, const struct property *propert
 				       (n < 500 || m->planned >= MODELS),
 			       "scene %zu: %d of %d loaded, %d made a plan", k, m->loaded,
 			       n, m->planned);
+		free(scene->whole);
+		free(scene->broken);
 	}
 	folder_remove(m->folder);
 	free(m);
@@ -757,7 +668,7 @@ const struct property file_properties[] = {
 	{"recording_bytes",
 	 "a recording whose database has broken bytes: refused with one line, or read",
 	 2000, .all = try_recordings},
-	{"scene_mutants", "scenes with other values, and parts of other scenes", 2000,
+	{"scene_mutants", "the same of scenes with files beside them", 2000,
 	 .all = try_mutants, .for_tests_only = true},
 	{0},
 };

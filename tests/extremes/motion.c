@@ -1,16 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * The integers that kernels run: reaction and plane constraint at any numbers, and the motion profile
- * of the actuator.
+ * The integers that kernels run: reaction and plane constraint at any numbers. The motion profile of the
+ * actuator is in ../unit/fixed/profile.c.
  */
 #include <string.h>
 #include "../../lib/fixed/plan.h"
-#include "../../lib/fixed/profile.h"
-#include "../unit/fixed/profile_watch.h"
 #include "extremes.h"
 #include "numbers.h"
-
-#define TICKS 300
 
 static int32_t any_corner(void)
 {
@@ -70,69 +66,10 @@ static void try_forces(struct extremes_row *row, const struct property *property
 		V3_OF(right));
 }
 
-static struct incise_profile_limits any_limits(void)
-{
-	struct incise_profile_limits l = {
-		.tick_ns = INCISE_PROFILE_TICK_MIN_NS +
-			   below(INCISE_PROFILE_TICK_MAX_NS - INCISE_PROFILE_TICK_MIN_NS),
-		.velocity = 1 + below(INCISE_PROFILE_VELOCITY_MAX),
-		.acceleration = 1 + (uint32_t)exp(between(0, 22)),
-		.position_min = -(int32_t)below(INCISE_PROFILE_POSITION_MAX),
-		.position_max = (int32_t)below(INCISE_PROFILE_POSITION_MAX),
-	};
-
-	if (below(2)) /* an average of up to 256 ticks */
-		l.jerk = (uint64_t)(2e9 * l.acceleration / l.tick_ns / (1 + below(255))) +
-			 1;
-	if (!below(6))
-		l.velocity = (uint32_t)any_integer();
-	if (!below(6))
-		l.tick_ns = (uint32_t)any_integer();
-	if (!below(6))
-		l.position_max = any_integer();
-	return l;
-}
-
-/* Each tick holds the limits of lib/fixed/profile.h, with any targets. */
-static void try_profile(struct extremes_row *row, const struct property *property)
-{
-	struct incise_profile_limits l = any_limits();
-	struct incise_profile_slot slot;
-	struct incise_profile profile;
-	struct watch watch;
-
-	if (incise_profile_init(&profile, &l, 0)) {
-		extremes_refused_plainly(row);
-		return;
-	}
-	watch_begin(&watch, &l, 0);
-	for (int k = 0; k < TICKS; k++) {
-		const char *wrong;
-
-		if (!below(12))
-			incise_profile_target(&profile,
-					      (enum incise_profile_mode)below(3),
-					      below(2) ? any_integer() : (int64_t)any());
-		if (!below(60))
-			incise_profile_stop(&profile);
-		incise_profile_tick(&profile, &slot);
-		wrong = watch_tick(&watch, &profile, &slot);
-		extremes_check(row, !wrong,
-			       "%s: tick %d of %u ns, v %u, a %u, j %llu, %d … %d", wrong,
-			       k, l.tick_ns, l.velocity, l.acceleration,
-			       (unsigned long long)l.jerk, l.position_min,
-			       l.position_max);
-	}
-}
-
 const struct property motion_properties[] = {
 	{"reaction_plane",
 	 "reaction and plane constraint of any integers: the formula, rounded and held, "
 	 "to the bit",
 	 500000, .each = try_forces},
-	{"profile",
-	 "the actuator's motion, any limits, any targets at any time: "
-	 "velocity, acceleration, travel and steps within its limits",
-	 3000, .each = try_profile},
 	{0},
 };

@@ -82,7 +82,10 @@ static void move(struct extremes_row *row, const struct incise_surface *surface,
 	v3_sub(went, proxy->touch.point_mm, was.touch.point_mm);
 	near = incise_surface_kind(surface) < INCISE_SURFACE_HEIGHTS || proxy->began ||
 	       !was.touching || length(went) <= 2 * length(way) * (1 + 1e-9) + 1e-9;
-	check_touch(row, !proxy->touching || (is_touch(&proxy->touch) && near),
+	check_touch(row,
+		    isfinite(proxy->clear_mm) &&
+			    (proxy->touching ? is_touch(&proxy->touch) && near
+					     : !proxy->began),
 		    "the proxy of a tool", at, &proxy->touch);
 }
 

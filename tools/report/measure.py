@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Benchmarks of incise bench, one after the other; each is a program of its own, so that none meets what
-another has left in memory.
+"""incise bench all: benchmarks of incise bench, one after the other, and their report. Each is a program of its own,
+so that none meets what another has left in memory.
 
-measure.py JOB.json FOLDER   FOLDER/data/NAME.json and FOLDER/plots; the report on standard output
+  incise-bench NAME --json ─▶ data/NAME.json ─┐
+                    -o     ─▶ plots/          ├─▶ report.{json,html,md}
 
-The job is {"programs": a folder, "benchmarks": names, "quick": …, "report": what it is added to}. A benchmark
-that fails is in the report with its last line, and the others go on. SIGTERM goes to the whole process group:
-a benchmark ends by itself, and this after it.
+  FOLDER/.unfinished/{data,plots,report.*}  ─▶  FOLDER/{data,plots,report.*}
+
+Standard input has the job of incise-bench-all.c. A benchmark that fails is in the report with its last line, and the
+others go on. A signal ends the benchmark that runs, and FOLDER is as it was.
 """
+import contextlib
 import json
 import os
 import shutil
@@ -16,12 +19,20 @@ import subprocess
 import sys
 import time
 
+import compare
+import report as pages
+
+END_S = 3  # of a benchmark that is to end
 LINES = 20  # of warnings that are kept
 LINE_CHARACTERS = 600
 OWN_PROGRAM = {"view"}
 DRAWN = {"precision", "stability"}
 
 stopped = []
+
+
+def fail(text):
+    sys.exit(f"incise bench all: {text}")
 
 
 def progress(line):
@@ -35,8 +46,14 @@ def run(command, out, said, title):
     begin = time.monotonic()
     process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=out, stderr=said)
     while process.poll() is None:
-        if not stopped:
-            progress(f"{title}: {time.monotonic() - begin:.0f} s")
+        if stopped:
+            process.terminate()
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(END_S)
+            process.kill()
+            process.wait()
+            break
+        progress(f"{title}: {time.monotonic() - begin:.0f} s")
         time.sleep(0.05)
     progress("")
     return process.returncode
@@ -94,15 +111,18 @@ def measure(name, job, folder, title):
     return "failed" if why else "measured", why, lines[:LINES], report
 
 
-def main():
-    with open(sys.argv[1], encoding="utf-8") as file:
-        job = json.load(file)
-    report, names = job["report"], job["benchmarks"]
+def measure_all(job, folder):
+    """The report, but for what it is compared with; None where a signal came."""
+    names, begun = job["benchmarks"], job["report"]
+    command = "incise bench all -o DIR" + " --quick" * job["quick"] + (" --only " + ",".join(names)) * job["only"]
+    report = {"schema": begun["schema"], "version": begun["version"],
+              "date": time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime()), "command": command, "quick": job["quick"],
+              "machine": begun["machine"], "runs": {}, "failed": [], "benchmarks": {}, "figures": []}
     for i, name in enumerate(names):
         begin = time.monotonic()
-        state, why, lines, found = measure(name, job, sys.argv[2], f"{name} ({i + 1} of {len(names)})")
+        state, why, lines, found = measure(name, job, folder, f"{name} ({i + 1} of {len(names)})")
         if stopped:
-            sys.exit(1)
+            return None
         report["runs"][name] = {"state": state, "seconds": time.monotonic() - begin if state != "left out" else 0.0,
                                 "why": why or None, "warnings": lines}
         if state == "failed":
@@ -114,9 +134,109 @@ def main():
         figures = found.get("figures")
         report["figures"] += [dict(figure, name=f"{name}: {figure.get('name', '')}")
                               for figure in figures if isinstance(figure, dict)] if isinstance(figures, list) else []
-    json.dump(report, sys.stdout)
+    return report
+
+
+def compare_with(path, old, report):
+    """The comparison, or the reason why there is none."""
+    try:
+        found = compare.compare(old.get("benchmarks", old), path, report["benchmarks"], "this run")
+    except compare.NoReport as why:
+        found = {"failed": str(why)}
+    return dict(found, file=path)
+
+
+def remove(path):
+    if os.path.isdir(path) and not os.path.islink(path):
+        shutil.rmtree(path)
+    else:
+        with contextlib.suppress(FileNotFoundError):
+            os.unlink(path)
+
+
+def make_report(job, unfinished):
+    for part in ("data", "plots"):
+        os.makedirs(os.path.join(unfinished, part))
+    report = measure_all(job, unfinished)
+    if report and "old" in job:
+        report["against"] = compare_with(job["against"], job["old"], report)
+    if report:
+        with open(os.path.join(unfinished, "report.json"), "w", encoding="utf-8") as file:
+            json.dump(report, file, indent=1, ensure_ascii=False)
+            file.write("\n")
+        pages.bench(unfinished)
+    return report
+
+
+def make(job):
+    """A new report is made within the folder, hidden, and takes the old one's place when it is whole."""
+    folder, unfinished = job["folder"], os.path.join(job["folder"], ".unfinished")
+    remove(unfinished)
+    report = None
+    try:
+        report = make_report(job, unfinished)
+        for part in ("data", "plots", "report.json", "report.html", "report.md") if report else ():
+            remove(os.path.join(folder, part))
+            os.rename(os.path.join(unfinished, part), os.path.join(folder, part))
+    finally:
+        remove(unfinished)
+        if not report and job["made"]:
+            os.rmdir(folder)
+    if not report:
+        fail(f"{signal.strsignal(stopped[0])}: {folder} is unchanged")
+
+
+def print_report(job, report):
+    folder, text = job["folder"], None
+    if job["json"]:
+        with open(os.path.join(folder, "report.json"), encoding="utf-8") as file:
+            text = file.read()
+    else:
+        text = (f"wrote {folder}/report.html, report.md, report.json: {len(report['benchmarks'])} of "
+                f"{len(report.get('runs') or {})} benchmarks\n")
+    try:
+        sys.stdout.write(text)
+        sys.stdout.flush()
+    except OSError as why:
+        sys.stdout = None
+        sys.exit(1) if isinstance(why, BrokenPipeError) else fail(f"standard output: {why.strerror}")
+
+
+def judge(job, report):
+    """One line for the worst that is not as it should be."""
+    failed, against = report["failed"], report.get("against", {})
+    why = f"{job['folder']}/report.md says"
+    worse = against.get("worse", 0) + len(against.get("gone", []))
+    if not report["benchmarks"] and not failed:
+        fail(f"nothing was measured; {why} why")
+    if failed:
+        fail(f"{len(failed)} of {len(report['runs'])} benchmarks failed; {why} why")
+    if "failed" in against:
+        fail(against["failed"])
+    if worse:
+        fail(f"{worse} metric{'s are' if worse > 1 else ' is'} worse or missing compared with {job['against']}; "
+             f"{why} which")
+
+
+def main():
+    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, lambda number, _: stopped.append(number))
+    job = json.load(sys.stdin)
+    try:
+        if job["benchmarks"]:
+            make(job)
+        else:
+            pages.bench(job["folder"])
+    except OSError as why:
+        fail(f"{why.filename}: {why.strerror}")
+    except (TypeError, ValueError, AttributeError, KeyError) as why:
+        fail(f"report: {type(why).__name__}: {why}")
+    with open(os.path.join(job["folder"], "report.json"), encoding="utf-8") as file:
+        report = json.load(file)
+    print_report(job, report)
+    if job["benchmarks"]:
+        judge(job, report)
 
 
 if __name__ == "__main__":
-    signal.signal(signal.SIGTERM, lambda *_: stopped.append(True))
     main()

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * The stages of a tick in integers: limits and targets; then random plans at work, and numbers at their
- * ends. ../scene/forces.c compares each force with its formula.
+ * The stages of a tick in integers: limits and targets. ../scene/forces.c compares each force with its
+ * formula; ../../fuzz/fixed_plan.c has random plans at work, and numbers at their ends.
  */
 #include "../unit.h"
 #include "trial_plan.h"
@@ -121,75 +121,4 @@ TEST(test_targets, begin)
 	pose.tool = INCISE_FIXED_POSE_TUBE;
 	assert_int_equal(incise_fixed_plan_pose(&plan, &tick_state, &pose, pose.t_ns),
 			 INCISE_FIXED_POSE_UNKNOWN);
-}
-
-/* --- random plans ----------------------------------------------------------------------- */
-
-static uint32_t play(const struct incise_fixed_plan *plan, uint64_t seed, bool hostile,
-		     uint32_t *flags)
-{
-	struct incise_fx_trial_hand hand = {.t.seed = seed, .t_ns = 1000000000};
-	uint32_t digest = 0;
-	int32_t last[3] = {0};
-
-	memset(&tick_state, (int)seed, sizeof(tick_state));
-	incise_fixed_plan_begin(plan, &tick_state);
-	for (int k = 0; k < 400; k++) {
-		struct incise_fixed_tick tick;
-		struct incise_fixed_pose pose;
-		int32_t moved[3];
-
-		incise_fx_trial_hand(&hand, plan, &pose);
-		if (hostile && !(k % 3))
-			for (int i = 0; i < 4; i++) {
-				int32_t end = incise_fx_trial_one_in(&hand.t, 2)
-						      ? INT32_MAX
-						      : INT32_MIN;
-
-				pose.quaternion[i] = end;
-				pose.position[i % 3] = k & 1 ? end : pose.position[i % 3];
-			}
-		incise_fixed_plan_pose(plan, &tick_state, &pose, hand.t_ns);
-		incise_fixed_plan_tick(plan, &tick_state, hand.t_ns, &tick);
-		for (int i = 0; i < 3; i++)
-			moved[i] = tick.command[i] - last[i];
-		incise_fx_copy(last, tick.command);
-		assert_true(length_of(tick.command) <= plan->numbers.force);
-		/* Two roundings of each component. */
-		assert_true(length_of(moved) <= plan->numbers.slew + 2 * sqrt(3));
-		digest ^=
-			incise_fx_crc((const uint8_t *)tick.target, sizeof(tick.target)) +
-			incise_fx_crc((const uint8_t *)tick.command,
-				      sizeof(tick.command)) *
-				(uint32_t)(k + 1);
-		*flags |= tick.flags;
-	}
-	return digest;
-}
-
-/* The same again gives the same bits, and what can happen does. */
-TEST(test_random_plans, begin)
-{
-	uint8_t *bytes = calloc(1, INCISE_FX_TRIAL_PLAN_SIZE);
-	uint32_t flags = 0;
-
-	assert_non_null(bytes);
-	for (uint64_t seed = 1; seed <= 300; seed++) {
-		struct incise_fixed_plan plan;
-		uint32_t size = incise_fx_trial_plan(seed, bytes), first;
-
-		assert_int_equal(incise_fixed_plan_open(&plan, bytes, size), 0);
-		for (int hostile = 0; hostile < 2; hostile++) {
-			first = play(&plan, seed, hostile, &flags);
-			assert_int_equal(play(&plan, seed, hostile, &flags), first);
-		}
-	}
-	assert_int_equal(
-		flags & (INCISE_TICK_CONTACT | INCISE_TICK_EXTRAPOLATED |
-			 INCISE_TICK_CLAMPED | INCISE_TICK_SLEWED | INCISE_TICK_TRAVEL |
-			 INCISE_TICK_STARTING | INCISE_TICK_STALE | INCISE_TICK_IN_CUT),
-		INCISE_TICK_CONTACT | INCISE_TICK_EXTRAPOLATED | INCISE_TICK_CLAMPED |
-			INCISE_TICK_SLEWED | INCISE_TICK_TRAVEL | INCISE_TICK_STARTING |
-			INCISE_TICK_STALE | INCISE_TICK_IN_CUT);
-	free(bytes);
 }

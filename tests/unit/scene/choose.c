@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/scene/choose.c: each optional stage left out, compared with the same scene with all
- * stages there and the unneeded ones neutral. The ticks are bit-identical, from fewer stages
- * in no more memory, with a reason for each.
+ * lib/scene/choose.c: which stages a scene leaves out, in no more memory, with a reason for each; lean.c
+ * has that the ticks are those of the whole pipeline.
  *
  * The time that leaving out saves cannot be tested: the test counts the stages that run.
  * `incise plan` shows their ns.
@@ -10,9 +9,6 @@
 #include "../unit.h"
 #include "../../../lib/scene/forces.h"
 #include "fed.h"
-#include "../cases.h"
-
-#define TICKS 2500
 
 static struct fed_folder folder;
 
@@ -118,77 +114,6 @@ static struct incise_plan *plan_of(const struct incise_scene *scene)
 	return plan;
 }
 
-/*
- * In and out of the tissue some five times, sideways and turning all the while, with the
- * blade down and, between 1.0 and 1.9 s, with the handle.
- */
-static void stroke(void *own, double t, struct incise_tracker_sample *pose)
-{
-	bool round = t > 1.0 && t < 1.9;
-	double tilt = 0.3 * sin(5 * t), turn = 1.5 * sin(3 * t);
-	double end[3] = {15 * sin(5.7 * t), 8 * sin(8.2 * t),
-			 0.5 - 5 * sin(2 * M_PI * 2 * t)};
-
-	fed_attitude(pose->quaternion, round ? M_PI + tilt : tilt, turn);
-	memcpy(pose->position_mm, end, sizeof(end));
-	if (round) {
-		/* The tip is at the other end of the axis, which the turns carry along. */
-		pose->position_mm[0] -= 120 * -sin(turn) * sin(tilt);
-		pose->position_mm[1] -= 120 * cos(turn) * sin(tilt);
-		pose->position_mm[2] += 120 * cos(tilt);
-	}
-}
-
-/* Poses fail for 120 ms each 0.7 s, in the tissue and out of it. */
-static bool silent(int i)
-{
-	return i % 700 >= 580;
-}
-
-static bool same(const struct incise_tick *a, const struct incise_tick *b)
-{
-#define SAME(field) !memcmp(&a->field, &b->field, sizeof(a->field))
-	return SAME(t_ns) && SAME(position_mm) && SAME(tool_mm) && SAME(proxy_mm) &&
-	       SAME(normal) && SAME(depth_mm) && SAME(velocity_mm_s) && SAME(command_N) &&
-	       SAME(rendered_N) && SAME(flags) && SAME(phase) && SAME(tool);
-#undef SAME
-}
-
-/* Conditions that the stroke met. */
-struct seen {
-	unsigned int flags, phases, tools;
-	int ticks_with_force;
-};
-
-static void compare(struct incise_plan *a, struct incise_plan *b, struct seen *seen)
-{
-	for (int i = 0; i < TICKS; i++) {
-		int64_t t_ns = (int64_t)(i + 10) * 1000000;
-		struct incise_tick x, y;
-
-		if (i == 2000 || i == 2300) {
-			enum incise_tool tool =
-				i == 2000 ? INCISE_TOOL_TUBE : INCISE_TOOL_AUTO;
-
-			assert_int_equal(incise_plan_set_tool(a, tool), 0);
-			assert_int_equal(incise_plan_set_tool(b, tool), 0);
-		}
-		fed_tick(a, t_ns, silent(i) ? NULL : stroke, NULL, &x);
-		fed_tick(b, t_ns, silent(i) ? NULL : stroke, NULL, &y);
-		if (!same(&x, &y))
-			fail_msg("tick %d: %.17g %.17g %.17g N, flags %x, or %.17g %.17g "
-				 "%.17g N, flags %x",
-				 i, x.command_N[0], x.command_N[1], x.command_N[2],
-				 x.flags, y.command_N[0], y.command_N[1], y.command_N[2],
-				 y.flags);
-		seen->flags |= x.flags;
-		seen->phases |= 1U << x.phase;
-		seen->tools |= 1U << x.tool;
-		seen->ticks_with_force +=
-			x.command_N[0] != 0 || x.command_N[1] != 0 || x.command_N[2] != 0;
-	}
-}
-
 static int stages(const struct incise_plan *plan)
 {
 	int n = 0;
@@ -281,10 +206,8 @@ static int stages_of_a_loop(void)
 	return (int)n_all - 3;
 }
 
-/* The plan leaves out the stages that the scene lacks; its ticks are those of the whole pipeline. */
-static void lean_is_full_to_the_bit(const struct lack *lack,
-				    const struct surface *surface, const char *arithmetic,
-				    struct seen *seen)
+static void leaves_out_what_lacks(const struct lack *lack, const struct surface *surface,
+				  const char *arithmetic)
 {
 	struct incise_scene *scene = scene_of(&lack->lacking, surface, arithmetic);
 	struct incise_plan *lean = plan_of(scene), *full;
@@ -306,39 +229,19 @@ static void lean_is_full_to_the_bit(const struct lack *lack,
 	if (lack->also)
 		assert_non_null(strstr(why_not(lean, lack->also), lack->why));
 	assert_non_null(strstr(why_not(full, "actuate"), "no stepper"));
-	compare(lean, full, seen);
 	incise_plan_free(full);
 	incise_plan_free(lean);
 	incise_scene_free(scene);
 }
 
-/* Of the surfaces and evaluators each lack has one, and with CASES=all each. */
-TEST(test_lean_is_full_to_the_bit)
+/* Of the surfaces and evaluators each lack has one. */
+TEST(test_each_lack_leaves_out_its_stage)
 {
-	const unsigned int met = INCISE_TICK_CONTACT | INCISE_TICK_STALE |
-				 INCISE_TICK_CLAMPED | INCISE_TICK_SLEWED |
-				 INCISE_TICK_STARTING | INCISE_TICK_EXTRAPOLATED |
-				 INCISE_TICK_IN_CUT | INCISE_TICK_MEMBRANE |
-				 INCISE_TICK_LUMEN | INCISE_TICK_BACK_WALL;
-	struct seen seen = {0};
-	int compared = 0;
+	for (int i = 0; i < LACKS; i++) {
+		const struct lack lack = lack_of(i);
 
-	for (int i = 0; i < LACKS; i++)
-		for (int way = 0; way < 6; way++) {
-			const struct lack lack = lack_of(i);
-
-			if (!cases_are_all() && way != i % 6)
-				continue;
-			lean_is_full_to_the_bit(&lack, &surfaces[way % 3],
-						evaluators[way / 3], &seen);
-			compared += TICKS;
-		}
-	/* It was a varied stroke. */
-	assert_int_equal(seen.flags & met, met);
-	assert_int_equal(seen.phases, 7);
-	assert_int_equal(seen.tools, 1 << INCISE_TOOL_BLADE | 1 << INCISE_TOOL_HANDLE |
-					     1 << INCISE_TOOL_TUBE);
-	assert_true(seen.ticks_with_force > compared / 4);
+		leaves_out_what_lacks(&lack, &surfaces[i % 3], evaluators[i % 6 / 3]);
+	}
 }
 
 /* A scene that lacks nothing keeps all, but for what no loop runs and what no rig has. */
@@ -376,71 +279,6 @@ TEST(test_picture)
 	assert_non_null(strstr(why_not(plan, "bleeding"), "picture.bleeding is false"));
 	incise_plan_free(plan);
 	incise_scene_free(scene);
-}
-
-/*
- * One stage at a time, on a scene that has the reaction or the plane constraint only: scene
- * 0 has it, 1 sets it to its neutral value, 2 never names it.
- */
-static void one_effect(const char *stage, const char *const text[3], int way)
-{
-	struct incise_scene *scene[3];
-	struct incise_plan *plan[3];
-	struct seen seen = {0};
-
-	for (int k = 0; k < 3; k++) {
-		char all_of_it[800];
-
-		snprintf(all_of_it, sizeof(all_of_it),
-			 "arithmetic = \"%s\"; surface = %s;\n%s\n"
-			 "device = { delay_ticks = 0; };\n",
-			 evaluators[way & 1], surfaces[1 + way / 2].text, text[k]);
-		scene[k] = fed_scene(&folder, all_of_it, NULL);
-		assert_non_null(scene[k]);
-		plan[k] = plan_of(scene[k]);
-		assert_complete(plan[k]);
-		assert_int_equal(keeps(plan[k], stage), !k);
-	}
-	assert_int_equal(stages(plan[1]), stages(plan[2]));
-	assert_true(stages(plan[0]) > stages(plan[1]));
-	compare(plan[1], plan[2], &seen);
-	assert_true(seen.ticks_with_force > 100);
-	for (int k = 0; k < 3; k++) {
-		incise_plan_free(plan[k]);
-		incise_scene_free(scene[k]);
-	}
-}
-
-TEST(test_one_force)
-{
-	for (int i = 0; i < incise_n_tissue_forces; i++) {
-		const struct incise_force_number *number =
-			incise_tissue_forces[i].number + incise_tissue_forces[i].acts;
-		const char *other = i ? "reaction_N_mm = 0.3;" : "plane_N_mm = 0.4;";
-		char text[3][120];
-		const char *const texts[] = {text[0], text[1], text[2]};
-
-		snprintf(text[0], sizeof(text[0]), "tissue = { %s %s = %#.9g; };", other,
-			 number->key, number->skin);
-		snprintf(text[1], sizeof(text[1]), "tissue = { %s %s = 0.0; };", other,
-			 number->key);
-		snprintf(text[2], sizeof(text[2]), "tissue = { %s };", other);
-		for (int way = 0; way < 4; way++)
-			if (cases_are_all() || way == i % 4)
-				one_effect(incise_tissue_forces[i].name, texts, way);
-	}
-}
-
-TEST(test_one_effect)
-{
-	static const char tissue[] = "tissue = { reaction_N_mm = 0.3; };";
-	static const char *const average[] = {
-		"tissue = { reaction_N_mm = 0.3; }; effects = { average_ticks = 16; };",
-		"tissue = { reaction_N_mm = 0.3; }; effects = { average_ticks = 1; };",
-		tissue};
-
-	for (int way = 0; way < (cases_are_all() ? 4 : 1); way++)
-		one_effect("normal", average, way);
 }
 
 static int set_up(void **state)

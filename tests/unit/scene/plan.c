@@ -160,8 +160,6 @@ TEST(test_against_truth)
 	}
 }
 
-static uint64_t noise = 1;
-
 static int silent_tracker(struct incise_tracker *tracker,
 			  struct incise_tracker_sample *samples, int n)
 {
@@ -669,65 +667,4 @@ TEST(test_timed_fault)
 			assert_true(ns[k] == 0);
 	}
 	felt_end(&f);
-}
-
-/* Within ±10, or now and then of any bits. */
-static double any_number(void)
-{
-	union {
-		uint64_t bits;
-		double value;
-	} u;
-
-	incise_random_step(&noise);
-	u.bits = noise;
-	return noise >> 20 & 31 ? (double)(noise >> 44) / 52429 - 10 : u.value;
-}
-
-/* Any poses and attitudes, and any tool, on the scene that has all of paper 2. */
-TEST(test_any_fed_pose_gives_a_force_within_limits)
-{
-	for (int fixed = 0; fixed < 2; fixed++) {
-		struct fed fed = fed_start("scenes/neck.scene", fixed);
-		double last[3] = {0};
-		int phases[3] = {0};
-
-		noise = 3;
-		for (int i = 1; i < 20000; i++) {
-			struct incise_tracker_sample pose = {.t_ns = i *
-								     INT64_C(1000000)};
-			double change[3];
-
-			for (int k = 0; k < 3; k++)
-				pose.position_mm[k] = any_number();
-			for (int k = 0; k < 4; k++)
-				pose.quaternion[k] = any_number();
-			if (noise % 97 == 0)
-				pose.t_ns = (int64_t)noise;
-			if (noise % 89 == 0)
-				assert_int_equal(
-					incise_plan_set_tool(
-						fed.plan,
-						(enum incise_tool)(noise >> 8 & 3)),
-					0);
-			incise_plan_feed(fed.plan, &pose, 1);
-			assert_int_equal(
-				incise_plan_tick(fed.plan, i * INT64_C(1000000), &t), 0);
-			for (int k = 0; k < 3; k++) {
-				change[k] = t.command_N[k] - last[k];
-				last[k] = t.command_N[k];
-				assert_true(isfinite(t.tool_mm[k]));
-				assert_true(isfinite(t.normal[k]));
-			}
-			/* The limits of the scene; rounding as in limit.h. */
-			assert_true(size(last) <= 4);
-			assert_true(size(change) <= 0.4 + 1e-14);
-			assert_true(isfinite(t.depth_mm) && t.depth_mm >= 0);
-			phases[t.phase]++;
-		}
-		assert_true(phases[INCISE_PHASE_FREE] > 1000);
-		assert_true(phases[INCISE_PHASE_CUTTING] > 1000);
-		assert_true(phases[INCISE_PHASE_INSERTION] > 1000);
-		fed_end(&fed);
-	}
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * Contacts: where they begin and end, on every kind of surface; ridges, creases, corners,
- * folds, borders and slivers; and any pose whatever.
+ * folds, borders and slivers. Any pose whatever is in ../../extremes/surface.c.
  */
 #include "../unit.h"
 #include <float.h>
@@ -509,43 +509,6 @@ TEST(test_inside_is_in_contact)
 	free(s);
 }
 
-/* Any pose whatever, jumps of metres and the ends of double: all results are numbers. */
-TEST(test_any_pose)
-{
-	static const double odd[] = {0,	   -0.0,    1e-300,   5e-324,	1e300, -1e300,
-				     1e15, DBL_MAX, -DBL_MAX, INFINITY, NAN,   1,
-				     -1,   1e4,	    -1e4,     1e9};
-	uint64_t random = 88172645463325252u;
-
-	for (int kind = 0; kind < N_KINDS; kind++) {
-		struct incise_surface *surface = of_kind(kind);
-
-		incise_proxy_init(&proxy, surface, kind & 1 ? 0 : 0.05);
-		for (int k = 0; k < 200000; k++) {
-			double tool[3], size = pow(10, 8 * solid_random(&random) - 4);
-			bool special = solid_random(&random) < 0.02;
-
-			if (k % 5000 == 0)
-				incise_proxy_init(&proxy, surface, proxy.leave_mm);
-			for (int i = 0; i < 3; i++) {
-				double step = size * (2 * solid_random(&random) - 1);
-
-				tool[i] = special ? odd[(int)(16 * solid_random(&random))]
-					  : fabs(proxy.tool_mm[i]) > 3
-						  ? 3 * solid_random(&random)
-						  : proxy.tool_mm[i] + step;
-			}
-			incise_proxy_move(&proxy, tool);
-			assert_true(v3_finite(proxy.tool_mm));
-			assert_true(v3_finite(proxy.touch.point_mm));
-			assert_true(isfinite(proxy.touch.depth_mm));
-			assert_true(isfinite(proxy.clear_mm));
-			assert_true(fabs(v3_length(proxy.touch.normal) - 1) < 1e-12);
-			assert_true(proxy.touching || !proxy.began);
-		}
-		incise_surface_free(surface);
-	}
-}
 /* Each triangle with corners of its own, each moved by up to @by along each axis. */
 static struct incise_surface *apart(const struct solid *whole, double by, uint64_t *seed)
 {
