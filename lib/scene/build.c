@@ -25,6 +25,8 @@ struct plan_place {
 
 static const struct plan_place floor_place = {.normal = {0, 0, 1}};
 
+static const struct incise_host_hold no_host = {.ticks = 1};
+
 /* On a mesh the direction to the surface is rounding where the tool is shallow: so is the tilt. */
 static bool fits_integers(const struct incise_scene *scene)
 {
@@ -249,6 +251,7 @@ static struct incise_plan *new_plan(const struct incise_scene *scene,
 				    struct incise_rig *rig,
 				    struct incise_tracker_info tracker,
 				    const struct plan_place *place,
+				    const struct incise_host_hold *hold,
 				    struct incise_error *err)
 {
 	struct incise_plan *plan = calloc(1, sizeof(*plan));
@@ -259,6 +262,7 @@ static struct incise_plan *new_plan(const struct incise_scene *scene,
 		return NULL;
 	}
 	plan->scene = scene;
+	plan->hold = *hold;
 	rc = take_rig(plan, rig, &tracker, *place, err);
 	take_stations(plan, &tracker);
 	if (!rc)
@@ -300,7 +304,7 @@ static struct incise_plan *new_plan(const struct incise_scene *scene,
 struct incise_plan *incise_plan_new(const struct incise_scene *scene,
 				    struct incise_rig *rig, struct incise_error *err)
 {
-	return new_plan(scene, rig, fed_tracker, &floor_place, err);
+	return new_plan(scene, rig, fed_tracker, &floor_place, &no_host, err);
 }
 
 struct incise_plan *incise_plan_new_fed(const struct incise_scene *scene,
@@ -335,5 +339,13 @@ struct incise_plan *incise_plan_new_fed_on(const struct incise_scene *scene,
 		errno = EINVAL;
 		return NULL;
 	}
-	return new_plan(scene, NULL, *tracker, &place, err);
+	return new_plan(scene, NULL, *tracker, &place, &no_host, err);
+}
+
+struct incise_plan *incise_plan_new_held(const struct incise_scene *scene,
+					 const struct incise_tracker_info *tracker,
+					 const struct incise_host_hold *hold,
+					 struct incise_error *err)
+{
+	return new_plan(scene, NULL, *tracker, &floor_place, hold, err);
 }
