@@ -16,6 +16,7 @@ struct incise_host_hold {
 	int ticks;  /* from step to step; 1: a tracker's loop, without a host */
 	bool cubic; /* the host gives velocities */
 	bool fit;   /* a gain that is too large is lowered */
+	double gain; /* in place of the scene's; 0: that. A refusal sets it to the largest that is safe */
 };
 
 struct incise_host_place {

@@ -21,6 +21,9 @@
 /* A host that adds up its steps in double is off by less than this share of a tick. */
 #define SNAP 0.01
 
+/* The check of stability takes longer with more ticks in a step. */
+#define HOLD_MOST 512
+
 /* The plan's memory that ticks change. */
 #define PARTS 5
 struct part {
@@ -101,7 +104,7 @@ static struct incise_plan *new_host_plan(const struct incise_scene *scene,
 		.rate_hz = incise_scene_rate_hz(scene),
 		.stations = 1,
 	};
-	const struct incise_host_hold hold = {
+	struct incise_host_hold hold = {
 		.ticks = count_hold(options->host_period_s, poses.rate_hz),
 		.cubic = options->gives_velocity,
 		.fit = options->fit_gain,
@@ -126,9 +129,14 @@ struct incise_host *incise_host_new(const struct incise_scene *scene,
 	struct incise_host *host;
 	int rc;
 
-	if (options && !(options->host_period_s >= 0 && options->host_period_s <= 1)) {
-		incise_error_set(err, EINVAL, "host_period_s %g: expected 0 … 1 s",
-				 options->host_period_s);
+	if (options &&
+	    !(options->host_period_s >= 0 &&
+	      options->host_period_s * incise_scene_rate_hz(scene) <= HOLD_MOST)) {
+		incise_error_set(
+			err, EINVAL,
+			"host_period_s %g: expected 0 or more, up to %d ticks at "
+			"the scene's rate_hz, %g",
+			options->host_period_s, HOLD_MOST, incise_scene_rate_hz(scene));
 		return NULL;
 	}
 	host = calloc(1, sizeof(*host));
