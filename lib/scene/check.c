@@ -167,8 +167,9 @@ static void advise(struct incise_plan *plan, const struct incise_tracker_info *t
 {
 	int way = advice->swung.way;
 	double gain = find_advice(plan, tracker, false, way, advice);
-	double damping =
-		plan->hold.fit ? 0 : find_advice(plan, tracker, true, way, advice);
+	double damping = plan->hold.fit && gain > 0
+				 ? 0
+				 : find_advice(plan, tracker, true, way, advice);
 
 	plan->hold.gain = gain;
 	*text = '\0';

@@ -485,7 +485,9 @@ static void tick(struct search *s, struct rest_run *run)
 	}
 	memmove(run->late_N, run->late_N + 1,
 		(size_t)s->device.late_ticks * sizeof(*run->late_N));
-	if (!hosted)
+	if (hosted)
+		run->next_pose_s = run->t_s + s->device.period_s;
+	else
 		track(s, run);
 }
 
@@ -795,6 +797,8 @@ static bool judge_linear(struct search *s, const struct rest_run *run, double de
 		struct rest_run kicked = *run;
 		struct window last;
 
+		/* A host's next step is a whole one away. */
+		kicked.ticks = 1;
 		incise_plan_force_map(&s->plan, to_ns(run->t_s), s->axis, side, &map);
 		if (side && is_same(&map, &before))
 			break;
@@ -844,12 +848,15 @@ void incise_rest_take_weakest(struct incise_plan_weakest *to,
 static bool judge_steps(struct search *s, const struct rest_run *run, double depth_mm,
 			int way, struct incise_rest *rest)
 {
-	int *ticks = &s->plan.hold.ticks;
+	int longest = s->plan.hold.ticks;
+	bool rests = true;
 
-	for (; *ticks; *ticks = *ticks * 3 / 4)
-		if (!judge_linear(s, run, depth_mm, way, rest))
-			return false;
-	return true;
+	for (int ticks = longest; ticks && rests; ticks = ticks * 3 / 4) {
+		s->plan.hold.ticks = ticks;
+		rests = judge_linear(s, run, depth_mm, way, rest);
+	}
+	s->plan.hold.ticks = longest;
+	return rests;
 }
 
 /* Returns whether it rests. */

@@ -44,7 +44,7 @@ struct incise_host;
 /** Settings of a host. All 0: a host at the scene's rate, without velocities, on its own clock. */
 struct incise_host_options {
 	/**
-	 * Largest step of the host, s; 0: a tick. A step that is no multiple of the tick counts as a tick longer,
+	 * Largest step of the host, s, up to 512 ticks; 0: a tick. A step that is no multiple of the tick counts as a tick longer,
 	 * as the last tick before it may be so old.
 	 */
 	double host_period_s;

@@ -790,6 +790,18 @@ static int compare(const void *a, const void *b)
 	return (x > y) - (x < y);
 }
 
+#define LOST_EVERY 5
+static void note_lost(const struct incise_scene *scene, int k, double gain)
+{
+	struct incise_host_options options = {.fit_gain = true};
+	struct incise_host *host;
+	double at_once = fit(scene, &options, &host);
+
+	incise_host_free(host);
+	if (at_once > 0 && at_once < scene->tissue.gain)
+		lost[k].share[lost[k].n++] = 1 - gain / at_once;
+}
+
 /* Stiffer than it is drawn, so that most are lowered. */
 #define STIFFER 8
 static void try_hosted(uint64_t seed)
@@ -798,9 +810,8 @@ static void try_hosted(uint64_t seed)
 	int k = below(&seed, 3);
 	struct incise_host_options options = {.fit_gain = true};
 	struct incise_scene *scene;
-	struct incise_host *at_once;
 	struct incise_plan *plan;
-	double gain, gain_at_once;
+	double gain;
 	static struct leaned l;
 
 	draw_leaned(seed, &l);
@@ -808,8 +819,6 @@ static void try_hosted(uint64_t seed)
 	succeeds(scene);
 	scene->tissue.gain *= STIFFER;
 	scene->limits.pose_age_ms = 1000;
-	gain_at_once = fit(scene, &options, &at_once);
-	incise_host_free(at_once);
 	hosted.seed = seed;
 	hosted.step_s = 1 / rates_hz[k];
 	hosted.irregular = chance(&seed, 0.5);
@@ -823,8 +832,8 @@ static void try_hosted(uint64_t seed)
 		say(&l, ", host %.0f Hz%s%s gain %.3g", rates_hz[k],
 		    hosted.irregular ? " irregular" : "",
 		    hosted.velocity ? " with velocity" : "", gain);
-		if (gain_at_once > 0 && gain_at_once < scene->tissue.gain)
-			lost[k].share[lost[k].n++] = 1 - gain / gain_at_once;
+		if (sum.scenes % LOST_EVERY == 0)
+			note_lost(scene, k, gain);
 		scene->unchecked = true;
 		plan = incise_plan_new_fed(scene, &l.tracker, &err);
 		succeeds(plan);
