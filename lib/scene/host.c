@@ -196,14 +196,18 @@ static int64_t tick_at(const struct incise_host *host, int64_t tick)
 static int64_t find_lag(struct incise_host *host, int64_t t_ns)
 {
 	struct host_state *now = &host->now;
-	int64_t step_ns = t_ns - (now->from_ns + now->last.t_ns), clock_ns, lag_ns;
+	int64_t step_ns = t_ns - (now->from_ns + now->last.t_ns);
+	int64_t before_ns = now->clock_ns, lag_ns;
 
 	if (!host->options.clock)
 		return 0;
-	clock_ns = incise_clock_now(host->options.clock);
-	lag_ns = now->lag_ns + (clock_ns - now->clock_ns) - step_ns;
-	now->clock_ns = clock_ns;
-	now->lag_ns = now->started && step_ns >= 0 && lag_ns > 0 ? lag_ns : 0;
+	now->clock_ns = incise_clock_now(host->options.clock);
+	if (!now->started || step_ns < 0)
+		now->lag_ns = 0;
+	else
+		now->lag_ns += now->clock_ns - before_ns - step_ns;
+	if (now->lag_ns < 0)
+		now->lag_ns = 0;
 	if ((double)now->lag_ns <= host->plan->scene->limits.pose_age_ms * 1e6)
 		return 0;
 	lag_ns = now->lag_ns;

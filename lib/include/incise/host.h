@@ -89,8 +89,8 @@ struct incise_host_info {
  * @param scene   must outlive the host
  * @param options or NULL: all 0
  * @return host, to be freed with incise_host_free(); NULL with errno EINVAL (options out of range), EDOM (the scene
- *         swings at this step; the error names the largest safe tissue.gain, unless @options asks to fit it and none
- *         is), or of incise_plan_new_fed(). Takes up to some seconds.
+ *         swings at this step: the error names the largest safe tissue.gain, and with fit_gain there is none), or of
+ *         incise_plan_new_fed(). Takes up to some seconds.
  */
 INCISE_API struct incise_host *incise_host_new(const struct incise_scene *scene,
 					       const struct incise_host_options *options,
