@@ -10,7 +10,7 @@ unit_scripts := udev/stepper-setup
 documents := README.md CHANGELOG.md $(O)/doc/options.md \
 	$(filter-out doc/reference.md,$(wildcard doc/*.md doc/*.svg doc/*.png))
 # Sources of examples, not what was built of them.
-example_files := $(addprefix examples/,README.md Makefile own_loop.c tracker_lines.c)
+example_files := $(addprefix examples/,README.md Makefile own_loop.c slow_host.c tracker_lines.c)
 example_scripts := examples/capture_to_figure.sh examples/learn.py
 udev_rules := $(wildcard udev/*.rules)
 sysusers := $(wildcard udev/*.sysusers)

@@ -15,7 +15,9 @@ static inline bool wall_rests(const struct incise_haptic_device *device,
 			      const struct incise_predict *predict, double stiffness_N_mm,
 			      double damping_N_s_mm, int late_ticks)
 {
-	const struct incise_pose_loop loop = {device->period_s, predict, late_ticks};
+	const struct incise_pose_loop loop = {.period_s = device->period_s,
+					      .predict = predict,
+					      .late_ticks = late_ticks};
 	const struct incise_plant plant =
 		incise_pose_loop_plant(device->mass_kg, device->damping_N_s_mm, NULL);
 	const struct incise_force_map wall = {.now = {{stiffness_N_mm}},

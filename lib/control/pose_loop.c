@@ -50,6 +50,8 @@ struct loop {
 	int cells;		/* of the mean … */
 	double cell_ticks;	/* … and so many ticks in each */
 	int own_states, states; /* of an axis */
+	bool hosted;		/* a period is a host's step … */
+	bool cubic;		/* … with velocities */
 	struct incise_force_map map;
 };
 
@@ -100,6 +102,8 @@ static double unit(const struct loop *loop, int state)
 
 	if (state < loop->own_states)
 		return pow(period_s, -order[state]);
+	if (loop->cubic && late == -1)
+		return 1 / period_s;
 	for (int i = 0; i < 3; i++)
 		most_N_mm = fmax(most_N_mm, fabs(loop->map.now[i][i]));
 	return late >= 0 && late < loop->late && most_N_mm > 0 ? most_N_mm : 1;
@@ -113,15 +117,20 @@ static void go_to(struct pose_loop_run *run, double t_s)
 	run->t_s = t_s;
 }
 
-static void take_pose_loop(struct pose_loop_run *run, double arrival_s)
+static void take_place(struct pose_loop_run *run, const double at_mm[3], double arrival_s)
 {
 	struct incise_tracker_sample sample = {
 		.t_ns = to_ns(arrival_s),
 		.quaternion = {1},
 	};
 
-	memcpy(sample.position_mm, run->pose_mm[0], sizeof(run->pose_mm[0]));
+	v3_copy(sample.position_mm, at_mm);
 	incise_predict_add(&run->predict, &sample);
+}
+
+static void take_pose_loop(struct pose_loop_run *run, double arrival_s)
+{
+	take_place(run, run->pose_mm[0], arrival_s);
 	memmove(run->pose_mm[0], run->pose_mm[1],
 		(size_t)--run->n * sizeof(run->pose_mm[0]));
 }
@@ -144,33 +153,68 @@ static void set_mean(const struct loop *loop, struct pose_loop_run *run,
 	}
 }
 
-static void set_force(const struct loop *loop, struct pose_loop_run *run)
+static void find_force(const struct loop *loop, struct pose_loop_run *run, double t_s,
+		       double force_N[3])
 {
 	const struct incise_force_map *map = &loop->map;
 	double x[3], v[3], a[3] = {0}, mean[3] = {0}, attitude[4];
 
-	incise_predict_at(&run->predict, to_ns(run->t_s), x, v, attitude);
+	incise_predict_at(&run->predict, to_ns(t_s), x, v, attitude);
 	if (loop->own_states == OWN_STATES)
-		incise_predict_acceleration(&run->predict, to_ns(run->t_s), a);
+		incise_predict_acceleration(&run->predict, to_ns(t_s), a);
 	if (map->mean_ticks > 1)
 		set_mean(loop, run, x, mean);
 	for (int i = 0; i < 3; i++)
-		run->late_N[loop->late][i] =
-			-v3_dot(map->now[i], x) - v3_dot(map->mean[i], mean) -
-			v3_dot(map->damping[i], v) - v3_dot(map->mass[i], a);
+		force_N[i] = -v3_dot(map->now[i], x) - v3_dot(map->mean[i], mean) -
+			     v3_dot(map->damping[i], v) - v3_dot(map->mass[i], a);
+}
+
+static void set_force(const struct loop *loop, struct pose_loop_run *run,
+		      const double force_N[3])
+{
+	v3_copy(run->late_N[loop->late], force_N);
 	memcpy(run->force_N, run->late_N[0], sizeof(run->force_N));
 	memmove(run->late_N[0], run->late_N[1],
 		(size_t)loop->late * sizeof(run->late_N[0]));
 }
 
+/* A step of a host. */
+static void run_step(const struct loop *loop, struct pose_loop_run *run)
+{
+	double step_s = loop->ticks * loop->tick_s, force_N[3], at_mm[3];
+	struct incise_host_place from, to;
+
+	v3_copy(from.at_mm, run->pose_mm[0]);
+	v3_copy(from.mm_s, run->pose_mm[1]);
+	for (int i = 0; i < 3; i++) {
+		to.at_mm[i] = run->plant[i].position_mm;
+		to.mm_s[i] = run->plant[i].velocity_mm_s;
+	}
+	for (int k = 1; k <= loop->ticks; k++) {
+		double t_s = k * loop->tick_s - step_s;
+
+		incise_host_between(at_mm, &from, &to, step_s, (double)k / loop->ticks,
+				    loop->cubic);
+		take_place(run, at_mm, t_s);
+		find_force(loop, run, t_s, force_N);
+	}
+	v3_copy(run->pose_mm[0], to.at_mm);
+	v3_copy(run->pose_mm[1], to.mm_s);
+	for (int k = 1; k <= loop->ticks; k++) {
+		set_force(loop, run, force_N);
+		go_to(run, k * loop->tick_s);
+	}
+}
+
 /* Round a period: the last poses are taken in before the tick that starts the next one. */
 static void run_period(const struct loop *loop, struct pose_loop_run *run)
 {
-	double lead_s = LEAD * loop->tick_s;
+	double lead_s = LEAD * loop->tick_s, force_N[3];
 	int taken = 0;
 
 	for (int k = 1; k <= loop->ticks; k++) {
-		set_force(loop, run);
+		find_force(loop, run, run->t_s, force_N);
+		set_force(loop, run, force_N);
 		for (; taken < loop->poses; taken++) {
 			double t_s = (loop->waiting + 1 + taken) * loop->pose_s -
 				     loop->latency_s - lead_s;
@@ -207,7 +251,7 @@ static void measure_period(const struct loop *loop, double *matrix)
 
 		*find_loop_place(loop, &run, column / 3, column % 3) =
 			SIZE_MM * unit(loop, column / 3);
-		run_period(loop, &run);
+		(loop->hosted ? run_step : run_period)(loop, &run);
 		for (int row = 0; row < n; row++)
 			matrix[row * n + column] =
 				*find_loop_place(loop, &run, row / 3, row % 3) /
@@ -249,7 +293,14 @@ static void set_times(struct loop *loop, double tick_s)
 	loop->tick_s = loop->pose_s * loop->poses / loop->ticks;
 	loop->waiting =
 		(int)((loop->latency_s + LEAD * loop->tick_s) / loop->pose_s + 1e-9);
-	loop->states = loop->own_states + loop->waiting + loop->late + loop->cells;
+}
+
+/* A pose for each tick; a host's last one waits, with its velocity. */
+static void set_step(struct loop *loop, double tick_s, int ticks)
+{
+	loop->tick_s = loop->pose_s = tick_s;
+	loop->ticks = ticks;
+	loop->waiting = loop->cubic ? 2 : 1;
 }
 
 /* The predictor as it is at the begin of a period, with all that it knows 0. */
@@ -261,7 +312,7 @@ static void set_predict(struct loop *loop)
 	p->period_s = loop->pose_s;
 	incise_double_predict_init(&p->now);
 	p->now.started = true;
-	p->now.arrival_ns = to_ns(-LEAD * loop->tick_s);
+	p->now.arrival_ns = to_ns(-loop->tick_s * (loop->hosted ? loop->ticks : LEAD));
 	p->now.t_ns = p->now.arrival_ns - p->latency_ns;
 }
 
@@ -274,6 +325,8 @@ static void loop_init(struct loop *loop, const struct incise_pose_loop *of,
 		.predict = *of->predict,
 		.late = of->late_ticks,
 		.map = *map,
+		.hosted = of->hold.ticks > 1,
+		.cubic = of->hold.ticks > 1 && of->hold.cubic,
 	};
 	if (map->mean_ticks > 1) {
 		loop->cells = (int)fmin(map->mean_ticks - 1, CELLS_MOST);
@@ -282,7 +335,11 @@ static void loop_init(struct loop *loop, const struct incise_pose_loop *of,
 	for (int i = 0; i < 9; i++)
 		mass = mass || map->mass[i / 3][i % 3] != 0;
 	loop->own_states = mass ? OWN_STATES : OWN_STATES - 1;
-	set_times(loop, of->period_s);
+	if (loop->hosted)
+		set_step(loop, of->period_s, of->hold.ticks);
+	else
+		set_times(loop, of->period_s);
+	loop->states = loop->own_states + loop->waiting + loop->late + loop->cells;
 	set_predict(loop);
 }
 

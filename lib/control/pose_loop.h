@@ -27,11 +27,15 @@
  * faster than the loop. Beyond 64 ticks in a P, or 16 P in a tick or 32 in the latency, tick or P are made longer
  * too.
  *
+ * In the loop of a host (incise/host.h) a period is its step: a pose, the ticks since the last one with poses between,
+ * and the last force, held for the step. Its states are the last pose, and its velocity, in place of those on their way.
+ *
  * N, mm, s.
  */
 #ifndef INCISE_POSE_LOOP_H
 #define INCISE_POSE_LOOP_H
 
+#include "host_path.h"
 #include "plant.h"
 #include "predict.h"
 
@@ -48,6 +52,8 @@ struct incise_pose_loop {
 	/* As initialised for the tracker: its gains, period and latency count. */
 	const struct incise_predict *predict;
 	int late_ticks; /* until a force acts, 0 … INCISE_POSE_LOOP_LATE_MAX */
+	/* With more ticks than one there is a host in place of the tracker, whose period is a tick. */
+	struct incise_host_hold hold;
 };
 
 /* A mass in a hand, or free (NULL). */

@@ -25,6 +25,8 @@ struct plan_place {
 
 static const struct plan_place floor_place = {.normal = {0, 0, 1}};
 
+static const struct incise_host_hold no_host = {.ticks = 1};
+
 /* On a mesh the direction to the surface is rounding where the tool is shallow: so is the tilt. */
 static bool fits_integers(const struct incise_scene *scene)
 {
@@ -112,7 +114,7 @@ static void take_tissue(struct incise_plan *plan)
 {
 	const struct incise_scene *scene = plan->scene;
 
-	plan->gain = scene->tissue.gain;
+	plan->gain = plan->hold.gain > 0 ? plan->hold.gain : scene->tissue.gain;
 	for (int i = 0; i < incise_n_tissue_forces; i++) {
 		struct incise_acting_force *own = &plan->acting[i];
 		const double *number = scene->tissue.force[i];
@@ -232,7 +234,8 @@ static int equip(struct incise_plan *plan, struct incise_error *err)
 static int check_age(const struct incise_plan *plan,
 		     const struct incise_tracker_info *tracker, struct incise_error *err)
 {
-	double least_ms = (double)tracker->latency_ns * 1e-6 + 1e3 / tracker->rate_hz;
+	double rate_hz = tracker->rate_hz / plan->hold.ticks;
+	double least_ms = (double)tracker->latency_ns * 1e-6 + 1e3 / rate_hz;
 
 	if (plan->scene->limits.pose_age_ms >= least_ms)
 		return 0;
@@ -241,7 +244,7 @@ static int check_age(const struct incise_plan *plan,
 		"%s: limits.pose_age_ms: poses of a tracker of %g Hz with a latency of "
 		"%g ms can be older than %g ms, and then there is no force; set it to "
 		"%.1f or more",
-		plan->scene->path, tracker->rate_hz, (double)tracker->latency_ns * 1e-6,
+		plan->scene->path, rate_hz, (double)tracker->latency_ns * 1e-6,
 		plan->scene->limits.pose_age_ms, ceil(least_ms * 10) / 10);
 }
 
@@ -249,6 +252,7 @@ static struct incise_plan *new_plan(const struct incise_scene *scene,
 				    struct incise_rig *rig,
 				    struct incise_tracker_info tracker,
 				    const struct plan_place *place,
+				    struct incise_host_hold *hold,
 				    struct incise_error *err)
 {
 	struct incise_plan *plan = calloc(1, sizeof(*plan));
@@ -259,6 +263,7 @@ static struct incise_plan *new_plan(const struct incise_scene *scene,
 		return NULL;
 	}
 	plan->scene = scene;
+	plan->hold = *hold;
 	rc = take_rig(plan, rig, &tracker, *place, err);
 	take_stations(plan, &tracker);
 	if (!rc)
@@ -290,6 +295,7 @@ static struct incise_plan *new_plan(const struct incise_scene *scene,
 		rc = plan->integers ? 0 : -errno;
 	}
 	if (rc) {
+		*hold = plan->hold;
 		incise_plan_free(plan);
 		errno = -rc;
 		return NULL;
@@ -300,7 +306,9 @@ static struct incise_plan *new_plan(const struct incise_scene *scene,
 struct incise_plan *incise_plan_new(const struct incise_scene *scene,
 				    struct incise_rig *rig, struct incise_error *err)
 {
-	return new_plan(scene, rig, fed_tracker, &floor_place, err);
+	struct incise_host_hold hold = no_host;
+
+	return new_plan(scene, rig, fed_tracker, &floor_place, &hold, err);
 }
 
 struct incise_plan *incise_plan_new_fed(const struct incise_scene *scene,
@@ -317,6 +325,7 @@ struct incise_plan *incise_plan_new_fed_on(const struct incise_scene *scene,
 					   const double normal[3],
 					   struct incise_error *err)
 {
+	struct incise_host_hold hold = no_host;
 	struct plan_place place;
 
 	if (!(tracker->rate_hz > 0) || !isfinite(tracker->rate_hz) ||
@@ -335,5 +344,21 @@ struct incise_plan *incise_plan_new_fed_on(const struct incise_scene *scene,
 		errno = EINVAL;
 		return NULL;
 	}
-	return new_plan(scene, NULL, *tracker, &place, err);
+	return new_plan(scene, NULL, *tracker, &place, &hold, err);
+}
+
+struct incise_plan *incise_plan_new_held(const struct incise_scene *scene,
+					 const struct incise_tracker_info *tracker,
+					 struct incise_host_hold *hold,
+					 struct incise_error *err)
+{
+	struct incise_plan *plan;
+
+	plan = new_plan(scene, NULL, *tracker, &floor_place, hold, err);
+	if (plan || !hold->fit || !(hold->gain > 0))
+		return plan;
+	plan = new_plan(scene, NULL, *tracker, &floor_place, hold, err);
+	if (plan && err)
+		*err = (struct incise_error){0};
+	return plan;
 }

@@ -167,8 +167,11 @@ static void advise(struct incise_plan *plan, const struct incise_tracker_info *t
 {
 	int way = advice->swung.way;
 	double gain = find_advice(plan, tracker, false, way, advice);
-	double damping = find_advice(plan, tracker, true, way, advice);
+	double damping = plan->hold.fit && gain > 0
+				 ? 0
+				 : find_advice(plan, tracker, true, way, advice);
 
+	plan->hold.gain = gain;
 	*text = '\0';
 	if (gain > 0)
 		snprintf(text, 200, "set tissue.gain to at most %.3g%s", gain,
@@ -230,7 +233,10 @@ int incise_plan_check_rest(struct incise_plan *plan,
 	/* Names the run that limits the gain. */
 	advise(plan, tracker, &advice, text);
 	name_run(rest, run);
-	if (s->own_delay)
+	if (plan->hold.ticks > 1)
+		snprintf(delay, sizeof(delay), "a host that steps once in %.4g ms",
+			 plan->hold.ticks * s->device.period_s * 1e3);
+	else if (s->own_delay)
 		snprintf(delay, sizeof(delay), "a delay of %d ticks",
 			 s->device.delay_ticks);
 	else

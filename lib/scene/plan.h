@@ -9,6 +9,7 @@
 #include <incise/model.h>
 #include <incise/plan.h>
 #include <incise/stepper_plan.h>
+#include "../control/host_path.h"
 #include "../control/model_input.h"
 #include "../control/predict.h"
 #include "../surface/surface.h"
@@ -106,6 +107,7 @@ struct incise_plan {
 		const char *name, *why;
 	} left_out[INCISE_PLAN_STAGES_MAX + INCISE_PLAN_NO_STAGES];
 	int n_left_out;
+	struct incise_host_hold hold;
 	struct incise_plan_stability stability;
 	int fault; /* negative errno of the device that failed, or 0 */
 	struct incise_plan_ops ops;
@@ -163,6 +165,15 @@ static inline bool incise_plan_has_model(const struct incise_plan *plan,
 incise_stage_fn incise_stage_pose, incise_stage_fed, incise_stage_actuate;
 
 /* --- plan --- */
+
+/*
+ * As incise_plan_new_fed(), in the loop of a host that steps once in so many ticks of the tracker. With hold->fit
+ * hold->gain is the gain that was found.
+ */
+struct incise_plan *incise_plan_new_held(const struct incise_scene *scene,
+					 const struct incise_tracker_info *tracker,
+					 struct incise_host_hold *hold,
+					 struct incise_error *err);
 
 /*
  * A copy that can tick beside the plan, with another gain: as the plan of a scene with that. It shares the

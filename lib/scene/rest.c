@@ -152,6 +152,9 @@ struct rest_run {
 		double arrival_s, at_mm[3];
 	} pose[POSES_MOST]; /* ring of those on their way */
 	unsigned int first, last;
+	struct incise_host_place step; /* of a host's last one … */
+	int ticks;		       /* … and how many ticks were since the first */
+	double command_N[3];	       /* of the plan; a host holds it */
 	double late_N[INCISE_STABILITY_DELAY_MAX + 1][3];
 	double sent_N[3]; /* after the actuator's slew, along the axes */
 	double noise_mm;  /* of each pose, sd */
@@ -387,56 +390,105 @@ static void go_to(const struct search *s, struct rest_run *run, double t_s)
 	run->t_s = t_s;
 }
 
-static void feed_rest(struct search *s, const struct rest_run *run, unsigned int pose)
+/* Feed a place along the axes. */
+static void feed_place(struct search *s, const double at_mm[3], double t_s)
 {
-	struct incise_tracker_sample sample = {
-		.t_ns = to_ns(run->pose[pose % POSES_MOST].arrival_s),
-		.status = ' ',
-	};
+	struct incise_tracker_sample sample = {.t_ns = to_ns(t_s), .status = ' '};
 
 	memcpy(sample.quaternion, s->turn, sizeof(s->turn));
 	v3_copy(sample.position_mm, s->way.at->point_mm);
 	for (int i = 0; i < 3; i++)
-		v3_add(sample.position_mm, sample.position_mm,
-		       run->pose[pose % POSES_MOST].at_mm[i], s->axis[i]);
+		v3_add(sample.position_mm, sample.position_mm, at_mm[i], s->axis[i]);
 	incise_plan_feed(&s->plan, &sample, 1);
+}
+
+static void tick_plan(struct search *s, struct rest_run *run, double t_s)
+{
+	struct incise_tick out;
+
+	incise_plan_tick(&s->plan, to_ns(t_s), &out);
+	s->ticks++;
+	for (int i = 0; i < 3; i++)
+		run->command_N[i] = v3_dot(out.command_N, s->axis[i]);
+}
+
+/* A guided device has its noise along the normal. */
+static void sense(const struct search *s, const struct rest_run *run, uint64_t n,
+		  struct incise_host_place *place)
+{
+	for (int i = 0; i < 3; i++) {
+		place->at_mm[i] = run->device[i].position_mm;
+		place->mm_s[i] = run->device[i].velocity_mm_s;
+	}
+	if (s->way.guided)
+		place->mm_s[1] = s->way.along_mm_s;
+	if (run->noise_mm > 0)
+		place->at_mm[0] += run->noise_mm * incise_random_normal(run->random, n);
+}
+
+/* A step of a host: the ticks since its last one. */
+static void step_rest(struct search *s, struct rest_run *run)
+{
+	const struct incise_host_hold *hold = &s->plan.hold;
+	double step_s = hold->ticks * s->device.period_s, at_mm[3];
+	struct incise_host_place to;
+
+	sense(s, run, (uint64_t)run->ticks, &to);
+	for (int k = 1; k <= hold->ticks; k++) {
+		double t_s = run->t_s + (k - hold->ticks) * s->device.period_s;
+
+		incise_host_between(at_mm, &run->step, &to, step_s,
+				    (double)k / hold->ticks, hold->cubic);
+		feed_place(s, at_mm, t_s);
+		tick_plan(s, run, t_s);
+	}
+	run->step = to;
+}
+
+/* The poses of a tracker in the time of a tick. */
+static void track(struct search *s, struct rest_run *run)
+{
+	double end_s = run->t_s + s->device.period_s;
+
+	while (run->next_pose_s < end_s) {
+		unsigned int pose = run->last++ % POSES_MOST;
+		struct incise_host_place place;
+
+		go_to(s, run, run->next_pose_s);
+		sense(s, run, run->last - 1, &place);
+		run->pose[pose].arrival_s = run->t_s + s->device.latency_s;
+		v3_copy(run->pose[pose].at_mm, place.at_mm);
+		run->next_pose_s += s->device.pose_s;
+	}
 }
 
 static void tick(struct search *s, struct rest_run *run)
 {
 	double most_N = s->device.slew_N_s * s->device.period_s;
-	double end_s = run->t_s + s->device.period_s;
-	struct incise_tick out;
+	bool hosted = s->plan.hold.ticks > 1;
 
 	for (; run->first != run->last &&
 	       run->pose[run->first % POSES_MOST].arrival_s <= run->t_s;
 	     run->first++)
-		feed_rest(s, run, run->first);
-	incise_plan_tick(&s->plan, to_ns(run->t_s), &out);
-	s->ticks++;
+		feed_place(s, run->pose[run->first % POSES_MOST].at_mm,
+			   run->pose[run->first % POSES_MOST].arrival_s);
+	if (!hosted)
+		tick_plan(s, run, run->t_s);
+	else if (run->ticks++ % s->plan.hold.ticks == 0)
+		step_rest(s, run);
 	for (int i = 0; i < 3; i++) {
 		double change_N;
 
-		run->late_N[s->device.late_ticks][i] = v3_dot(out.command_N, s->axis[i]);
+		run->late_N[s->device.late_ticks][i] = run->command_N[i];
 		change_N = run->late_N[0][i] - run->sent_N[i];
 		run->sent_N[i] += fmax(-most_N, fmin(most_N, change_N));
 	}
 	memmove(run->late_N, run->late_N + 1,
 		(size_t)s->device.late_ticks * sizeof(*run->late_N));
-	while (run->next_pose_s < end_s) {
-		unsigned int pose = run->last++ % POSES_MOST;
-
-		go_to(s, run, run->next_pose_s);
-		run->pose[pose].arrival_s = run->t_s + s->device.latency_s;
-		for (int i = 0; i < 3; i++)
-			run->pose[pose].at_mm[i] = run->device[i].position_mm;
-		/* A guided device has its noise along the normal. */
-		if (run->noise_mm > 0)
-			run->pose[pose].at_mm[0] +=
-				run->noise_mm *
-				incise_random_normal(run->random, run->last - 1);
-		run->next_pose_s += s->device.pose_s;
-	}
+	if (hosted)
+		run->next_pose_s = run->t_s + s->device.period_s;
+	else
+		track(s, run);
 }
 
 /* Where it starts; a guided one goes along the skin meanwhile. */
@@ -465,6 +517,7 @@ static void start_rest(struct search *s, struct rest_run *run)
 		set_motion(&run->tick[i], &run->device[i], s->device.period_s);
 	s->plan = s->rested;
 	s->parts = s->rested_parts;
+	sense(s, run, 0, &run->step);
 	for (int k = 1; k <= ticks; k++) {
 		tick(s, run);
 		hold_rest(s, run);
@@ -722,6 +775,7 @@ static bool judge_linear(struct search *s, const struct rest_run *run, double de
 		.period_s = s->device.period_s,
 		.predict = &s->plan.predict,
 		.late_ticks = s->device.late_ticks,
+		.hold = s->plan.hold,
 	};
 	const double *at_mm = s->way.at->point_mm;
 	struct incise_force_map map, before;
@@ -743,6 +797,8 @@ static bool judge_linear(struct search *s, const struct rest_run *run, double de
 		struct rest_run kicked = *run;
 		struct window last;
 
+		/* A host's next step is a whole one away. */
+		kicked.ticks = 1;
 		incise_plan_force_map(&s->plan, to_ns(run->t_s), s->axis, side, &map);
 		if (side && is_same(&map, &before))
 			break;
@@ -788,6 +844,21 @@ void incise_rest_take_weakest(struct incise_plan_weakest *to,
 	to->paid = paid;
 }
 
+/* A host's step may be shorter than the longest, with which a stiffer tissue can be stable. */
+static bool judge_steps(struct search *s, const struct rest_run *run, double depth_mm,
+			int way, struct incise_rest *rest)
+{
+	int longest = s->plan.hold.ticks;
+	bool rests = true;
+
+	for (int ticks = longest; ticks && rests; ticks = ticks * 3 / 4) {
+		s->plan.hold.ticks = ticks;
+		rests = judge_linear(s, run, depth_mm, way, rest);
+	}
+	s->plan.hold.ticks = longest;
+	return rests;
+}
+
 /* Returns whether it rests. */
 static bool try(struct search *s, struct rest_run *run, int lean_of, int way,
 		struct incise_rest *rest)
@@ -802,7 +873,7 @@ static bool try(struct search *s, struct rest_run *run, int lean_of, int way,
 		return false;
 	/* Similar leans have similar loops. */
 	return s->way.guided || !(depth_mm > 0) || lean_of % LOOK_EVERY ||
-	       judge_linear(s, run, depth_mm, way, rest);
+	       judge_steps(s, run, depth_mm, way, rest);
 }
 
 /* All leans of a way. Returns whether they rest. */

@@ -62,6 +62,23 @@ build_examples() {
 	run -2 --separate-stderr ./own_loop
 }
 
+@test "slow_host feels a scene at 60 steps a second" {
+	build_examples slow_host
+	sed 's/fracture_J_m2 = .*;/fracture_J_m2 = 0.0;/' "$dest/usr/share/incise/scenes/liver.scene" >liver.scene
+	cp "$dest/usr/share/incise/scenes/liver.fis" .
+	run -0 --separate-stderr ./slow_host liver.scene
+	[ "${#lines[@]}" -eq 10 ]
+	read -r _ _ depth _ force _ <<<"${lines[0]}"
+	holds "$depth == 0 && $force == 0"
+	# 5 mm/s, straight down
+	read -r _ _ depth _ force _ <<<"${lines[9]}"
+	model=$(echo "$depth" 5 | incise eval "$dest/usr/share/incise/scenes/liver.fis")
+	holds "($depth - 7) ^ 2 < 0.01 ^ 2 && ($force - $model) ^ 2 < 0.02 ^ 2"
+	run -1 --separate-stderr ./slow_host none.scene
+	[[ "$stderr" == "./slow_host: none.scene: No such file"* ]]
+	run -2 --separate-stderr ./slow_host
+}
+
 @test "capture_to_figure.sh leaves a recording, data, a model and two figures" {
 	command -v gnuplot >/dev/null || skip "gnuplot is not installed"
 	run -0 --separate-stderr ./capture_to_figure.sh out

@@ -10,15 +10,21 @@
  * A scene that is refused with a gain is made again with that gain, and judged if it is accepted then;
  * one with twice that gain is not checked, but judged: whether the refusal had a reason.
  *
+ * The same in the loop of a host, whose steps and holds are in place of tracker and ticks: at its largest gain, with steps
+ * of one length or of any.
+ *
  *     make rest SEEDS=1..500 [KEEP=folder]    each failure in a line; KEEP: with its files
  *
  * mm, N, s.
  */
 #include "../unit.h"
+#include <incise/host.h>
 #include "../cases.h"
 #include "../../wall_limit.h"
 #include "drawn.h"
 
+#define HOSTED 1000
+#define HOSTED_FEW 50
 #define SCENES 500
 #define SCENES_FEW 20
 #define LEANS 6
@@ -74,6 +80,14 @@ static struct {
 	int64_t ticks;
 } sum;
 
+/* The host in whose loop the leans are; NULL: the plan's ticks. */
+static struct {
+	struct incise_host *host;
+	double step_s;
+	bool velocity, irregular;
+	uint64_t seed;
+} hosted;
+
 /* --- the loop ----------------------------------------------------------------------------- */
 
 static void place_of(const struct body *body, double at_mm[3])
@@ -120,6 +134,7 @@ struct loop {
 	} way[UNDERWAY];
 	unsigned int first, last;
 	double late_N[LATE_MOST + 1][3];
+	double next_step_s, next_force_s, sent_N[3], held_N[3]; /* of a host */
 	struct incise_tick tick;
 };
 
@@ -128,12 +143,60 @@ static int64_t at_ns(const struct loop *loop, double t_s)
 	return loop->from_ns + llround(t_s * 1e9);
 }
 
+/* A host's step; its force acts after the late ticks, before the next step's. */
+static void step_host(struct loop *loop)
+{
+	double late_s = loop->l->late_ticks * loop->tick_s, velocity[3] = {0};
+	struct incise_host_wrench wrench;
+	struct incise_host_pose pose;
+
+	place_of(&loop->body, pose.position_mm);
+	v3_add(pose.position_mm, pose.position_mm, -1, loop->handle_mm);
+	memcpy(pose.quaternion, loop->lean->q, sizeof(pose.quaternion));
+	for (int i = 0; i < 3; i++)
+		v3_add(velocity, velocity, loop->body.v[i], loop->body.axis[i]);
+	assert_int_equal(incise_host_step(hosted.host, at_ns(loop, loop->t_s), &pose,
+					  hosted.velocity ? velocity : NULL, &wrench),
+			 0);
+	incise_host_last(hosted.host, &loop->tick);
+	v3_copy(loop->sent_N, wrench.force_N);
+	loop->next_force_s = loop->t_s + late_s;
+	loop->next_step_s += hosted.irregular
+				     ? between(&hosted.seed, late_s, hosted.step_s)
+				     : hosted.step_s;
+	sum.ticks++;
+}
+
+static void go_hosted(struct loop *loop, const double lean_N[3], bool pinned)
+{
+	double end_s = loop->t_s + loop->tick_s, force_N[3];
+
+	while (loop->t_s < end_s) {
+		double to_s = fmin(end_s, fmin(loop->next_step_s, loop->next_force_s));
+
+		v3_add(force_N, loop->held_N, 1, lean_N);
+		if (!pinned)
+			move_on(&loop->body, force_N, to_s - loop->t_s);
+		loop->t_s = to_s;
+		if (to_s >= loop->next_force_s) {
+			v3_copy(loop->held_N, loop->sent_N);
+			loop->next_force_s = INFINITY;
+		}
+		if (to_s >= loop->next_step_s)
+			step_host(loop);
+	}
+}
+
 /* A tick, and the motion up to the next, with the poses that are taken on the way. */
 static void go(struct loop *loop, const double lean_N[3], bool pinned)
 {
 	double end_s = loop->t_s + loop->tick_s, force_N[3];
 	int late = loop->l->late_ticks;
 
+	if (hosted.host) {
+		go_hosted(loop, lean_N, pinned);
+		return;
+	}
 	for (; loop->first != loop->last &&
 	       loop->way[loop->first % UNDERWAY].arrival_s <= loop->t_s;
 	     loop->first++) {
@@ -182,6 +245,11 @@ static void begin(struct loop *loop, struct incise_plan *plan, const struct lean
 	loop->tick_s = 1 / incise_scene_rate_hz(plan->scene);
 	loop->pose_s = 1 / l->tracker.rate_hz;
 	loop->latency_s = (double)l->tracker.latency_ns * 1e-9;
+	loop->next_force_s = INFINITY;
+	if (hosted.host) {
+		incise_host_reset(hosted.host);
+		incise_host_set_tool(hosted.host, lean->tool);
+	}
 	incise_scene_scalpel(plan->scene, &scalpel);
 	if (lean->tool == INCISE_TOOL_HANDLE) {
 		v3_rotate(loop->handle_mm, lean->q, scalpel.axis);
@@ -351,6 +419,7 @@ static struct end lean_on(struct incise_plan *plan, const struct leaned *l,
 	begin(&loop, plan, l, lean);
 	loop.from_ns = *from_ns;
 	loop.next_pose_s = between(&seed, 0, loop.pose_s);
+	loop.next_step_s = between(&seed, 0, hosted.step_s);
 	incise_plan_set_tool(plan, lean->tool);
 	air = (int)((AIR_S + loop.latency_s + 2 * loop.pose_s +
 		     plan->scene->limits.ramp_ms * 1e-3) /
@@ -694,6 +763,88 @@ static void try_scene(uint64_t seed)
 	incise_scene_free(scene);
 }
 
+/* The largest gain up to the scene's in a host with this step; 0: none. */
+static double fit(const struct incise_scene *scene, struct incise_host_options *options,
+		  struct incise_host **host)
+{
+	struct incise_host_info info = {.gain = 0};
+
+	*host = incise_host_new(scene, options, &err);
+	if (*host)
+		incise_host_info(*host, &info);
+	else if (!strstr(err.text, "no gain down to"))
+		fail_msg("%s", err.text);
+	return info.gain;
+}
+
+/* The gains that were lost against a host at the ticks' rate, by 30, 60 and 100 Hz. */
+static struct {
+	int n;
+	double share[HOSTED];
+} lost[3];
+
+static int compare(const void *a, const void *b)
+{
+	double x = *(const double *)a, y = *(const double *)b;
+
+	return (x > y) - (x < y);
+}
+
+#define LOST_EVERY 5
+static void note_lost(const struct incise_scene *scene, int k, double gain)
+{
+	struct incise_host_options options = {.fit_gain = true};
+	struct incise_host *host;
+	double at_once = fit(scene, &options, &host);
+
+	incise_host_free(host);
+	if (at_once > 0 && at_once < scene->tissue.gain)
+		lost[k].share[lost[k].n++] = 1 - gain / at_once;
+}
+
+/* Stiffer than it is drawn, so that most are lowered. */
+#define STIFFER 8
+static void try_hosted(uint64_t seed)
+{
+	static const double rates_hz[] = {30, 60, 100};
+	int k = below(&seed, 3);
+	struct incise_host_options options = {.fit_gain = true};
+	struct incise_scene *scene;
+	struct incise_plan *plan;
+	double gain;
+	static struct leaned l;
+
+	draw_leaned(seed, &l);
+	scene = fed_scene(&folder, l.text.all, &err);
+	succeeds(scene);
+	scene->tissue.gain *= STIFFER;
+	scene->limits.pose_age_ms = 1000;
+	hosted.seed = seed;
+	hosted.step_s = 1 / rates_hz[k];
+	hosted.irregular = chance(&seed, 0.5);
+	hosted.velocity = options.gives_velocity = chance(&seed, 0.5);
+	options.host_period_s =
+		hosted.step_s + (hosted.irregular ? 1 / scene->rate_hz : 0);
+	gain = fit(scene, &options, &hosted.host);
+	sum.no_advice += !hosted.host;
+	if (hosted.host) {
+		sum.scenes++;
+		say(&l, ", host %.0f Hz%s%s gain %.3g", rates_hz[k],
+		    hosted.irregular ? " irregular" : "",
+		    hosted.velocity ? " with velocity" : "", gain);
+		if (sum.scenes % LOST_EVERY == 0)
+			note_lost(scene, k, gain);
+		scene->unchecked = true;
+		plan = incise_plan_new_fed(scene, &l.tracker, &err);
+		succeeds(plan);
+		lean_all(seed, plan, &l, true);
+		incise_plan_free(plan);
+	}
+	incise_host_free(hosted.host);
+	memset(&hosted, 0, sizeof(hosted));
+	incise_scene_free(scene);
+}
+
 static void summarize(void)
 {
 	printf("%d scenes accepted, %d of them as drawn; %d refused: %d with a gain, of which %d are "
@@ -725,6 +876,25 @@ TEST(test_an_accepted_scene_rests)
 	summarize();
 	assert_int_equal(sum.by[SWINGS], 0);
 	assert_int_equal(sum.advised, sum.advice_accepted);
+}
+
+TEST(test_an_accepted_host_rests)
+{
+	static const char *const names[] = {"30", "60", "100"};
+	int scenes = cases_are_all() ? HOSTED : HOSTED_FEW;
+	uint64_t seed = cases_seed(1);
+
+	memset(&sum, 0, sizeof(sum));
+	while (sum.scenes < scenes)
+		try_hosted(seed++);
+	summarize();
+	for (int k = 0; k < 3; k++) {
+		qsort(lost[k].share, (size_t)lost[k].n, sizeof(double), compare);
+		if (lost[k].n)
+			printf("host at %s Hz: median of the gain lost %.2f, of %d\n",
+			       names[k], lost[k].share[lost[k].n / 2], lost[k].n);
+	}
+	assert_int_equal(sum.by[SWINGS], 0);
 }
 
 /* With a ninth more than the largest gain that is accepted a shipped scene swings, as the refusal says. */
