@@ -41,7 +41,7 @@ struct incise_outlet_setup {
 	/* For ROS 2 alone; the first outlet of a process sets domain and interface for all: */
 	const char *frame; /**< header.frame_id; lives until the outlet is closed */
 	int domain;	   /**< 0 to 232 */
-	/** Of the network; "lo": this machine; NULL: as CYCLONEDDS_URI has it. */
+	/** Network interface; "lo": this machine; NULL: as CYCLONEDDS_URI has it. */
 	const char *interface;
 };
 
