@@ -147,6 +147,17 @@ $(O)/tests/streams/ReceiveClient: $(receiver)
 	$(call step,CXX)
 	$(Q)$(CXX) -O1 -w -I/usr/include/openigtlink -o $@ $< -lOpenIGTLink
 
+# Subscribers of others to topics of ROS 2; in Debian 13 Fast DDS has a library of another name.
+fastdds := $(firstword $(foreach name,fastdds fastrtps,$(if $(wildcard /usr/lib/*/lib$(name).so),$(name))))
+ros2-peers: $(if $(fastdds),$(O)/tests/ros2/fastdds_read)
+ros2-peers: ## Cyclone DDS for Python, and a program on Fast DDS, for tests of ROS 2
+	@tests/venv tests/ros2 $(O)/tests/ros2 'tests of ROS 2 with Cyclone DDS for Python are skipped' read
+
+$(O)/tests/ros2/fastdds_read: tests/ros2/fastdds_read.cc
+	@mkdir -p $(@D)
+	$(call step,CXX)
+	$(Q)$(CXX) -std=c++17 -O1 -w -o $@ $< -l$(fastdds) -lfastcdr
+
 # Attacks on recordings. What is in a module is found by INCISE_MODULE_PATH.
 attack_programs := $(addprefix $(O)/tests/attack/,kill faults damage record statement watch.so stall.so)
 
@@ -185,7 +196,7 @@ bats = BATS_TEST_TIMEOUT=$(LIMIT_S) ASAN_OPTIONS=detect_leaks=0 LOCPATH=$(abspat
 # What the command-line tests call beside the programs. Those of other projects come by pip.
 cli-needs: all $(locale) $(O)/tests/polhemus/fastrak $(O)/tests/state/loop $(O)/tests/day $(O)/tests/sql $(O)/tests/longer \
 	$(attack_programs)
-peers: can-drive mcap-reader python-peers stream-peers
+peers: can-drive mcap-reader python-peers stream-peers ros2-peers
 
 # Tests that `make check` runs bear the tag check. Most wait now and then, so one more runs than there are processors.
 bats_jobs = --jobs $(shell expr $$(nproc) + 1) --no-parallelize-within-files
@@ -249,7 +260,7 @@ notebooks: all ## run doc/notebooks and write them with their figures to build/n
 check-doc: doc
 
 .PHONY: rest doc notebooks check-doc check-style check-layers check-unit unit-programs check-kept check-cli cli-needs \
-	peers check-attack check-python check-tsan can-drive mcap-reader python-peers stream-peers
+	peers check-attack check-python check-tsan can-drive mcap-reader python-peers stream-peers ros2-peers
 
 # Sums of very many pairs: time and memory, next to numpy.
 $(O)/tests/corpus: tests/bench/corpus.c $(O)/lib/libincise-tests.a

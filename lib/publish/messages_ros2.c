@@ -11,15 +11,13 @@
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
+#include "../base/ros2.h"
 #include "../base/utf8.h"
 #include "../base/vector.h"
 #include "interpolators.h"
 #include "messages.h"
 
-#define FRAME_TRACKER "tracker" /* frame of the poses */
-#define FRAME_SCALPEL "scalpel"
 #define FRAME_CAMERA "camera"
-#define M_PER_MM 1e-3
 
 /* --- CDR ----------------------------------------------------------------------------- */
 
@@ -86,13 +84,12 @@ static void put_messages_ros2_text(struct cdr *cdr, const char *text)
 	*cdr->at++ = 0;
 }
 
-/* builtin_interfaces/Time; seconds have 32 bits. */
 static void put_time(struct cdr *cdr, uint64_t ns)
 {
-	uint64_t s = ns / 1000000000;
+	struct ros2_time time = ros2_time(ns);
 
-	put_u32(cdr, s > INT32_MAX ? INT32_MAX : (uint32_t)s);
-	put_u32(cdr, (uint32_t)(ns % 1000000000));
+	put_u32(cdr, (uint32_t)time.sec);
+	put_u32(cdr, time.nanosec);
 }
 
 static struct cdr header_begin(struct incise_messages *messages,
@@ -107,11 +104,10 @@ static struct cdr header_begin(struct incise_messages *messages,
 
 /* --- messages ------------------------------------------------------------------------ */
 
-/* The scalpel lies along z of its frame. */
 static int64_t force_message(struct incise_messages *messages,
 			     const struct incise_stream_rows *stream)
 {
-	struct cdr cdr = header_begin(messages, stream, FRAME_SCALPEL);
+	struct cdr cdr = header_begin(messages, stream, ROS2_FRAME_SCALPEL);
 	double wrench[6] = {0, 0, stream->cells[INCISE_CELL_FORCE].real};
 
 	for (int i = 0; i < 6; i++)
@@ -123,20 +119,20 @@ static int64_t force_message(struct incise_messages *messages,
 static int64_t tracker_message(struct incise_messages *messages,
 			       const struct incise_stream_rows *stream)
 {
-	struct cdr cdr = header_begin(messages, stream, FRAME_TRACKER);
+	struct cdr cdr = header_begin(messages, stream, ROS2_FRAME_TRACKER);
 	const union incise_cell *cells = stream->cells;
-	double q[4], arm_mm[3];
+	double q[4], position_mm[3], values[7];
 
 	if (!incise_pose_usable(*cells[INCISE_CELL_STATUS].text))
 		return 0;
 	for (int i = 0; i < 4; i++)
 		q[i] = cells[INCISE_CELL_QUATERNION + i].real;
-	v3_rotate(arm_mm, q, messages->recording->meta.tip_mm);
+	v3_rotate(position_mm, q, messages->recording->meta.tip_mm);
 	for (int i = 0; i < 3; i++)
-		put_f64(&cdr,
-			(cells[INCISE_CELL_POSITION + i].real + arm_mm[i]) * M_PER_MM);
-	for (int i = 0; i < 4; i++)
-		put_f64(&cdr, q[(i + 1) % 4]); /* x, y, z, w */
+		position_mm[i] += cells[INCISE_CELL_POSITION + i].real;
+	ros2_pose(values, position_mm, q);
+	for (int i = 0; i < 7; i++)
+		put_f64(&cdr, values[i]);
 	return cdr_end(&cdr, messages);
 }
 
@@ -146,7 +142,7 @@ static int64_t event_message(struct incise_messages *messages,
 	struct cdr cdr = cdr_begin(messages);
 
 	put_time(&cdr, incise_message_ns(messages, stream->rows.t_ns));
-	put_u8(&cdr, 20); /* INFO */
+	put_u8(&cdr, ROS2_LOG_INFO);
 	put_messages_ros2_text(&cdr, stream->cells[INCISE_CELL_KIND].text);
 	put_messages_ros2_text(&cdr, stream->cells[INCISE_CELL_TEXT].text);
 	put_messages_ros2_text(&cdr, "");
@@ -225,15 +221,15 @@ static int64_t frame_message(struct incise_messages *messages,
 #define TIME MSG("builtin_interfaces/Time") "int32 sec\nuint32 nanosec\n"
 
 static const struct incise_message_stream streams[] = {
-	{"force", force_message, NULL, "/force", "geometry_msgs/msg/WrenchStamped",
+	{"force", force_message, NULL, "/force", ROS2_WRENCH,
 	 "std_msgs/Header header\nWrench wrench\n" /**/
 	 MSG("geometry_msgs/Wrench") "Vector3 force\nVector3 torque\n" MSG(
 		 "geometry_msgs/Vector3") "float64 x\nfloat64 y\nfloat64 z\n" HEADER},
-	{"tracker", tracker_message, NULL, "/tip", "geometry_msgs/msg/PoseStamped",
+	{"tracker", tracker_message, NULL, "/tip", ROS2_POSE,
 	 "std_msgs/Header header\nPose pose\n" /**/
 	 MSG("geometry_msgs/Pose") "Point position\nQuaternion orientation\n" MSG("geometry_msgs/Point") "float64 x\nfloat64 y\nfloat64 z\n" MSG(
 		 "geometry_msgs/Quaternion") "float64 x 0\nfloat64 y 0\nfloat64 z 0\nfloat64 w 1\n" HEADER},
-	{"events", event_message, NULL, "/events", "rcl_interfaces/msg/Log",
+	{"events", event_message, NULL, "/events", ROS2_LOG,
 	 "byte DEBUG=10\nbyte INFO=20\nbyte WARN=30\nbyte ERROR=40\nbyte FATAL=50\n"
 	 "builtin_interfaces/Time stamp\nuint8 level\nstring name\nstring msg\n"
 	 "string file\nstring function\nuint32 line\n" TIME},

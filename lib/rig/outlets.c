@@ -1,21 +1,26 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-/* Loading the module outlet_lsl.so; see incise/outlet.h. It stays loaded. */
+/* Loading a module of outlets; see incise/outlet.h. It stays loaded. */
 #include <incise/outlet.h>
 #include "../base/module.h"
 
-#define FILE_NAME "outlet_lsl.so"
-
-/* Exported by it. NULL: liblsl cannot be had. */
+/* Exported by it. NULL: its library cannot be had. */
 typedef int loader(const char *where, const struct incise_outlets **outlets,
 		   struct incise_error *err);
 
-int incise_outlets_open(const char *where, const struct incise_outlets **outlets,
-			struct incise_error *err)
+int incise_outlets_open(const char *where, enum incise_outlet_protocol protocol,
+			const struct incise_outlets **outlets, struct incise_error *err)
 {
+	static const struct {
+		const char *file, *packages;
+	} modules[] = {
+		[INCISE_OUTLET_LSL] = {"outlet_lsl.so", "a C compiler is"},
+		[INCISE_OUTLET_ROS2] = {"outlet_ros2.so", "cyclonedds-dev is"},
+	};
 	struct incise_module module;
 	loader *load;
-	int rc = incise_module_find(&module, FILE_NAME, "incise_outlets_load", where,
-				    "a C compiler is", err);
+	int rc =
+		incise_module_find(&module, modules[protocol].file, "incise_outlets_load",
+				   where, modules[protocol].packages, err);
 
 	if (rc)
 		return rc;

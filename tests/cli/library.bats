@@ -243,9 +243,10 @@ maps() {
 			grep -vxE '_end|_edata|__bss_start' >exported
 		case $module in
 		*/frames_mkv.so) symbol=incise_frames ;;
+		*/export_hdf5.so) symbol=incise_table_hdf5 ;;
 		*/film_mkv.so) symbol=incise_film_module ;;
 		*/ranks_mpi.so) symbol=incise_ranks_join ;;
-		*/outlet_lsl.so) symbol=incise_outlets_load ;;
+		*/outlet_*.so) symbol=incise_outlets_load ;;
 		*) symbol=incise_backend ;;
 		esac
 		[ "$(cat exported)" = "$symbol" ] || complain "$module: $(cat exported)"

@@ -2,7 +2,7 @@
 /*
  * The parts of incise serve, in one thread:
  *
- *     source ── samples ──▶ stream: rate, means, UTC ── items ──▶ sinks: OpenIGTLink, …
+ *     source ── samples ──▶ stream: rate, means, UTC ── items ──▶ sinks: OpenIGTLink, LSL, ROS 2
  *     (loop, rig, recording)                                      (each with its clients)
  *
  * A source names the time of the next request for its new samples. A sink takes items and
@@ -16,6 +16,7 @@
 #include <jansson.h>
 #include <incise/calibration.h>
 #include <incise/camera.h>
+#include <incise/outlet.h>
 
 /* --- items ----------------------------------------------------------------------------- */
 
@@ -51,6 +52,7 @@ struct serve_item {
 			enum serve_state state;
 			const char *name; /* "running", … */
 			const char *text; /* a line for people */
+			bool changed;	  /* from the status before */
 		} status;
 	};
 };
@@ -62,7 +64,8 @@ struct serve_info {
 	const char *name; /* "loop neck", "rig sim:", "recording a.rec" */
 	double rate_hz;	  /* poses and forces at most */
 	bool kinds[SERVE_KINDS];
-	bool live; /* t_ns is CLOCK_MONOTONIC of this machine */
+	bool commanded; /* forces are a loop's commands, in the tracker's frame */
+	bool live;	/* t_ns is CLOCK_MONOTONIC of this machine */
 };
 
 struct serve_sink {
@@ -106,10 +109,18 @@ struct serve_sink *serve_igtl_new(const struct serve_igtl_options *options,
 				  const struct serve_info *info);
 
 /*
- * The Lab Streaming Layer (lsl.c), streams PREFIX-pose, -force and -events; fails the program if
- * there is no liblsl. @prefix and @info live longer.
+ * The Lab Streaming Layer, streams PREFIX-pose, -force and -events, or ROS 2, topics /PREFIX/measured_cp,
+ * … (outlets.c); fails the program if there is no liblsl or Cyclone DDS. @options and @info live longer.
  */
-struct serve_sink *serve_lsl_new(const char *prefix, const struct serve_info *info);
+struct serve_outlets_options {
+	enum incise_outlet_protocol protocol;
+	const char *prefix;
+	int domain;	       /* of ROS 2 */
+	const char *interface; /* of ROS 2; NULL: any */
+};
+
+struct serve_sink *serve_outlets_new(const struct serve_outlets_options *options,
+				     const struct serve_info *info);
 
 /* --- sources --------------------------------------------------------------------------- */
 

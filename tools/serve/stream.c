@@ -223,8 +223,9 @@ void serve_status(struct serve_stream *stream, enum serve_state state, const cha
 {
 	struct serve_item item = {.kind = SERVE_STATUS, .t_ns = cli_now_ns()};
 
-	if (stream->status_ns && item.t_ns - stream->status_ns < STATUS_NS &&
-	    stream->state == state && !strcmp(stream->text, text))
+	item.status.changed = !stream->status_ns || stream->state != state ||
+			      strcmp(stream->text, text) != 0;
+	if (!item.status.changed && item.t_ns - stream->status_ns < STATUS_NS)
 		return;
 	stream->status_ns = item.t_ns;
 	stream->state = state;

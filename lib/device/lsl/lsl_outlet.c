@@ -4,8 +4,6 @@
  * CLOCK_MONOTONIC, in seconds.
  */
 #include <errno.h>
-#include <pthread.h>
-#include <signal.h>
 #include <stdlib.h>
 #include <incise/outlet.h>
 #include "liblsl.h"
@@ -52,7 +50,6 @@ static struct incise_outlet *outlet_open(const struct incise_outlet_setup *setup
 					 struct incise_error *err)
 {
 	struct incise_outlet *outlet = malloc(sizeof(*outlet));
-	sigset_t all, before;
 
 	if (!outlet) {
 		incise_error_set(err, ENOMEM,
@@ -61,11 +58,7 @@ static struct incise_outlet *outlet_open(const struct incise_outlet_setup *setup
 				 setup->name);
 		return NULL;
 	}
-	/* The threads of liblsl are not to take this program's signals. */
-	sigfillset(&all);
-	pthread_sigmask(SIG_SETMASK, &all, &before);
 	outlet->outlet = offer(setup);
-	pthread_sigmask(SIG_SETMASK, &before, NULL);
 	if (outlet->outlet)
 		return outlet;
 	free(outlet);
