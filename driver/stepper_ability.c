@@ -200,9 +200,9 @@ int stepper_ability_measure(struct stepper *stepper)
 	stepper_latency_release(stepper);
 	kfree(trial);
 
-	stepper->firing_ns = min(close, (u64)U32_MAX);
-	info->step_ns = min(2 * (close + 2 * way), (u64)U32_MAX);
-	info->wait_step_ns = min(close + way + info->edge_ns, (u64)U32_MAX);
+	stepper->firing_ns = min_t(u64, close, U32_MAX);
+	info->step_ns = min_t(u64, 2 * (close + 2 * way), U32_MAX);
+	info->wait_step_ns = min_t(u64, close + way + info->edge_ns, U32_MAX);
 	period = min(info->step_ns, info->wait_step_ns);
 	share = 2 * stepper->n_motors * (period + pulse);
 	period = max(2 * pulse + period,
@@ -211,7 +211,7 @@ int stepper_ability_measure(struct stepper *stepper)
 			       (u64)INCISE_PROFILE_VELOCITY_MAX);
 	info->resolution_ns = hrtimer_resolution;
 	info->lateness_ns = late;
-	stepper->tick_cost_ns = min(stepper->n_motors * tick, (u64)U32_MAX);
+	stepper->tick_cost_ns = min_t(u64, stepper->n_motors * tick, U32_MAX);
 	/* The limits of a config. */
 	info->pulse_ns = clamp(pulse, 500ULL, 1000000ULL);
 	info->tick_min_ns =

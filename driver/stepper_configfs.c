@@ -234,12 +234,14 @@ static ssize_t stepper_number_store(struct config_item *item, u32 *number,
 	{                                                                           \
 		return stepper_number_store(item, stepper_motor_##_name##_of(item), \
 					    page, n);                               \
-	}                                                                           \
-	CONFIGFS_ATTR(stepper_motor_, _name)
+	}
 
-STEPPER_MOTOR_NUMBER(lost_steps_max);
-STEPPER_MOTOR_NUMBER(debounce_ns);
-STEPPER_MOTOR_NUMBER(cpu);
+STEPPER_MOTOR_NUMBER(lost_steps_max)
+CONFIGFS_ATTR(stepper_motor_, lost_steps_max);
+STEPPER_MOTOR_NUMBER(debounce_ns)
+CONFIGFS_ATTR(stepper_motor_, debounce_ns);
+STEPPER_MOTOR_NUMBER(cpu)
+CONFIGFS_ATTR(stepper_motor_, cpu);
 
 static struct configfs_attribute *stepper_motor_attrs[] = {
 	&stepper_motor_attr_step,

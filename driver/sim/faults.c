@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-only
 /*
  * Faults of a chip: interrupts that are late, missing or refused, and lines
- * that cannot be read; and the machine's sleep, for one driver alone, as a guest cannot
- * sleep without its disk. See incise_sim.h for the words of the files.
+ * that cannot be read; and the machine's sleep: for one driver alone, or for all devices but those
+ * that a guest has its files from. See incise_sim.h for the words of the files.
  */
 #include <linux/fs.h>
 #include <linux/module.h>
+#include <linux/pci.h>
 #include <linux/platform_device.h>
 #include <linux/pm.h>
 
@@ -77,6 +78,17 @@ static const struct file_operations sim_faults_fops = {
 	.write = sim_faults_write,
 };
 
+static int sim_stay_awake(const char *name)
+{
+	struct device *dev = bus_find_device_by_name(&pci_bus_type, NULL, name);
+
+	if (!dev)
+		return -ENODEV;
+	dev_pm_syscore_device(dev, true);
+	put_device(dev);
+	return 0;
+}
+
 static int sim_sleep_parse(void *of, char *text)
 {
 	char *word = sim_text_word(&text), *name;
@@ -87,6 +99,8 @@ static int sim_sleep_parse(void *of, char *text)
 
 	if (!word || sim_text_word(&text))
 		return -EINVAL;
+	if (sim_text_key(word, "awake", &name))
+		return sim_stay_awake(name);
 	resume = sim_text_key(word, "resume", &name);
 	if (!resume && !sim_text_key(word, "suspend", &name))
 		return -EINVAL;

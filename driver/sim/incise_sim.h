@@ -36,7 +36,9 @@
  *                    "none"               nothing is
  *  sleep     write   "suspend=DEVICE", "resume=DEVICE": calls that function
  *                    of the driver of a platform device, as a suspend of the
- *                    machine does, and gives its error
+ *                    machine does, and gives its error.
+ *                    "awake=DEVICE": that device of the PCI bus stays awake
+ *                    when the machine sleeps, until the next boot
  *
  * status: lines, edges (all that ever were, since reset), held (in the ring),
  * lost (the ring was full: the newest are lost), ring (its size), repeats

@@ -2,12 +2,16 @@
 /* See bench.h. */
 #include <errno.h>
 #include <fcntl.h>
+#include <sched.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/ioctl.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
+#include <sys/sysinfo.h>
+#include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -396,4 +400,22 @@ bool bench_until(struct bench *bench, unsigned int motor, uint32_t states,
 			return false;
 	}
 	return true;
+}
+
+pid_t bench_take_memory(void)
+{
+	pid_t pid = fork();
+	struct sysinfo info;
+
+	if (!pid) {
+		sched_setscheduler(0, SCHED_OTHER, &(struct sched_param){0});
+		sysinfo(&info);
+		if (mmap(NULL, info.freeram / 10 * 9 * info.mem_unit,
+			 PROT_READ | PROT_WRITE,
+			 MAP_PRIVATE | MAP_ANONYMOUS | MAP_POPULATE, -1, 0) != MAP_FAILED)
+			raise(SIGSTOP);
+		_exit(1);
+	}
+	waitpid(pid, NULL, WUNTRACED);
+	return pid;
 }

@@ -13,6 +13,7 @@
 
 #include <stdbool.h>
 #include <stdint.h>
+#include <sys/types.h>
 
 #include "../../driver/uapi/incise_stepper.h"
 #include "edge_log.h"
@@ -98,6 +99,9 @@ uint64_t bench_faulty(const struct bench *bench);
 /* Signs of life until a motor is in one of the states (bits); false after @ns. */
 bool bench_until(struct bench *bench, unsigned int motor, uint32_t states,
 		 unsigned int mode, int64_t target, int64_t ns);
+
+/* A program that holds 90 % of the free memory until it is killed; not without having it. */
+pid_t bench_take_memory(void);
 
 int64_t bench_now_ns(void);
 void bench_nap(int64_t ns);

@@ -11,7 +11,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
-#include <sys/sysinfo.h>
 #include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
@@ -111,21 +110,9 @@ static void hog(void)
 
 static void memory_is_short(void)
 {
-	pid_t pid = fork();
+	pid_t pid = bench_take_memory();
 
-	if (!pid) {
-		struct sysinfo info;
-		size_t size;
-		char *bytes;
-
-		sched_setscheduler(0, SCHED_OTHER, &(struct sched_param){0});
-		sysinfo(&info);
-		size = info.freeram / 10 * 9 * info.mem_unit;
-		bytes = mmap(NULL, size, PROT_READ | PROT_WRITE,
-			     MAP_PRIVATE | MAP_ANONYMOUS | MAP_POPULATE, -1, 0);
-		_exit(bytes == MAP_FAILED);
-	}
-	waitpid(pid, NULL, 0);
+	plan_kill(&pid);
 	bench_nap(50000000);
 }
 
