@@ -77,7 +77,7 @@ $(O)/bin/incise-serve: tool_more_libs += $(libs_tracker_igtl)
 # The benchmarks simulate a device exactly, which the library itself has no use for.
 $(O)/bin/incise-bench: $(O)/obj/lib/control/plant.o
 tool_libs := $(patsubst %,-l%,$(libraries))
-tool_more_libs := $(if $(has_png),-lpng) $(if $(has_jpeg),-ljpeg) -lm
+tool_more_libs := $(if $(has_png),-lpng) $(if $(has_jpeg),-ljpeg) $(libs_system)
 
 $(programs): $(O)/bin/%: $(O)/obj/tools/%.o $(tool_parts) $(foreach lib,$(libraries),$(O)/lib/lib$(lib).so)
 	@mkdir -p $(@D)
@@ -99,10 +99,10 @@ tools: $(programs) $(peer) | $(O)/share/incise/scenes $(O)/share/incise/report
 $(O)/obj/mk/settings: mk/settings.c $(call objects,incise)
 	@mkdir -p $(@D)
 	$(call step,LD)
-	$(Q)$(CC) $(cppflags) $(CPPFLAGS) $(cflags) $(CFLAGS) $(LDFLAGS) -o $@ $^ $(pc_libs_incise) $(libs_incise)
+	$(Q)$(CC) $(cppflags) $(CPPFLAGS) $(cflags) $(CFLAGS) $(LDFLAGS) -o $@ $^ $(pc_libs_incise) $(libs_system)
 
 $(O)/obj/mk/settings.tables: $(O)/obj/mk/settings
-	$(Q)$< >$@
+	$(Q)$(RUN) $< >$@
 
 $(O)/man/rig.conf.5: $(wildcard lib/*/*/rig.conf.5)
 $(O)/man/%.5: man/%.5 mk/manual-tables mk/manual-output $(wildcard schema/*.rows) $(O)/obj/mk/settings.tables
@@ -117,7 +117,7 @@ man_pages := $(filter-out $(left_out_commands:%=man/incise-%.1) $(left_out_comma
 tables := $(patsubst $(O)/bin/%,$(O)/obj/tools/%.table,$(programs))
 
 $(O)/obj/tools/%.table: $(O)/bin/%
-	$(Q)LD_LIBRARY_PATH=$(O)/lib $< --table >$@
+	$(Q)LD_LIBRARY_PATH=$(O)/lib $(RUN) $< --table >$@
 
 $(O)/man/%.1: man/%.1 mk/manual mk/manual-tables mk/manual-output $(wildcard schema/*.rows) \
 		$(O)/obj/tools/%.table $(O)/obj/mk/settings.tables
