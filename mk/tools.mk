@@ -28,9 +28,18 @@ $(O)/obj/tools/serve/pixels.o: cppflags += $(if $(has_jpeg),-DHAVE_JPEG)
 has_png := $(shell $(CC) -E -x c -include png.h /dev/null >/dev/null 2>&1 && echo yes)
 $(O)/obj/tools/cli/image.o: cppflags += $(if $(has_png),-DHAVE_PNG)
 
-tools: $(if $(has_jpeg),,left-out-JPEG) $(if $(has_png),,left-out-PNG)
+left_out_of_tools := $(if $(has_jpeg),,JPEG) $(if $(has_png),,PNG)
 lacks_JPEG := jpeglib.h
 lacks_PNG := png.h
+tools: $(left_out_of_tools:%=left-out-%)
+
+# incise doctor prints what this build leaves out, and is built again when that changes.
+left_out_names := $(subst $() $(),$(comma) ,$(sort $(left_out) $(left_out_of_tools) $(left_out_commands:%=incise-%)))
+$(O)/obj/left-out: every-time
+	@mkdir -p $(@D); echo '$(left_out_names)' | cmp -s - $@ || echo '$(left_out_names)' >$@
+$(O)/obj/tools/incise-doctor.o: $(O)/obj/left-out
+$(O)/obj/tools/incise-doctor.o: cppflags += -DLEFT_OUT='"$(left_out_names)"'
+.PHONY: every-time
 
 # The parts of all programs. The linker takes of them, and of the libraries, what a program
 # uses: a new part, command or benchmark is found by its place.
