@@ -5,6 +5,7 @@
 #   prefix, DESTDIR, bindir, libdir, includedir, mandir …   as usual
 #   CFLAGS, CXXFLAGS, LDFLAGS, CPPFLAGS   yours; the project's own flags are kept apart
 #   V=1            show whole commands
+#   RUN=COMMAND    runs a program that a cross compiler made, as qemu-aarch64-static does
 #   DEPS=no        let `make demo` and `make check` install no packages
 
 O ?= build
@@ -28,7 +29,7 @@ zshcompletiondir ?= $(datadir)/zsh/site-functions
 
 # These go to the shell, and to make's own lists: a name of two words would be two others.
 paths := CURDIR O DESTDIR prefix bindir libdir includedir datadir mandir docdir udevrulesdir sysusersdir \
-	tmpfilesdir unitdir pythondir completiondir zshcompletiondir srcdir KDIR INSTALL_MOD_PATH
+	tmpfilesdir unitdir pythondir completiondir zshcompletiondir srcdir KDIR INSTALL_MOD_PATH BUNDLE
 open := (
 close := )
 hash := \#
@@ -99,10 +100,8 @@ pc_incise := libconfig
 pc_incise-learn := libcrypto
 pc_incise-record := sqlite3 zlib libcrypto
 pc_incise-view := sdl2 epoxy cairo egl
-libs_incise := -lm -ldl
-libs_incise-learn := -lm
-libs_incise-record := -lm -ldl -pthread
-libs_incise-view := -lm
+# The C library's, which are one since glibc 2.34; what uses none is linked with none.
+libs_system := -lm -ldl -pthread
 about_incise := haptic cutting: fuzzy force models, virtual rig, scenes and real-time loop
 about_incise-learn := haptic cutting: learning models from data
 about_incise-record := haptic cutting: recordings and what is exported of them

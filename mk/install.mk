@@ -127,13 +127,25 @@ dist: ## a tarball of the committed tree
 	git archive --prefix=incise-$(version)/ -o $(O)/incise-$(version).tar.gz HEAD
 	@echo $(O)/incise-$(version).tar.gz
 
-wheel: ## a wheel of incise for Python, in build/wheel; it loads the system's libraries
+# All that a wheel holds beside python/incise; programs and libraries find each other in it.
+BUNDLE ?= $(O)/bundle
+bundle: all ## programs, libraries, scenes and pages in one folder, BUNDLE, that may be moved
+	$(INSTALL) -d $(addprefix $(BUNDLE)/,bin lib/incise man $(addprefix share/incise/,scenes schema report))
+	$(INSTALL) -m 644 mk/wheel/installed.py $(BUNDLE)/__init__.py
+	$(INSTALL) -m 755 $(programs) $(BUNDLE)/bin
+	for lib in $(libraries); do \
+		$(INSTALL) -m 755 $(O)/lib/lib$$lib.so.$(version) $(BUNDLE)/lib/lib$$lib.so.$(soversion) || exit 1; \
+	done
+	$(INSTALL) -m 755 $(add_ons:%=$(O)/lib/incise/%.so) $(BUNDLE)/lib/incise
+	$(INSTALL) -m 644 $(man_pages:%=$(O)/%) $(BUNDLE)/man
+	$(INSTALL) -m 644 $(scenes) $(BUNDLE)/share/incise/scenes
+	$(INSTALL) -m 644 $(schemas) $(BUNDLE)/share/incise/schema
+	$(INSTALL) -m 644 $(report_files) $(BUNDLE)/share/incise/report
+
+ARCH ?= $(shell uname -m)
+wheel: ## a wheel of incise for Python with all of it inside, in dist/; ARCH=aarch64: by a cross compiler, in dist/aarch64/
 	@mk/deps wheel
-	@rm -rf $(O)/wheel && mkdir -p $(O)/wheel && cp -r python $(O)/wheel/source && \
-		cp LICENSES/LGPL-2.1-or-later.txt $(O)/wheel/source/COPYING
-	cd $(O)/wheel/source && /usr/bin/python3 -m build --wheel --no-isolation -o .. >../log 2>&1 || \
-		{ tail -20 ../log; exit 1; }
-	@rm -r $(O)/wheel/source; echo $(O)/wheel/*.whl
+	@mk/wheel/make $(O)/wheel dist$(if $(filter-out $(shell uname -m),$(ARCH)),/$(ARCH)) $(version) $(ARCH)
 
 deb: ## Debian packages of the tree as it is, in build/deb
 	@mk/deps build deb
@@ -146,4 +158,4 @@ check-deb: ## the packages: lintian, then installed, tried and purged in a clean
 		echo "skipped: Debian packages, for what builds them is missing"; \
 	fi
 
-.PHONY: install uninstall dist wheel deb check-deb
+.PHONY: install uninstall dist bundle wheel deb check-deb

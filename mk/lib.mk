@@ -48,7 +48,7 @@ $(O)/lib/lib$1.so.$(version): $$(call objects,$1) lib/lib$1.map \
 	$$(Q)$$(CC) -shared -Wl,-soname,lib$1.so.$(soversion) -Wl,-z,defs -Wl,--as-needed \
 		-Wl,--version-script,lib/lib$1.map $$(call runpath) \
 		-L$(O)/lib $$(CFLAGS) $$(LDFLAGS) -o $$@ $$(call objects,$1) \
-		$$(addprefix -l,$$(needs_$1)) $$(filter %.a,$$^) $$(pc_libs_$1) $$(libs_$1)
+		$$(addprefix -l,$$(needs_$1)) $$(filter %.a,$$^) $$(pc_libs_$1) $(libs_system)
 
 $(O)/lib/lib$1.so.$(soversion): $(O)/lib/lib$1.so.$(version)
 	$$(Q)ln -sf $$(<F) $$@
@@ -105,7 +105,7 @@ $(O)/lib/incise/$1.so: $$(objects_$1) $(hidden) $(O)/lib/libincise.so
 	$$(call step,LD)
 	$$(Q)$$(CC) -shared -Wl,-z,defs -Wl,--as-needed $$(call runpath,/..) -L$(O)/lib \
 		$$(CFLAGS) $$(LDFLAGS) -o $$@ $$(objects_$1) -lincise $(hidden) \
-		$$(if $$(pc_$1),$$(shell $$(PKG_CONFIG) --libs '$$(pc_$1)')) $$(libs_$1) -lm -pthread
+		$$(if $$(pc_$1),$$(shell $$(PKG_CONFIG) --libs '$$(pc_$1)')) $$(libs_$1) $(libs_system)
 
 libs: $(O)/lib/incise/$1.so
 endef

@@ -44,7 +44,7 @@ rtsan_cc = $(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 -ffp-contract=off $(warnings
 	-Wno-missing-prototypes -Wno-unused-parameter $(CFLAGS) -Wno-function-effects \
 	-MMD -MP -MF $@.d
 rtsan_libs = $(shell $(PKG_CONFIG) --libs $(pc_incise)) \
-	$(if $(filter stepper_can,$(add_ons)),$(shell $(PKG_CONFIG) --libs $(pc_stepper_can))) $(libs_incise) -pthread
+	$(if $(filter stepper_can,$(add_ons)),$(shell $(PKG_CONFIG) --libs $(pc_stepper_can))) $(libs_system)
 
 $(O)/obj/again/%.o: tests/unit/%.c
 	@mkdir -p $(@D)

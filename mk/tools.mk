@@ -28,9 +28,18 @@ $(O)/obj/tools/serve/pixels.o: cppflags += $(if $(has_jpeg),-DHAVE_JPEG)
 has_png := $(shell $(CC) -E -x c -include png.h /dev/null >/dev/null 2>&1 && echo yes)
 $(O)/obj/tools/cli/image.o: cppflags += $(if $(has_png),-DHAVE_PNG)
 
-tools: $(if $(has_jpeg),,left-out-JPEG) $(if $(has_png),,left-out-PNG)
+left_out_of_tools := $(if $(has_jpeg),,JPEG) $(if $(has_png),,PNG)
 lacks_JPEG := jpeglib.h
 lacks_PNG := png.h
+tools: $(left_out_of_tools:%=left-out-%)
+
+# incise doctor prints what this build leaves out, and is built again when that changes.
+left_out_names := $(subst $() $(),$(comma) ,$(sort $(left_out) $(left_out_of_tools) $(left_out_commands:%=incise-%)))
+$(O)/obj/left-out: every-time
+	@mkdir -p $(@D); echo '$(left_out_names)' | cmp -s - $@ || echo '$(left_out_names)' >$@
+$(O)/obj/tools/incise-doctor.o: $(O)/obj/left-out
+$(O)/obj/tools/incise-doctor.o: cppflags += -DLEFT_OUT='"$(left_out_names)"'
+.PHONY: every-time
 
 # The parts of all programs. The linker takes of them, and of the libraries, what a program
 # uses: a new part, command or benchmark is found by its place.
@@ -77,7 +86,7 @@ $(O)/bin/incise-serve: tool_more_libs += $(libs_tracker_igtl)
 # The benchmarks simulate a device exactly, which the library itself has no use for.
 $(O)/bin/incise-bench: $(O)/obj/lib/control/plant.o
 tool_libs := $(patsubst %,-l%,$(libraries))
-tool_more_libs := $(if $(has_png),-lpng) $(if $(has_jpeg),-ljpeg) -lm
+tool_more_libs := $(if $(has_png),-lpng) $(if $(has_jpeg),-ljpeg) $(libs_system)
 
 $(programs): $(O)/bin/%: $(O)/obj/tools/%.o $(tool_parts) $(foreach lib,$(libraries),$(O)/lib/lib$(lib).so)
 	@mkdir -p $(@D)
@@ -99,10 +108,10 @@ tools: $(programs) $(peer) | $(O)/share/incise/scenes $(O)/share/incise/report
 $(O)/obj/mk/settings: mk/settings.c $(call objects,incise)
 	@mkdir -p $(@D)
 	$(call step,LD)
-	$(Q)$(CC) $(cppflags) $(CPPFLAGS) $(cflags) $(CFLAGS) $(LDFLAGS) -o $@ $^ $(pc_libs_incise) $(libs_incise)
+	$(Q)$(CC) $(cppflags) $(CPPFLAGS) $(cflags) $(CFLAGS) $(LDFLAGS) -o $@ $^ $(pc_libs_incise) $(libs_system)
 
 $(O)/obj/mk/settings.tables: $(O)/obj/mk/settings
-	$(Q)$< >$@
+	$(Q)$(RUN) $< >$@
 
 $(O)/man/rig.conf.5: $(wildcard lib/*/*/rig.conf.5)
 $(O)/man/%.5: man/%.5 mk/manual-tables mk/manual-output $(wildcard schema/*.rows) $(O)/obj/mk/settings.tables
@@ -117,7 +126,7 @@ man_pages := $(filter-out $(left_out_commands:%=man/incise-%.1) $(left_out_comma
 tables := $(patsubst $(O)/bin/%,$(O)/obj/tools/%.table,$(programs))
 
 $(O)/obj/tools/%.table: $(O)/bin/%
-	$(Q)LD_LIBRARY_PATH=$(O)/lib $< --table >$@
+	$(Q)LD_LIBRARY_PATH=$(O)/lib $(RUN) $< --table >$@
 
 $(O)/man/%.1: man/%.1 mk/manual mk/manual-tables mk/manual-output $(wildcard schema/*.rows) \
 		$(O)/obj/tools/%.table $(O)/obj/mk/settings.tables

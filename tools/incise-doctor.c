@@ -195,6 +195,9 @@ static void check_modules(struct doctor *doctor)
 	    "make && sudo make install    # or the package libincise2",
 	    "%d modules of devices and file formats", n);
 	features_each(add_module, doctor);
+	if (*LEFT_OUT)
+		add(doctor, "modules", "left out", OK, NULL,
+		    "this incise was built without " LEFT_OUT);
 }
 
 static void add_opened(struct doctor *doctor, const char *name, struct incise_rig *rig)

@@ -139,8 +139,8 @@ static int unknown_command(const char *word)
 		if (!strcmp(word, synonyms[i][0]))
 			nearest = synonyms[i][1];
 	if (nearest && !strcmp(nearest, word))
-		cli_error("'%s': this incise was built without it; 'make' prints what it "
-			  "needs",
+		cli_error("'%s': this incise was built without it; 'incise doctor' lists "
+			  "what is left out, and 'make' what it needs",
 			  word);
 	else if (nearest)
 		cli_error("'%.64s': no such command; did you mean 'incise %s'?", word,

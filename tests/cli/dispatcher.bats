@@ -199,5 +199,5 @@ setup() {
 	mkdir bin
 	cp "$INCISE_BUILD/bin/incise" bin
 	PATH=/usr/bin:/bin LD_LIBRARY_PATH=$INCISE_BUILD/lib run -2 --separate-stderr bin/incise serve
-	[ "$stderr" = "incise: 'serve': this incise was built without it; 'make' prints what it needs" ] || complain "$stderr"
+	[ "$stderr" = "incise: 'serve': this incise was built without it; 'incise doctor' lists what is left out, and 'make' what it needs" ] || complain "$stderr"
 }

@@ -16,6 +16,9 @@
 #include "../../../base/monotonic.h"
 #include "socketcan_netlink.h"
 
+#ifndef ARPHRD_CAN
+#define ARPHRD_CAN 280 /* the C library has it since glibc 2.32 */
+#endif
 #define NS_PER_S INT64_C(1000000000)
 #define WAIT_S 1
 #define SEQUENCE 1 /* each query has a socket of its own */

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * A CANopen master for one node; see canopen.h. Times are ns of the bus's clock.
+ * A CANopen master for one node; see canopen.h. Times are ns of the bus's clock. The length of a
+ * frame is can_dlc: headers before Linux 5.11 have no other name for it.
  *
  *   can_id  10 … 7   6 … 0
  *           function node
@@ -46,7 +47,7 @@ static void handle_heartbeat(struct canopen *master, const struct can_frame *fra
 {
 	uint8_t state = frame->data[0] & 0x7f; /* bit 7 toggles in node guarding */
 
-	if (frame->len != 1)
+	if (frame->can_dlc != 1)
 		return;
 	if (state != CANOPEN_BOOT_UP && state != CANOPEN_STOPPED &&
 	    state != CANOPEN_OPERATIONAL && state != CANOPEN_PRE_OPERATIONAL)
@@ -62,7 +63,7 @@ static void handle_emcy(struct canopen *master, const struct can_frame *frame)
 	uint16_t code = (uint16_t)(frame->data[0] | frame->data[1] << 8);
 
 	/* The end of an error, often a ms later, must not hide the error. */
-	if (frame->len != 8 || !code)
+	if (frame->can_dlc != 8 || !code)
 		return;
 	emcy->code = code;
 	emcy->error_register = frame->data[2];
@@ -74,7 +75,7 @@ static void handle_answer(struct canopen *master, const struct can_frame *frame)
 	struct canopen_answer *answer = &master->answer;
 	bool abort = frame->data[0] == 0x80;
 
-	if (!answer->wanted || answer->received || frame->len != 8)
+	if (!answer->wanted || answer->received || frame->can_dlc != 8)
 		return;
 	/* A segment does not name its object; all other answers do. */
 	if (answer->segment && !abort) {
@@ -96,7 +97,7 @@ uint32_t canopen_handle(struct canopen *master, const struct can_frame *frame,
 		master->bus_offs += !!(id & CAN_ERR_BUSOFF);
 		return 0;
 	}
-	if (id & (CAN_EFF_FLAG | CAN_RTR_FLAG) || frame->len > CAN_MAX_DLEN)
+	if (id & (CAN_EFF_FLAG | CAN_RTR_FLAG) || frame->can_dlc > CAN_MAX_DLEN)
 		return 0;
 	if (id == 0 || id == CANOPEN_SYNC ||
 	    (master->own && id == (uint32_t)CANOPEN_HEARTBEAT + master->own))
@@ -121,7 +122,7 @@ uint32_t canopen_handle(struct canopen *master, const struct can_frame *frame,
 		return function;
 	case CANOPEN_SDO_REQUEST:
 		master->echoes +=
-			frame->len == 8 && !memcmp(frame->data, master->request, 8);
+			frame->can_dlc == 8 && !memcmp(frame->data, master->request, 8);
 		return 0;
 	case CANOPEN_TPDO1:
 	case CANOPEN_TPDO2:
@@ -135,7 +136,8 @@ uint32_t canopen_handle(struct canopen *master, const struct can_frame *frame,
 
 int canopen_send_heartbeat(struct canopen *master, int64_t now_ns)
 {
-	struct can_frame frame = {.can_id = CANOPEN_HEARTBEAT + master->own, .len = 1};
+	struct can_frame frame = {.can_id = CANOPEN_HEARTBEAT + master->own,
+				  .can_dlc = 1};
 	int rc;
 
 	if (!master->own || master->heartbeat_ns <= 0 ||
@@ -159,7 +161,7 @@ bool canopen_is_operational(const struct canopen *master)
 
 int canopen_send_nmt(struct canopen *master, enum canopen_command command)
 {
-	struct can_frame frame = {.can_id = 0, .len = 2};
+	struct can_frame frame = {.can_id = 0, .can_dlc = 2};
 
 	frame.data[0] = (uint8_t)command;
 	frame.data[1] = master->node;
@@ -231,7 +233,8 @@ static int send_request(struct canopen *master, const uint8_t request[8],
 			int64_t until_ns)
 {
 	struct can_bus *bus = master->bus;
-	struct can_frame frame = {.can_id = CANOPEN_SDO_REQUEST + master->node, .len = 8};
+	struct can_frame frame = {.can_id = CANOPEN_SDO_REQUEST + master->node,
+				  .can_dlc = 8};
 	int rc;
 
 	memcpy(frame.data, request, 8);

@@ -134,12 +134,12 @@ void cia402_pack_rpdo(struct can_frame *frame, uint8_t node, enum cia402_mode mo
 	frame->can_id = CANOPEN_RPDO1 + (node & NODE);
 	canopen_pack(frame->data, 2, controlword);
 	if (mode == CIA402_CST) {
-		frame->len = RPDO1_LENGTH_CST;
+		frame->can_dlc = RPDO1_LENGTH_CST;
 		target = target > INT16_MAX ? INT16_MAX : target;
 		target = target < INT16_MIN ? INT16_MIN : target;
 		canopen_pack(frame->data + 2, 2, (uint32_t)target);
 	} else {
-		frame->len = RPDO1_LENGTH;
+		frame->can_dlc = RPDO1_LENGTH;
 		canopen_pack(frame->data + 2, 4, (uint32_t)target);
 	}
 }
@@ -149,7 +149,7 @@ static bool is_pdo(const struct can_frame *frame, uint32_t function, unsigned in
 {
 	return !(frame->can_id & (CAN_EFF_FLAG | CAN_RTR_FLAG | CAN_ERR_FLAG)) &&
 	       (frame->can_id & CAN_SFF_MASK & ~NODE) == function &&
-	       frame->len >= length && frame->len <= CAN_MAX_DLEN;
+	       frame->can_dlc >= length && frame->can_dlc <= CAN_MAX_DLEN;
 }
 
 bool cia402_parse_status(const struct can_frame *frame, uint16_t *statusword,
@@ -159,7 +159,7 @@ bool cia402_parse_status(const struct can_frame *frame, uint16_t *statusword,
 		return false;
 	*statusword = (uint16_t)canopen_unpack(frame->data, 2);
 	*position = (int32_t)canopen_unpack(frame->data + 2, 4);
-	if (frame->len > TPDO1_LENGTH)
+	if (frame->can_dlc > TPDO1_LENGTH)
 		*mode = (int8_t)frame->data[TPDO1_LENGTH];
 	return true;
 }
