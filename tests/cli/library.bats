@@ -247,6 +247,7 @@ maps() {
 		*/film_mkv.so) symbol=incise_film_module ;;
 		*/ranks_mpi.so) symbol=incise_ranks_join ;;
 		*/outlet_lsl.so) symbol=incise_outlets_load ;;
+		*/export_hdf5.so) symbol=incise_table_hdf5 ;;
 		*) symbol=incise_backend ;;
 		esac
 		[ "$(cat exported)" = "$symbol" ] || complain "$module: $(cat exported)"
