@@ -194,8 +194,8 @@ rig() { # ARGUMENTS
 
 @test "info of a bus whose backend is not there, or cannot look" {
 	run --separate-stderr incise info nosuch:can0
-	failed_with 'nosuch:can0: no such backend "nosuch"; there are: sim, kernel, bench'
-	run --separate-stderr incise info kernel:/dev/incise-stepper0
+	failed_with 'nosuch:can0: no such backend "nosuch"; there are: sim, bench'
+	run --separate-stderr env -u INCISE_MODULE_PATH incise info kernel:/dev/incise-stepper0
 	failed_with "kernel:/dev/incise-stepper0:"
 }
 

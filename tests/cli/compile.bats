@@ -90,8 +90,9 @@ setup() {
 }
 
 @test "the integer core builds without a library, for a kernel" {
-	# what the kernel has in place of stdint.h, of the divisions that 32 bits lack, and of our CRC
+	# what the kernel has in place of stdint.h and errno.h, of the divisions that 32 bits lack, and of our CRC
 	mkdir linux
+	${CC:-cc} -E -dM -include errno.h -x c /dev/null | grep '#define E' >linux/errno.h
 	printf '#include <%s.h>\n' stdbool stddef stdint | tee linux/types.h >linux/limits.h
 	cat >linux/math64.h <<-'E'
 		#include <linux/types.h>

@@ -238,7 +238,7 @@ typed_at() { # SHELL… -- SETUP KEYS
 		typed_at zsh -f -i -- "$begin" "$keys"
 	done <<-'END'
 		incise verif\t=>verify 
-		incise train --search ty\t=>type 
+		incise train --search ty\t=>type=
 		incise haptic neck --policy=fi\t=>--policy=fifo 
 		incise capture --rig sim:see\t=>sim:seed=
 		incise train two\t=>two\ words.csv 
@@ -247,6 +247,6 @@ typed_at() { # SHELL… -- SETUP KEYS
 		incise calibrate dep\t=>depth 
 		incise train --shar\t=>--share 
 		incise ex\t=>export 
-		incise train --in\t\t=>input columns
+		incise train --se\t\t=>random choice
 	END
 }

@@ -73,7 +73,7 @@ setup() {
 	INCISE_MODULE_PATH=$PWD/modules run -0 --separate-stderr incise --version
 	grep -qE '^  trackers   empty \(.*tracker_empty.so: file too short' <<<"$output"
 	grep -qx '  cameras    none' <<<"$output"
-	grep -qx '  steppers   kernel' <<<"$output"
+	grep -qx '  steppers   none' <<<"$output"
 	[ "${lines[-1]}" = "  modules    $PWD/modules" ]
 	run -1 --separate-stderr bash -c "incise --version >/dev/full"
 	[ "${#stderr_lines[@]}" -eq 1 ]

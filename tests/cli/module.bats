@@ -56,7 +56,7 @@ setup() {
 	touch modules/tracker_other.so modules/stepper_.so modules/stepper_x.txt
 	rig other:1
 	run --separate-stderr incise haptic liver.scene --rig rig.conf --no-rt --duration 0.1s
-	failed_with 'rig.conf:2: stepper: no such backend "other"' 'there are: sim, kernel, mine'
+	failed_with 'rig.conf:2: stepper: no such backend "other"' 'there are: sim, mine'
 	[[ "$stderr" == *mine ]]
 }
 

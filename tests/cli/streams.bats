@@ -222,8 +222,10 @@ ask() {
 	begin_capture a
 	until_rows force 1000
 	no_more
+	# All rows of the first program, but those of the last moments, and a second's of the next one.
+	incise info a.rec.part --json >rows.json
 	send lsl_send "$name" --recover
-	until_rows force "$(($(key rows.json rows.force) + 1000))"
+	until_rows force "$(($(key rows.json rows.force) + 2000))"
 	kill -INT $capture
 	# some are lost
 	ends_with 1

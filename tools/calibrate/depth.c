@@ -118,7 +118,7 @@ static const struct cli_command command = {
 	.options = option_table,
 	.examples =
 		"incise calibrate depth two-point --length 47.5mm --pixels 400\n"
-		"incise calibrate depth board --from plane.png tilt*.png --square 5mm",
+		"incise calibrate depth board --from plane.png tilt*.png --board 9x6,5mm",
 	.success = "the calibration is active",
 	.failure = "failed or refused",
 };
