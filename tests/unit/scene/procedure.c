@@ -19,7 +19,6 @@
 #define R 55.0
 #define KN 0.14
 #define KX 0.17
-#define KD 0.0005
 #define KY 0.28
 #define KXZ 0.22
 #define ALIGNED 0.2
