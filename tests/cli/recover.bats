@@ -77,6 +77,8 @@ chunks() {
 				<(sqlite3 new/$form.rec/recording.db "SELECT * FROM $table")
 		done
 	done
+	# form 1 knew no station
+	[ "$("$INCISE_BUILD/tests/sql" new/1.rec/recording.db "SELECT DISTINCT station, button FROM tracker")" = "0|0" ]
 	# forms 2 to 4 are of one capture, and 4 is read as it is
 	exports old 4
 	[ "$(wc -l <old/4.chunks)" -gt 3 ]

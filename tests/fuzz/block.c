@@ -70,6 +70,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 	if (!incise_batch_decode(&batch, &block, data + HEAD, size - HEAD)) {
 		if (batch.n != (size_t)block.count)
 			wrong("another number of rows");
+		for (size_t k = 0; k < batch.n; k++)
+			if (batch.column[0].i[k] < 0 ||
+			    (k && batch.column[0].i[k] <= batch.column[0].i[k - 1]))
+				wrong("numbers that do not ascend");
 		bytes = malloc(incise_batch_bound(&batch));
 		n = incise_batch_encode(&batch, bytes);
 		if (n > incise_batch_bound(&batch))

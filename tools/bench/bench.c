@@ -392,27 +392,6 @@ const struct bench_table bench_points = {
 		    COLUMN(bench_point, "y", y)},
 };
 
-/* The value of each key of "motion,name", with spaces between them; of @only that alone. */
-static void block_of(const struct bench_data *data, const char *only, const void *row,
-		     char block[TEXT_BYTES])
-{
-	int n = 0;
-
-	*block = 0;
-	for (const char *key = only ? only : data->blocks; *key;) {
-		size_t length = strcspn(key, ",");
-
-		if (n)
-			block[n++] = ' ';
-		word_of(column_of(data->table, key, length), row, "%g", block + n,
-			TEXT_BYTES - (size_t)n);
-		n += (int)strlen(block + n);
-		key += length + (key[length] == ',');
-		if (only)
-			break;
-	}
-}
-
 static const struct bench_rows *rows_of(const struct bench_run *run,
 					const struct bench_table *table)
 {
@@ -422,79 +401,15 @@ static const struct bench_rows *rows_of(const struct bench_run *run,
 	return NULL;
 }
 
-/* Blocks, or with a key its values, as keys of an object in the order of their first coming. */
-static json_t *words_of(const struct bench_data *data, const char *key,
-			const struct bench_rows *rows)
-{
-	json_t *words = json_object();
-	char word[TEXT_BYTES];
-
-	for (int i = 0; i < rows->n; i++) {
-		const void *row = row_at(data->table, rows->rows, i);
-
-		if (!matches(data->table, data->where, row))
-			continue;
-		block_of(data, key, row, word);
-		json_object_set_new_nocheck(words, word, json_true());
-	}
-	return words;
-}
-
 static void write_data(const struct bench_run *run, const char *file,
-		       const struct bench_data *data, const struct bench_rows *rows)
+		       const struct bench_rows *rows)
 {
-	json_t *blocks = words_of(data, NULL, rows), *present;
 	FILE *out = plot_data(run->folder, file);
-	char block[TEXT_BYTES];
-	const char *name;
 
-	json_object_foreach(blocks, name, present)
-	{
-		fprintf(out, "# %s\n", name);
-		write_line(out, data->table, NULL);
-		for (int i = 0; i < rows->n; i++) {
-			const void *row = row_at(data->table, rows->rows, i);
-
-			if (!matches(data->table, data->where, row))
-				continue;
-			block_of(data, NULL, row, block);
-			if (!strcmp(block, name))
-				write_line(out, data->table, row);
-		}
-		fputs("\n\n", out);
-	}
+	write_line(out, rows->table, NULL);
+	for (int i = 0; i < rows->n; i++)
+		write_line(out, rows->table, row_at(rows->table, rows->rows, i));
 	plot_data_end(out, run->folder);
-	json_decref(blocks);
-}
-
-static void write_words(FILE *script, const char *name, const char *key, json_t *words)
-{
-	const char *word, *space = "";
-	json_t *present;
-
-	fprintf(script, "%s_%s = \"", name, key);
-	json_object_foreach(words, word, present)
-	{
-		fprintf(script, "%s'%s'", space, word);
-		space = " ";
-	}
-	fputs("\"\n", script);
-	json_decref(words);
-}
-
-/* The file and the values of its blocks as variables of a script. */
-static void write_variables(FILE *script, const char *name, const char *file,
-			    const struct bench_data *data, const struct bench_rows *rows)
-{
-	fprintf(script, "%s = '%s'\n", name, file);
-	for (const char *key = data->blocks; *key;) {
-		size_t length = strcspn(key, ",");
-		char one[64];
-
-		snprintf(one, sizeof(one), "%.*s", (int)length, key);
-		write_words(script, name, one, words_of(data, key, rows));
-		key += length + (key[length] == ',');
-	}
 }
 
 static void write_scalars(FILE *script, const json_t *object)
@@ -512,13 +427,18 @@ static void write_scalars(FILE *script, const json_t *object)
 	}
 }
 
-static int values_of(const struct bench_plot *plot, const char *key,
-		     const struct bench_rows *rows)
+/* Different values of a column; neighbours are alike. NULL: 1. */
+static int count_values(const struct bench_rows *rows, const char *key)
 {
-	json_t *words = key ? words_of(&plot->data, key, rows) : NULL;
-	int n = key ? (int)json_object_size(words) : 1;
+	char word[TEXT_BYTES], last[TEXT_BYTES] = "";
+	int n = key ? 0 : 1;
 
-	json_decref(words);
+	for (int i = 0; key && i < rows->n; i++) {
+		word_of(column_of(rows->table, key, strlen(key)),
+			row_at(rows->table, rows->rows, i), "%g", word, sizeof(word));
+		n += strcmp(word, last) != 0;
+		strcpy(last, word);
+	}
 	return n;
 }
 
@@ -536,8 +456,8 @@ static void reserve(struct bench_run *run)
 static void draw_bench(const struct bench_run *run)
 {
 	const struct bench_plot *plot = &run->bench->plot;
-	const struct bench_rows *rows = rows_of(run, plot->data.table),
-				*more = rows_of(run, plot->more.table);
+	const struct bench_rows *rows = rows_of(run, plot->data),
+				*more = rows_of(run, plot->more);
 	char *file = cli_text("%s.dat", run->name),
 	     *more_file = cli_text("%s-more.dat", run->name);
 	FILE *script;
@@ -545,18 +465,18 @@ static void draw_bench(const struct bench_run *run)
 
 	if (!rows)
 		return;
-	write_data(run, file, &plot->data, rows);
-	if (more)
-		write_data(run, more_file, &plot->more, more);
-	width = plot->width * values_of(plot, plot->across, rows);
+	write_data(run, file, rows);
+	width = plot->width * count_values(rows, plot->across);
 	script = plot_begin(run->folder, run->name,
 			    width > WIDTH_LEAST ? width : WIDTH_LEAST, plot->height);
 	fputs("set datafile columnheaders separator tab\n", script);
 	write_scalars(script, run->machine);
 	write_scalars(script, run->report);
-	write_variables(script, "data", file, &plot->data, rows);
-	if (more)
-		write_variables(script, "more", more_file, &plot->more, more);
+	fprintf(script, "data = '%s'\n", file);
+	if (more) {
+		write_data(run, more_file, more);
+		fprintf(script, "more = '%s'\n", more_file);
+	}
 	fputs(plot->script, script);
 	if (!plot_draw(script, run->folder, run->name))
 		cli_fail("%s/plot/%s.gp: gnuplot failed, see above", run->folder,

@@ -99,29 +99,18 @@ struct bench_table {
 	struct bench_metric metrics[BENCH_METRICS];
 };
 
-/* Rows that a plot draws, in blocks by the values of keys: "motion,name"; "": in one block. */
-struct bench_data {
-	const struct bench_table *table;
-	const char *blocks;
-	const char *where; /* as of a metric */
-};
-
 /*
  * A plot: a script of tools/bench/plots. It finds
  *
- *   data, more         file names; blocks are separated by two empty lines, each has a name
- *                      for "index", its keys' values with spaces between them, and a line of
- *                      keys for "using"
- *   data_KEY           values of each key of the blocks, as a list of words; more_KEY
+ *   data, more         names of files: a line of keys, a line for each row
  *   NAME               each scalar of bench_values(); cpu and kernel
  */
 struct bench_plot {
 	const char *suffix; /* the plot is NAME-suffix; NULL: NAME */
 	const char *script;
-	int width,
-		height; /* px; with across the width of a panel of a value of that key */
-	const char *across;
-	struct bench_data data, more;
+	int width, height;  /* px */
+	const char *across; /* a panel of that width for each value of this key */
+	const struct bench_table *data, *more;
 };
 
 extern const char text_precision_gp[], text_stability_map_gp[];

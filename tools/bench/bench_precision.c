@@ -556,6 +556,5 @@ const struct bench bench_precision = {
 	.plot = {.script = text_precision_gp,
 		 .width = 1000,
 		 .height = 720,
-		 .data = {&rows_table, "kind", "failed="},
-		 .more = {&rows_table, "name,failed", "failed!=,peer=1"}},
+		 .data = &rows_table},
 };

@@ -510,6 +510,6 @@ const struct bench bench_stability = {
 		 .width = 340,
 		 .height = 540,
 		 .across = "BT_m",
-		 .data = {&results[0].table, "BT_m,delay"},
-		 .more = {&bench_points, "block"}},
+		 .data = &results[0].table,
+		 .more = &bench_points},
 };

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/loop/state_reader.c: a reader next to a living and a dead writer, and malformed
- * pages.
+ * lib/loop/state_reader.c: a reader next to a living and a dead writer, and malformed pages; garbage is in
+ * ../../fuzz/state_page.c.
  */
 #include "../unit.h"
 #include <fcntl.h>
@@ -342,55 +342,4 @@ TEST(test_cut_off_later, begin, end)
 		assert_int_equal(incise_state_read(reader, &now), size < all ? -EIO : 0);
 	}
 	assert_int_equal(incise_state_ticks(reader, &cursor, ticks, 10, NULL), -EIO);
-}
-
-/* Garbage in some places of a good page, a thousand times. */
-TEST(test_garbage, begin, end)
-{
-	uint64_t seed = 1;
-	int read = 0, bad = 0;
-	int fd;
-
-	made_ticks(made.writer, 0, INCISE_STATE_TICKS + 100);
-	incise_state_run(made.writer, INCISE_RUN_RUNNING, "all is well");
-	load();
-	fd = open(made.path, O_WRONLY);
-	for (int round = 0; round < 1000; round++) {
-		struct incise_state *reader;
-		uint64_t cursor = 0, lost = 0;
-		/* In front of the ring, and a little of it. */
-		const size_t reach = offsetof(struct state_page, slot[3]);
-		int rc, n;
-
-		memcpy(&page, &good, reach);
-		for (int i = round % 40; i >= 0; i--) {
-			incise_random_step(&seed);
-			/* Half of the bytes are in the head and the run part. */
-			((unsigned char *)&page)[(seed >> 33) % (i % 2 ? reach : 2000)] =
-				(unsigned char)(seed >> 20);
-		}
-		assert_int_equal(pwrite(fd, &page, reach, 0), reach);
-		reader = incise_state_open(made.path, NULL);
-		if (!reader)
-			continue;
-		rc = incise_state_read(reader, &now);
-		assert_true(rc == 0 || rc == -EIO);
-		read += !rc;
-		bad += !!rc;
-		assert_true(memchr(now.reason, 0, sizeof(now.reason)));
-		assert_true(memchr(now.scene, 0, sizeof(now.scene)));
-		assert_true((unsigned int)now.run < INCISE_RUNS);
-		assert_true(now.n_stages >= 0 && now.n_stages <= INCISE_PLAN_STAGES_MAX);
-		n = incise_state_ticks(reader, &cursor, ticks, INCISE_STATE_TICKS + 10,
-				       &lost);
-		assert_true(n >= -EIO && n <= INCISE_STATE_TICKS);
-		for (int i = 0; i < n; i++)
-			assert_true((unsigned int)ticks[i].phase <=
-				    INCISE_PHASE_INSERTION);
-		incise_state_quantile(&now.lateness, 0.99);
-		incise_state_close(reader);
-	}
-	/* Both ways were taken. */
-	assert_true(read > 10 && bad > 10);
-	close(fd);
 }

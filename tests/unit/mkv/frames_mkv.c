@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * lib/record/mkv/frames_mkv.c: frames come back to the byte, with their times; a file truncated
- * at any byte gives all whole frames before it; a disk that is full, writes short, or fails;
- * kill -9, also of the pump of the virtual camera.
+ * at any byte gives all whole frames before it; a disk that writes short, or fails; kill -9. A full disk and
+ * a kill of a whole recording are in tests/attack.
  */
 #include "../unit.h"
 #include <signal.h>
 #include <sys/mman.h>
-#include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
-#include <time.h>
 #include <incise/backend.h>
 #include <incise/rig.h>
 #include "../../../lib/base/crypto/sha256.h"
@@ -468,39 +466,6 @@ TEST(noise_ends)
 	}
 }
 
-/* A limit on the file's size stands for a full disk: write(2) gets short, then fails. */
-TEST(full_disk)
-{
-	const struct rlimit limit = {100000, RLIM_INFINITY};
-	struct rlimit before;
-	char path[64];
-
-	signal(SIGXFSZ, SIG_IGN);
-	assert_int_equal(getrlimit(RLIMIT_FSIZE, &before), 0);
-	for (size_t i = 0; i < 4; i++) {
-		struct incise_error err = {0};
-		static uint8_t bytes[ROOM];
-		uint64_t n = 0;
-		int rc;
-
-		film_path(path, sizeof(path));
-		writer = begin(path, &shapes[i]);
-		assert_int_equal(setrlimit(RLIMIT_FSIZE, &limit), 0);
-		do {
-			frame = film_frame(&shapes[i], n++, 0, bytes);
-			rc = writer->ops->put(writer, &frame, &stored, &err);
-		} while (!rc && n < 1000);
-		assert_int_equal(rc, -EFBIG);
-		/* It stays so. */
-		assert_int_equal(writer->ops->put(writer, &frame, &stored, &err), -EFBIG);
-		assert_int_equal(writer->ops->close(writer, &err), -EFBIG);
-		assert_int_equal(setrlimit(RLIMIT_FSIZE, &before), 0);
-		assert_says(err.text, path);
-		assert_int_equal(count(path, &shapes[i]), n - 1);
-		film_remove(path);
-	}
-}
-
 TEST(short_writes_are_gone_on_with)
 {
 	off_t ends[6];
@@ -654,138 +619,4 @@ TEST(virtual_camera_comes_back)
 	reader->ops->close(reader);
 	incise_rig_close(rig);
 	film_remove(path);
-}
-
-/* --- kill -9 ----------------------------------------------------------------------- */
-
-static const struct incise_frames_shape live_shapes[] = {
-	{64, 48, INCISE_PIXELS_YUYV, 200},
-	{64, 48, INCISE_PIXELS_MJPEG, 200},
-};
-
-/* Frames of the film, a few ahead of the rows; then none. */
-struct film_camera {
-	struct incise_camera camera;
-	const struct incise_frames_shape *shape;
-	const _Atomic uint64_t *rows;
-	int64_t from_ns; /* since the first read */
-	uint64_t next, end;
-	uint8_t bytes[64 * 48 * 3];
-};
-
-#define AHEAD 8 /* so few always find a slot */
-
-static int64_t clock_ns(void)
-{
-	struct timespec now;
-
-	clock_gettime(CLOCK_MONOTONIC, &now);
-	return now.tv_sec * INCISE_NS_PER_S + now.tv_nsec;
-}
-
-static int camera_read(struct incise_camera *camera, struct incise_camera_frame *frame)
-{
-	struct film_camera *c = (struct film_camera *)camera;
-
-	if (!c->from_ns)
-		c->from_ns = clock_ns();
-	if (c->next == c->end || c->next >= *c->rows + AHEAD)
-		return 0;
-	*frame = film_frame(c->shape, c->next, 0, c->bytes);
-	frame->t_ns = c->from_ns + (int64_t)c->next++ * 5 * MS;
-	return 1;
-}
-
-static void camera_info(const struct incise_camera *camera,
-			struct incise_camera_info *info)
-{
-	const struct film_camera *c = (const struct film_camera *)camera;
-
-	*info = (struct incise_camera_info){
-		.rate_hz = c->shape->rate_hz,
-		.width = c->shape->width,
-		.height = c->shape->height,
-		.pixels = c->shape->pixels,
-	};
-}
-
-static uint64_t camera_lost(const struct incise_camera *camera)
-{
-	return 0;
-}
-
-static const struct incise_camera_ops camera_ops = {
-	.read = camera_read,
-	.info = camera_info,
-	.lost = camera_lost,
-};
-
-static void record(const char *path, const struct incise_frames_shape *shape,
-		   uint64_t end, _Atomic uint64_t *rows)
-{
-	static struct film_camera camera = {.camera = {&camera_ops}};
-	struct incise_clock *clock = incise_clock_new_real();
-	struct incise_frame_record records[16];
-	struct incise_frame_pump *pump;
-
-	camera.shape = shape;
-	camera.rows = rows;
-	camera.end = end;
-	pump = incise_frame_pump_new(
-		&(struct incise_frame_pump_setup){
-			.camera = &camera.camera,
-			.clock = clock,
-			.writer = incise_frames.create(path, shape, NULL, NULL),
-		},
-		NULL);
-	for (;;) {
-		*rows += (uint64_t)incise_frame_pump_take(pump, records, 16);
-		usleep(1000);
-	}
-}
-
-/*
- * Killed after a number of rows, while more frames come or when no more do: a frame that has a row
- * is in the file, and the last frame has its row without another one behind it.
- */
-TEST(a_kill_costs_no_row)
-{
-	_Atomic uint64_t *rows = mmap(NULL, sizeof(*rows), PROT_READ | PROT_WRITE,
-				      MAP_SHARED | MAP_ANONYMOUS, -1, 0);
-
-	assert_true(rows != MAP_FAILED);
-	for (uint64_t round = 0; round < 20; round++) {
-		const struct incise_frames_shape *shape = &live_shapes[round % 2];
-		static uint8_t bytes[64 * 48 * 3];
-		uint64_t n = 0, least = 1 + round * 7 % 20;
-		bool rests = round / 2 % 2;
-		char path[64];
-		pid_t child;
-
-		film_path(path, sizeof(path));
-		*rows = 0;
-		child = fork();
-		assert_true(child >= 0);
-		if (!child)
-			record(path, shape, rests ? least : UINT64_MAX, rows);
-		while (*rows < least && !waitpid(child, NULL, WNOHANG))
-			usleep(1000);
-		assert_int_equal(kill(child, SIGKILL), 0);
-		assert_int_equal(waitpid(child, NULL, 0), child);
-		reader = incise_frames.open(path, &err);
-		succeeds(reader);
-		while (reader->ops->next(reader, &frame, &stored, &err) == 1) {
-			struct incise_camera_frame want = film_frame(shape, n, 0, bytes);
-
-			assert_int_equal(frame.seq, n++);
-			assert_int_equal(frame.size, want.size);
-			assert_memory_equal(frame.data, want.data, want.size);
-		}
-		reader->ops->close(reader);
-		assert_true(n >= *rows);
-		if (rests)
-			assert_int_equal(n, least);
-		film_remove(path);
-	}
-	munmap((void *)rows, sizeof(*rows));
 }

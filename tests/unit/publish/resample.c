@@ -246,27 +246,6 @@ TEST(uncertainties_are_what_was_put_in)
 	free(text2);
 }
 
-/* Of before the tracker's station was known. */
-TEST(a_recording_of_form_1_has_no_station)
-{
-	struct incise_recovered made;
-	char *text, *rest;
-	struct row r;
-	int n = 0;
-
-	assert_int_equal(system("cp -r known.rec old.rec"), 0);
-	change("old.rec/recording.db", TO_FORM_1);
-	succeeds(!incise_recording_recover("old.rec", "new.rec", true, &made, &err));
-	text = rest = resample("new.rec", 100, NULL);
-	strsep(&rest, "\n");
-	for (; next_row(&rest, &r); n++) {
-		assert_true(r.station == 0 && r.button == 0);
-		assert_true(n < 5 || n > 280 || fabs(r.x[0] - 100 * r.t) < 2e-4);
-	}
-	assert_true(n >= 300);
-	free(text);
-}
-
 TEST(damage_is_told)
 {
 	static const struct {

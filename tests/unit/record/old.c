@@ -1,24 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Tests of lib/record/old: bytes and CRCs of rows as incise-recording(5) has them of format 4, and older formats,
- * which are only converted.
+ * Tests of lib/record/old: bytes and CRCs of rows as incise-recording(5) has them of format 4. Older formats are
+ * converted in tests/cli/recover.bats.
  */
 #include "../unit.h"
 #include "recorded.h"
+#include "../../../lib/base/crc32c.h"
 #include "../../../lib/record/old/old.h"
-
-/* CRC32C by division, one bit after the other. */
-static uint32_t divide(uint32_t crc, const uint8_t *bytes, size_t n)
-{
-	crc = ~crc;
-	for (size_t i = 0; i < n; i++)
-		for (int bit = 0; bit < 8; bit++) {
-			uint32_t out = (crc ^ bytes[i] >> bit) & 1;
-
-			crc = crc >> 1 ^ (out ? 0x82f63b78 : 0);
-		}
-	return ~crc;
-}
 
 static const uint8_t force_bytes[] = {5, 1, 0, 0, 0,   0,  0, 0, 0, 202, 154, 59,
 				      0, 0, 0, 0, 255, 15, 0, 0, 0, 0,	 0,   0};
@@ -126,9 +114,10 @@ static uint32_t expected(uint32_t crc, const int64_t *seq, int n,
 	for (int i = 0; i < n; i++) {
 		int64_t row[] = {seq[i], 100 * seq[i], 9};
 
-		crc = divide(crc, (uint8_t *)row, sizeof(row)); /* little-endian hosts */
+		crc = incise_crc32c(crc, (uint8_t *)row,
+				    sizeof(row)); /* little-endian hosts */
 	}
-	return divide(crc, (uint8_t *)fields, sizeof(fields));
+	return incise_crc32c(crc, (uint8_t *)fields, sizeof(fields));
 }
 
 static void add(struct incise_ledger *ledger, const int64_t *seq, int n)
@@ -171,53 +160,4 @@ TEST(blocks_are_chained_and_count)
 	assert_true(end.first_ns == 5200 && end.last_ns == 5200);
 	assert_true(end.count == 0 && end.lost == 3 && ledger.lost == 10);
 	assert_int_equal(end.crc, expected(b.crc, NULL, 0, &end));
-}
-
-/* What has no place in an older format is empty in one that was converted of it. */
-TEST(older_ones_are_only_converted, IN_FOLDER)
-{
-	static const struct {
-		const char *sql, *number;
-	} cases[] = {
-		{TO_FORM_1, "format 1"},
-		{TO_FORM_2, "format 2"},
-		{TO_FORM_3, "format 3"},
-	};
-
-	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct incise_recording_info now, before;
-		struct incise_recording *recording;
-		struct incise_recovered made;
-		struct incise_stream streams[INCISE_STREAMS_MAX];
-		struct incise_source source;
-
-		assert_int_equal(system("rm -rf a.rec b.rec"), 0);
-		record("a.rec", SHORT_SCRIPT, 8000 * MS); /* two cuts */
-		recording = open_recording("a.rec");
-		succeeds(!incise_recording_measure(recording, &now, &err));
-		incise_recording_close(recording);
-		change("a.rec/recording.db", cases[i].sql);
-		assert_error(incise_recording_open("a.rec", &err), ENOTSUP, &err, "a.rec",
-			     cases[i].number, "incise recover a.rec -o NEW.rec");
-		succeeds(!incise_recording_recover("a.rec", "b.rec", true, &made, &err));
-		recording = open_recording("b.rec");
-		succeeds(!incise_recording_measure(recording, &before, &err));
-		assert_true(before.cuts > 0 && before.cuts == now.cuts);
-		assert_true(before.tracker == now.tracker);
-		/* format 1 has no lines of times */
-		assert_true(fabs(before.force_max_N - now.force_max_N) <
-			    (i ? 1e-9 : 0.1));
-		assert_int_equal(incise_recording_streams(recording, streams, &err),
-				 i ? 2 : 0);
-		assert_int_equal(recording->streams[INCISE_LEDGER_TRACKER]->n_knots > 0,
-				 i > 0);
-		succeeds(!incise_source_open(&source, recording, INCISE_LEDGER_TRACKER,
-					     &err) &&
-			 incise_source_next(&source, &err) == 1);
-		assert_int_equal(source.batch.column[11].i[0], i ? 1 : 0); /* station */
-		incise_source_close(&source);
-		assert_null(incise_recording_wall(recording, &err));
-		assert_int_equal(err.code, ENODATA);
-		incise_recording_close(recording);
-	}
 }

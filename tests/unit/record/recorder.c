@@ -278,83 +278,6 @@ TEST(name_taken_meanwhile_is_kept, start, stop)
 	incise_recording_close(recording);
 }
 
-/* --- kills -------------------------------------------------------------------------- */
-
-/*
- * Record in another process, which reports the start of each poll and never closes. A full pipe
- * holds it up, so that it gets not far in simulated time before the signal comes.
- */
-static pid_t record_forever(const char *spec, int64_t duration_ns, int *polls)
-{
-	int pipes[2];
-	pid_t pid;
-
-	assert_int_equal(pipe(pipes), 0);
-	pid = fork();
-	if (!pid) {
-		struct incise_rig *rig = open_rig(spec);
-		struct incise_clock *clock = incise_rig_clock(rig);
-		struct incise_recorder *rec = start_recorder("a.rec", rig);
-		int64_t end = incise_clock_now(clock) + duration_ns;
-
-		while (incise_clock_now(clock) < end) {
-			int64_t now;
-
-			incise_clock_wait_until(clock, incise_clock_now(clock) + POLL_NS);
-			now = incise_clock_now(clock);
-			if (incise_recorder_poll(rec, NULL) ||
-			    write(pipes[1], &now, sizeof(now)) != sizeof(now))
-				_exit(1);
-		}
-		_exit(0);
-	}
-	close(pipes[1]);
-	*polls = pipes[0];
-	return pid;
-}
-
-static void killed_recording_is_readable(const char *spec, int64_t duration_ns,
-					 int signal)
-{
-	int64_t first = 0, last = 0, t;
-	int status, polls;
-	pid_t pid = record_forever(spec, duration_ns, &polls);
-
-	while (read(polls, &t, sizeof(t)) == sizeof(t)) {
-		first = first ? first : t;
-		last = t;
-		if (signal && last - first > 800 * MS)
-			break;
-	}
-	if (signal)
-		kill(pid, signal);
-	assert_int_equal(waitpid(pid, &status, 0), pid);
-	assert_true(signal ? WIFSIGNALED(status) : WEXITSTATUS(status) == 0);
-	while (read(polls, &t, sizeof(t)) == sizeof(t))
-		last = t;
-	close(polls);
-
-	assert_int_equal(access("a.rec", F_OK), -1);
-	open_info();
-	assert_false(info.complete);
-	assert_int_equal(info.force_lost, 0);
-	/* One commit per 100 ms, one more force period because samples lie on a grid. */
-	if (last - info.end_ns > 100 * MS + 100000)
-		fail_msg("%.1f ms lost", (last - info.end_ns) * 1e-6);
-	assert_true(info.tracker > 0 && fabs(info.zero_mV - 180) < 0.22);
-	incise_recording_close(recording);
-}
-
-TEST(exit_without_close, IN_FOLDER)
-{
-	killed_recording_is_readable(SIM, 3050 * MS, 0);
-}
-
-TEST(sigkill, IN_FOLDER)
-{
-	killed_recording_is_readable(SIM, INT64_MAX / 2, SIGKILL);
-}
-
 TEST(interrupted_recording_knows_its_losses, start, stop)
 {
 	pid_t pid = fork();
@@ -729,54 +652,6 @@ TEST(silence_at_the_ends_is_lost, IN_FOLDER)
 				 (int)stats.force_lost);
 		assert_int_equal(system("rm -r a.rec"), 0);
 	}
-}
-
-/* --- full disk ----------------------------------------------------------------------- */
-
-/*
- * A limit on the size of files stands in for a full disk, which needs a mount: write(2)
- * fails with EFBIG instead of ENOSPC, and the recorder takes both for the same. That
- * SQLITE_FULL becomes ENOSPC is tested in schema.c.
- */
-TEST(full_disk_keeps_what_was_committed, start, stop)
-{
-	struct rlimit before, limit;
-	struct incise_error err = {0}, second = {0};
-
-	signal(SIGXFSZ, SIG_IGN);
-	getrlimit(RLIMIT_FSIZE, &before);
-	limit = before;
-	limit.rlim_cur = 400000;
-	setrlimit(RLIMIT_FSIZE, &limit);
-	assert_int_equal(poll_for(rec, rig, 60000 * MS, &err), -ENOSPC);
-	assert_int_equal(incise_recorder_close(rec, &second), -ENOSPC);
-	setrlimit(RLIMIT_FSIZE, &before);
-	assert_says(err.text, "a.rec:", "a.rec.part");
-
-	open_info();
-	assert_false(info.complete);
-	assert_true(info.force >= 1000); /* at least one commit of 100 ms */
-	incise_recording_close(recording);
-}
-
-/* The script that records most: what is full only at the end fails there, and stays. */
-TEST(full_disk_at_the_end, start, stop)
-{
-	struct rlimit before, limit;
-	struct stat st;
-
-	signal(SIGXFSZ, SIG_IGN);
-	assert_int_equal(poll_for(rec, rig, 1000 * MS, &err), 0);
-	assert_int_equal(stat("a.rec.part/recording.db-wal", &st), 0);
-	getrlimit(RLIMIT_FSIZE, &before);
-	limit = before;
-	limit.rlim_cur = st.st_size;
-	setrlimit(RLIMIT_FSIZE, &limit);
-	assert_int_equal(incise_recorder_close(rec, &err), -ENOSPC);
-	setrlimit(RLIMIT_FSIZE, &before);
-	assert_int_equal(access("a.rec", F_OK), -1);
-	recording = open_recording("a.rec");
-	incise_recording_close(recording);
 }
 
 /* --- what a kill costs --------------------------------------------------------------- */

@@ -270,52 +270,6 @@ TEST(what_cannot_be_verified, WITH_MODULES)
 {
 
 	assert_int_equal(incise_verify("none.rec", NULL, &report, &err), -ENOENT);
-	record("a.rec", SIM, 600 * MS);
-	change(DB, TO_FORM_1);
-	assert_error(incise_verify("a.rec", NULL, &report, &err), ENOTSUP, &err,
-		     "format 1");
-}
-
-/* A page in the middle is garbage: found, and no crash, wherever it is. */
-TEST(damaged_pages_are_found, WITH_MODULES)
-{
-	struct stat st;
-
-	record("good.rec", SIM, 1000 * MS);
-	assert_int_equal(stat("good.rec/recording.db", &st), 0);
-	assert_true(st.st_size > 12 * 4096);
-	for (int page = 1; page < st.st_size / 4096; page += 2) {
-		char command[200];
-
-		snprintf(command, sizeof(command),
-			 "rm -rf a.rec; cp -r good.rec a.rec; dd if=/dev/zero of=" DB
-			 " bs=4096 seek=%d count=1 conv=notrunc 2>/dev/null",
-			 page);
-		assert_int_equal(system(command), 0);
-		/* those of table meta keep it from being opened */
-		if (!incise_verify("a.rec", NULL, &report, &err) &&
-		    (report.complete || report.intact))
-			fail_msg("page %d", page);
-	}
-}
-
-TEST(truncated_file, WITH_MODULES)
-{
-	struct stat st;
-
-	record("a.rec", SIM, 1000 * MS);
-	assert_int_equal(stat(DB, &st), 0);
-	for (off_t size = st.st_size - 1; size > 0; size -= 40000) {
-		for (int whole = 0; whole < 2; whole++) { /* pages */
-
-			if (whole)
-				size -= size % 4096;
-			assert_int_equal(truncate(DB, size), 0);
-			if (!incise_verify("a.rec", NULL, &report, &err) &&
-			    report.complete)
-				fail_msg("%ld bytes", (long)size);
-		}
-	}
 }
 
 static int stop(void *user, double share)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/rig/rig_plan.c: what rig.conf and the shorthand set, each key with its range and default, and the
- * message for each that is wrong.
+ * lib/rig/rig_plan.c: what rig.conf and the shorthand set, and the message for each that is wrong; types and
+ * ranges of all keys are read by lib/base/settings.c, which ../base/settings.c holds.
  */
 #include "../unit.h"
 #include <locale.h>
@@ -139,20 +139,10 @@ TEST(file_refuses)
 		{"tracker = \"sim\";", EINVAL, {":1: tracker:", "\"sim\""}},
 		{"tracker = \"sim:seed=1\";", EINVAL, {":1: tracker:", "\"sim:seed=1\""}},
 		{"tracker = 1;", EINVAL, {":1: tracker:", "1"}},
-		{"clock = \"fast\";", EINVAL, {":1: clock:", "fast"}},
 		{"tracer = \"sim:\";", EINVAL, {":1: tracer:"}},
 		{"voltmeter = \"sim:\";", EINVAL, {":1: voltmeter:"}},
 		{"sim = 1;", EINVAL, {":1: sim:"}},
 		{"sim = {\n\nsede = 1; };", EINVAL, {":3: sim.sede:"}},
-		{"sim = { sede = \"a\"; };", EINVAL, {":1: sim.sede:"}},
-		{"sim = {\nseed = -1; };", EINVAL, {":2: sim.seed:", "-1"}},
-		{"sim = { seed = \"a\"; };", EINVAL, {":1: sim.seed:"}},
-		{"sim = { seed = [1]; };", EINVAL, {":1: sim.seed:"}},
-		{"sim = { seed = {}; };", EINVAL, {":1: sim.seed:"}},
-		{"sim = { withdrawal = 1; };", EINVAL, {":1: sim.withdrawal:", "1"}},
-		{"sim = {\nwithdrawal = \"both\"; };",
-		 EINVAL,
-		 {":2: sim.withdrawal:", "both"}},
 		{"sim = { depth_mm = [5]; };", EINVAL, {":1: sim.depth_mm:"}},
 		{"sim = { depth_mm = [5, 6]; times = [1]; };",
 		 EINVAL,
@@ -165,16 +155,7 @@ TEST(file_refuses)
 		{"sim = { depth_mm = [4, 8.5]; times = [1, 1]; };",
 		 EINVAL,
 		 {":1: mismatched element type"}},
-		{"sim = { depth_mm = [50]; times = [1]; };",
-		 EINVAL,
-		 {":1: sim.depth_mm:", "50"}},
-		{"sim = { depth_mm = (\"5\"); times = [1]; };",
-		 EINVAL,
-		 {":1: sim.depth_mm:"}},
 		{"sim = { depth_mm = 5; times = 1; };", EINVAL, {":1: sim.depth_mm:"}},
-		{"surface = { normal = [0, 0, 0]; };",
-		 EINVAL,
-		 {":1: surface.normal:", "[0, 0, 0]"}},
 	};
 
 	for (size_t i = 0; i < sizeof(row) / sizeof(row[0]); i++) {
@@ -465,16 +446,10 @@ TEST(what_is_wrong_is_said)
 		const char *text, *says;
 	} cases[] = {
 		{"tracker_setup = 3;", "rig.conf:1: tracker_setup:"},
-		{"tracker_setup = { station = [1]; };", "station"},
-		{"tracker_setup = { stations = []; };", "tracker_setup.stations"},
-		{"tracker_setup = { stations = [0]; };", "tracker_setup.stations"},
-		{"tracker_setup = { stations = { a = 1; }; };", "tracker_setup.stations"},
 		{"tracker_setup = { stations = [2, 1]; };", "tracker_setup.stations"},
 		{"tracker_setup = { stations = [1, 1]; };", "tracker_setup.stations"},
 		{"tracker_setup = { stations = [1, 2, 3, 4, 4]; };",
 		 "tracker_setup.stations"},
-		{"tracker_setup = { stations = 1; };", "tracker_setup.stations"},
-		{"tracker_setup = { stations = [\"1\"]; };", "tracker_setup.stations"},
 		{"tracker_setup = { tube_station = 1; };", "tracker_setup.tube_station"},
 		{"tracker_setup = { stations = [2, 3]; tube_station = 2; };", "found 2"},
 		{"tracker_setup = { stations = [1, 2]; tube_station = 3; };",
@@ -483,29 +458,18 @@ TEST(what_is_wrong_is_said)
 		 "tube_station"},
 		{"tracker_setup = { stations = [1, 2]; tube_station = 258; };",
 		 "tube_station"},
-		{"tracker_setup = { hemisphere = [0.0, 0.0, 0.0]; };", "hemisphere"},
-		{"tracker_setup = { sync = \"slow\"; };", "\"slow\""},
-		{"tracker_setup = { offset_mm = [1.0, 2.0]; };", "offset_mm"},
-		{"tracker_setup = { repeat_ms = -1; };", "repeat_ms"},
 		{"\nforce_setup = { rate_hz = 0.5; };", "rig.conf:2: "},
-		{"force_setup = { rate_hz = 100001; };", "rate_hz"},
 		{"force_setup = { channel = -1; };", "channel"},
 		{"force_setup = { channel = 1.5; };", "force_setup.channel"},
 		{"force_setup = { channel = \"\"; };", "\"voltage0-voltage1\""},
 		{"force_setup = { channel = \"../voltage0\"; };", "force_setup.channel"},
 		{"force_setup = { channel = [0]; };", "force_setup.channel"},
 		{"force_setup = { reference = \"earth\"; };", "one of any, ground"},
-		{"force_setup = { full_scale_V = 0.0; };", "full_scale_V"},
 		{"force_setup = { trigger = \"../../etc\"; };", "force_setup.trigger"},
 		{"force_setup = { trigger = \"0123456789012345678901234567890123456789"
 		 "012345678901234567890123\"; };",
 		 "force_setup.trigger"},
-		{"camera_setup = { width = 15; };", "width"},
-		{"camera_setup = { height = 16385; };", "height"},
 		{"camera_setup = { format = \"h264\"; };", "camera_setup.format"},
-		{"camera_setup = { exposure_ms = 0; };", "exposure_ms"},
-		{"camera_setup = { zoom = 1; };", "zoom"},
-		{"foot_switch = \"b\";", "foot_switch:"},
 		{"sign_key = 1;", "sign_key:"},
 		{"sign_key = \"rig_ed25519\";", "rig.conf:1: sign_key:"},
 		{"foot_switch = { };", "rig.conf:1: foot_switch.device:"},
@@ -519,27 +483,9 @@ TEST(what_is_wrong_is_said)
 		 "foot_switch.key"},
 		{"foot_switch = { device = \"/dev/x\"; key = \"b\"; grab = true; };",
 		 "grab"},
-		{"vision = 3;", "rig.conf:1: vision:"},
-		{"vision = { depth_mm_px = 0.1; };", "depth_mm_px"},
-		{"\nvision = { hue = [0, 180]; };", "rig.conf:2: vision.hue:"},
-		{"vision = { hue = [-1, 179]; };", "vision.hue:"},
-		{"vision = { hue = [1]; };", "vision.hue:"},
-		{"vision = { hue = [1, 2, 3]; };", "vision.hue:"},
-		{"vision = { hue = [1.5, 2.0]; };", "vision.hue:"},
-		{"vision = { hue = (1, \"2\"); };", "vision.hue:"},
-		{"vision = { hue = 5; };", "vision.hue:"},
-		{"vision = { hue = { a = 1; b = 2; }; };", "vision.hue:"},
-		{"vision = { saturation = [0, 256]; };", "vision.saturation:"},
 		{"vision = { saturation = [9, 8]; };", "vision.saturation:"},
 		{"vision = { value = [1, 0]; };", "vision.value:"},
-		{"vision = { value = [0, 256]; };", "vision.value"},
-		{"vision = { full_px = 15.9; };", "full_px"},
-		{"vision = { full_px = 8193; };", "full_px"},
-		{"vision = { roi = [0, 0, 640]; };", "vision.roi:"},
-		{"vision = { roi = [0, -1, 640, 480]; };", "vision.roi:"},
-		{"vision = { roi = [0, 0, 8193, 480]; };", "vision.roi"},
 		{"vision = { roi = [0, 0, 15, 480]; };", "vision.roi"},
-		{"vision = { roi = [0, 0, 480, 0]; };", "vision.roi"},
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {

@@ -422,31 +422,6 @@ TEST(test_set_tool)
 	fed_end(&wall);
 }
 
-/* The handle's end stays where it is while poses are missing, and the tip too. */
-TEST(test_stale_handle)
-{
-	struct fed fed = fed_start("scenes/neck.scene", true);
-	struct incise_tracker_sample pose = {.position_mm = {10, 0, 40},
-					     .quaternion = {1}};
-	int stale = 0;
-
-	assert_int_equal(incise_plan_set_tool(fed.plan, INCISE_TOOL_HANDLE), 0);
-	for (int i = 1; i < 300; i++) {
-		pose.t_ns = i * INT64_C(1000000);
-		if (i < 100 && i % 8 == 0)
-			incise_plan_feed(fed.plan, &pose, 1);
-		assert_int_equal(incise_plan_tick(fed.plan, pose.t_ns, &t), 0);
-		if (i < 20)
-			continue;
-		stale += !!(t.flags & INCISE_TICK_STALE);
-		assert_int_equal(t.tool, INCISE_TOOL_HANDLE);
-		/* 120 mm from tip to end; a hand at rest is predicted to some roundings. */
-		assert_true(fabs(t.tool_mm[2] - 160) < 1e-6);
-	}
-	assert_true(stale > 100);
-	fed_end(&fed);
-}
-
 TEST(test_getters)
 {
 	struct fed fixed = fed_start("scenes/neck.scene", true);

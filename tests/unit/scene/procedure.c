@@ -19,7 +19,6 @@
 #define R 55.0
 #define KN 0.14
 #define KX 0.17
-#define KD 0.0005
 #define KY 0.28
 #define KXZ 0.22
 #define ALIGNED 0.2
@@ -337,28 +336,6 @@ TEST(test_procedure)
 	end(&th);
 }
 
-/* In the tissue a turn does not change the tool. A word does, when the force has faded. */
-TEST(test_change_in_the_tissue)
-{
-	start_at(&th, 5);
-	go(&th, 10, 0, -2, 0.4);
-	to = th.to;
-	to.about_x = 2.5;
-	move(&th, &to, 0.6, true);
-	assert_int_equal(th.tick.tool, INCISE_TOOL_BLADE);
-	assert_int_equal(th.tick.phase, INCISE_PHASE_CUTTING);
-	assert_int_equal(incise_plan_set_tool(th.plan, INCISE_TOOL_TUBE), 0);
-	/* Its force comes back by the ramp of 0.2 s; fresh, it is a cut of no length. */
-	move(&th, &to, 0.6, true);
-	assert_int_equal(th.tick.tool, INCISE_TOOL_TUBE);
-	assert_inserted(&th, 10, 1);
-	assert_int_equal(incise_plan_set_tool(th.plan, INCISE_TOOL_AUTO), 0);
-	move(&th, &to, 0.6, true);
-	assert_int_equal(th.tick.tool, INCISE_TOOL_HANDLE);
-	assert_free(&th);
-	end(&th);
-}
-
 /*
  * The tool changes out of the tissue while a force of the tissue is still on its way down. The way from one end of the scalpel to the other, 120 mm, is no
  * work of that force.
@@ -515,27 +492,6 @@ TEST(test_through_the_membrane)
 	end(&th);
 }
 
-/* A cut too short for the tube, or none, stops it like skin; so does a shallow one below its floor. */
-TEST(test_stopped_like_skin)
-{
-	static const struct {
-		double half_mm, cut_mm, cut_felt_mm;
-	} cases[] = {{2, 6, 0}, {15, 2, 2}};
-	const double tight = ALIGNED + (1 - ALIGNED) * (TUBE_MM - STRETCH_MM) / TUBE_MM;
-
-	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		start_at(&th, 15);
-		go(&th, 20 - cases[i].half_mm, 0, -cases[i].cut_mm, 1);
-		go(&th, 20 + cases[i].half_mm, 0, -cases[i].cut_mm, 1);
-		go(&th, 20 + cases[i].half_mm, 0, 15, 0.6);
-		take_tube(&th, 20);
-		go(&th, 20, 0, -7, 1);
-		assert_force(&th,
-			     (double[]){0, 0, tube_N(tight, cases[i].cut_felt_mm, 7, 0)});
-		end(&th);
-	}
-}
-
 /* A plan that replaces another one has its cuts, and its open membrane, in either arithmetic. */
 TEST(test_another_plan)
 {
@@ -568,35 +524,6 @@ TEST(test_another_plan)
 		go(&th, 50, 0, 15, 1.5);
 	}
 	end(&th);
-}
-
-/*
- * A blade that touches the skin elsewhere, or cuts there, changes nothing for a tube in the first
- * cut, to the bit. No poses come for 0.1 s after it, so that the
- * filter starts again and has no memory of where the hand was.
- */
-TEST(test_touch_elsewhere)
-{
-	double force_N[3][3];
-
-	for (int other = 0; other < 3; other++) {
-		cut_at(&th, 50, 6);
-		go(&th, 20, 0, 15, 1);
-		go(&th, 20, 0, other == 0 ? 15 : other == 1 ? -0.05 : -3, 1);
-		go(&th, 20, other == 2 ? -15 : 0, other == 0 ? 15 : 5, 1);
-		go(&th, 20, 0, 15, 1);
-		take_tube(&th, 50);
-		for (int i = 0; i < 100; i++, th.t_ns += 1000000)
-			fed_tick(th.plan, th.t_ns, NULL, NULL, &th.tick);
-		assert_true(th.tick.flags & INCISE_TICK_STALE);
-		go(&th, 50, 0, 15, 0.3);
-		go(&th, 50, 0, -12, 1.5);
-		for (int i = 0; i < 3; i++)
-			force_N[other][i] = th.tick.command_N[i];
-		end(&th);
-	}
-	assert_memory_equal(force_N[0], force_N[1], sizeof(force_N[0]));
-	assert_memory_equal(force_N[0], force_N[2], sizeof(force_N[0]));
 }
 
 /* Say where to go from now on. */
@@ -674,59 +601,6 @@ TEST(test_averaged_normal)
 	}
 	assert_int_equal(th.begins, 2);
 	assert_true(most > 300);
-	end(&th);
-}
-
-/*
- * Half way along 40 mm in 2 s the blade goes at 10 π mm/s, and no faster a little before
- * or after. Damping opposes that with Kd v = 31.4 mN; the filter sees the speed to 1 %.
- */
-TEST(test_damping_on_the_way)
-{
-	for (int way = 1; way >= -1; way -= 2) {
-		start_at(&th, 10);
-		go(&th, 10, 0, -4, 0.8);
-		to = th.to;
-		to.end[0] += 40 * way;
-		set_out(&th, &to, 2);
-		for (int i = 0; i < 1000; i++)
-			one_tick(&th);
-		assert_int_equal(th.tick.phase, INCISE_PHASE_CUTTING);
-		assert_true(fabs(th.tick.command_N[0] + way * KD * 10 * M_PI) <
-			    0.01 * KD * 10 * M_PI + th.bound_N);
-		assert_true(fabs(th.tick.command_N[2] - 4 * KN) < AT_REST_N + th.bound_N);
-		end(&th);
-	}
-}
-
-/* A contact ends leave_mm = 0.2 mm above the skin, and starts at it. */
-TEST(test_hysteresis)
-{
-	double begun = NAN, ended = NAN;
-
-	start_at(&th, 1);
-	for (int way = 0; way < 2; way++) {
-		to = th.to;
-		to.end[2] = way ? 1 : -1;
-		th.from = th.to;
-		th.to = to;
-		th.begin_s = (double)th.t_ns * 1e-9;
-		th.time_s = 2;
-		for (int i = 0; i < 2500; i++) {
-			int begins = th.begins, ends = th.ends;
-
-			one_tick(&th);
-			if (th.begins > begins)
-				begun = th.tick.tool_mm[2];
-			if (th.ends > ends)
-				ended = th.tick.tool_mm[2];
-		}
-	}
-	assert_int_equal(th.begins, 1);
-	assert_int_equal(th.ends, 1);
-	/* At 1.6 mm/s at most, in the middle of the way, a tick is 1.6 µm. */
-	assert_true(begun <= 0 && begun > -0.0017);
-	assert_true(ended > 0.2 && ended < 0.2017);
 	end(&th);
 }
 

@@ -7,8 +7,8 @@
  *                   ▲                                                                 │
  *                   └───────────────── held for a tick ◀──────────────────────────────┘
  *
- * A scene that is refused with a gain is made again with that gain, and judged if it is accepted then;
- * one with twice that gain is not checked, but judged: whether the refusal had a reason.
+ * A scene that is refused with a gain is made again with that gain, and judged if it is accepted then. Of
+ * twice that gain `incise bench stability` has a figure.
  *
  * The same in the loop of a host, whose steps and holds are in place of tracker and ticks: at its largest gain, with steps
  * of one length or of any.
@@ -76,7 +76,6 @@ struct end {
 static struct {
 	int scenes, refused, advised, advice_accepted, no_advice;
 	int leans, by[OUTCOMES], failed_scenes;
-	int doubled, doubled_swing;
 	int64_t ticks;
 } sum;
 
@@ -690,37 +689,6 @@ static bool named_lean(const char *why, const struct incise_plan *plan, struct l
 	return true;
 }
 
-/*
- * Whether a plan that is refused swings with twice the gain that its refusal names, under the lean that it names;
- * @accepted: with that gain.
- */
-static void try_twice(uint64_t seed, struct incise_scene *scene, const struct leaned *l,
-		      const struct incise_plan *accepted, const char *why)
-{
-	double unloading = accepted->unloading_N_mm, own = accepted->gain;
-	int64_t from_ns = 2000000000;
-	struct incise_plan *plan;
-	struct lean lean;
-
-	/* Not checked, its model has no slope; see scene.h. */
-	scene->unchecked = true;
-	scene->tissue.gain = 2 * own;
-	scene->tissue.force[0][INCISE_REACTION_UNLOADING] = 2 * unloading;
-	plan = incise_plan_new_fed(scene, &l->tracker, &err);
-	succeeds(plan);
-	if (named_lean(why, plan, &lean)) {
-		struct end end = lean_on(plan, l, &lean, &from_ns, seed);
-
-		sum.doubled++;
-		sum.doubled_swing += end.outcome >= DEEP;
-		if (end.outcome < DEEP)
-			printf("twice: seed %" PRIu64
-			       ": %s %.3g mm at twice the gain, as it is named: %s | %s\n",
-			       seed, outcomes[end.outcome], end.swing_mm, l->what, why);
-	}
-	incise_plan_free(plan);
-}
-
 /* As it is drawn, or with the gain of its refusal. */
 static void try_scene(uint64_t seed)
 {
@@ -730,14 +698,12 @@ static void try_scene(uint64_t seed)
 	struct incise_scene *scene;
 	struct incise_plan *plan;
 	const char *advice;
-	bool refused;
 
 	draw_leaned(seed, &l);
 	scene = fed_scene(&folder, l.text.all, &err);
 	succeeds(scene);
 	plan = incise_plan_new_fed(scene, &l.tracker, &why);
-	refused = !plan;
-	if (refused) {
+	if (!plan) {
 		sum.refused++;
 		advice = strstr(why.text, words);
 		sum.no_advice += !advice;
@@ -756,8 +722,6 @@ static void try_scene(uint64_t seed)
 	if (plan) {
 		sum.scenes++;
 		lean_all(seed, plan, &l, true);
-		if (refused)
-			try_twice(seed, scene, &l, plan, strchr(why.text, ':') + 2);
 	}
 	incise_plan_free(plan);
 	incise_scene_free(scene);
@@ -855,8 +819,6 @@ static void summarize(void)
 	for (int i = 0; i < OUTCOMES; i++)
 		printf(" %d %s%s", sum.by[i], outcomes[i], i < OUTCOMES - 1 ? "," : "");
 	printf("; in %d scenes; %.3g ticks\n", sum.failed_scenes, (double)sum.ticks);
-	printf("of %d refused, %d swing with twice the gain\n", sum.doubled,
-	       sum.doubled_swing);
 }
 
 TEST(test_an_accepted_scene_rests)
