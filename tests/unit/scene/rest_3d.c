@@ -24,7 +24,7 @@
 #include "drawn.h"
 
 #define HOSTED 1000
-#define HOSTED_FEW 50
+#define HOSTED_FEW 20
 #define SCENES 500
 #define SCENES_FEW 20
 #define LEANS 6
@@ -59,12 +59,13 @@ struct body {
 
 /*
  * Comes to rest; goes on as fast as it goes, as a tool that slips on a plane; slides over facets until the
- * end; slid off, or sank out of reach; moves by less than counts; swings where the skin is none, deeper
- * than half its radius; swings.
+ * end; slid off, or sank out of reach; moves by less than counts; in a host, moves by as much more as its step is
+ * longer than a tick, where only the account of work keeps a force that gives work from swinging; swings where the skin
+ * is none, deeper than half its radius; swings.
  */
-enum outcome { RESTS, STEADY, SLIDES, LEFT, QUIET, DEEP, SWINGS, OUTCOMES };
+enum outcome { RESTS, STEADY, SLIDES, LEFT, QUIET, RIPPLES, DEEP, SWINGS, OUTCOMES };
 static const char *const outcomes[] = {"rest",	"steady", "slide", "left",
-				       "quiet", "deep",	  "swing"};
+				       "quiet", "ripple", "deep",  "swing"};
 
 struct end {
 	enum outcome outcome;
@@ -472,6 +473,9 @@ static struct end lean_on(struct incise_plan *plan, const struct leaned *l,
 	/* By its way, too: another side may have become the nearest. */
 	if (end.outcome == SWINGS && fmax(end.depth_mm, -loop.body.at[0]) > l->deep_mm)
 		end.outcome = DEEP;
+	if (end.outcome == SWINGS && end.flags & INCISE_TICK_UNPAID &&
+	    end.swing_mm < SWING_MM * hosted.step_s / loop.tick_s)
+		end.outcome = RIPPLES;
 	return end;
 }
 
@@ -619,7 +623,7 @@ static int lean_all(uint64_t seed, struct incise_plan *plan, const struct leaned
 			continue;
 		sum.leans++;
 		sum.by[end.outcome]++;
-		if (end.outcome >= DEEP)
+		if (end.outcome >= RIPPLES)
 			tell(seed, i, l, &lean, &end, plan);
 	}
 	sum.failed_scenes += counts && swings;
@@ -736,7 +740,7 @@ static double fit(const struct incise_scene *scene, struct incise_host_options *
 	*host = incise_host_new(scene, options, &err);
 	if (*host)
 		incise_host_info(*host, &info);
-	else if (!strstr(err.text, "no gain down to"))
+	else if (err.code != EDOM)
 		fail_msg("%s", err.text);
 	return info.gain;
 }
@@ -767,26 +771,27 @@ static void note_lost(const struct incise_scene *scene, int k, double gain)
 }
 
 /* Stiffer than it is drawn, so that most are lowered. */
-#define STIFFER 8
+#define STIFFER 4
 static void try_hosted(uint64_t seed)
 {
 	static const double rates_hz[] = {30, 60, 100};
-	int k = below(&seed, 3);
+	uint64_t random = seed;
+	int k = below(&random, 3);
 	struct incise_host_options options = {.fit_gain = true};
 	struct incise_scene *scene;
 	struct incise_plan *plan;
 	double gain;
 	static struct leaned l;
 
-	draw_leaned(seed, &l);
+	draw_leaned(random, &l);
 	scene = fed_scene(&folder, l.text.all, &err);
 	succeeds(scene);
 	scene->tissue.gain *= STIFFER;
 	scene->limits.pose_age_ms = 1000;
 	hosted.seed = seed;
 	hosted.step_s = 1 / rates_hz[k];
-	hosted.irregular = chance(&seed, 0.5);
-	hosted.velocity = options.gives_velocity = chance(&seed, 0.5);
+	hosted.irregular = chance(&random, 0.5);
+	hosted.velocity = options.gives_velocity = chance(&random, 0.5);
 	options.host_period_s =
 		hosted.step_s + (hosted.irregular ? 1 / scene->rate_hz : 0);
 	gain = fit(scene, &options, &hosted.host);
@@ -821,20 +826,27 @@ static void summarize(void)
 	printf("; in %d scenes; %.3g ticks\n", sum.failed_scenes, (double)sum.ticks);
 }
 
-TEST(test_an_accepted_scene_rests)
+/* Those of SEEDS, else so many that are accepted. */
+static void try_all(void (*try)(uint64_t), int scenes)
 {
-	int scenes = cases_are_all() ? SCENES : SCENES_FEW, first, last;
 	const char *seeds = getenv("SEEDS");
+	int first, last;
 	uint64_t seed;
 
+	memset(&sum, 0, sizeof(sum));
 	if (seeds && sscanf(seeds, "%d..%d", &first, &last) == 2) {
 		for (int i = first; i <= last; i++)
-			try_scene((uint64_t)i);
+			try((uint64_t)i);
 	} else {
 		seed = cases_seed(1);
 		while (sum.scenes < scenes)
-			try_scene(seed++);
+			try(seed++);
 	}
+}
+
+TEST(test_an_accepted_scene_rests)
+{
+	try_all(try_scene, cases_are_all() ? SCENES : SCENES_FEW);
 	summarize();
 	assert_int_equal(sum.by[SWINGS], 0);
 	assert_int_equal(sum.advised, sum.advice_accepted);
@@ -843,12 +855,8 @@ TEST(test_an_accepted_scene_rests)
 TEST(test_an_accepted_host_rests)
 {
 	static const char *const names[] = {"30", "60", "100"};
-	int scenes = cases_are_all() ? HOSTED : HOSTED_FEW;
-	uint64_t seed = cases_seed(1);
 
-	memset(&sum, 0, sizeof(sum));
-	while (sum.scenes < scenes)
-		try_hosted(seed++);
+	try_all(try_hosted, cases_are_all() ? HOSTED : HOSTED_FEW);
 	summarize();
 	for (int k = 0; k < 3; k++) {
 		qsort(lost[k].share, (size_t)lost[k].n, sizeof(double), compare);
