@@ -119,6 +119,9 @@ struct serve_outlets_options {
 	const char *interface; /* of ROS 2; NULL: any */
 };
 
+/* The argument of --ros2 into a struct serve_outlets_options, behind the environment of ROS 2. */
+void serve_ros2_parse(void *options, char *text);
+
 struct serve_sink *serve_outlets_new(const struct serve_outlets_options *options,
 				     const struct serve_info *info);
 
