@@ -65,7 +65,6 @@ struct serve_info {
 	double rate_hz;	  /* poses and forces at most */
 	bool kinds[SERVE_KINDS];
 	bool commanded; /* forces are a loop's commands, in the tracker's frame */
-	bool live;	/* t_ns is CLOCK_MONOTONIC of this machine */
 };
 
 struct serve_sink {
