@@ -3,9 +3,7 @@
  * incise serve: poses, forces and frames live to other programs, over OpenIGTLink, LSL and
  * ROS 2. A process of its own: no loop waits for it, nor notices its clients.
  */
-#include <ctype.h>
 #include <errno.h>
-#include <net/if.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/epoll.h>
@@ -19,7 +17,6 @@
 #include "serve/stream.h"
 
 #define NS 1000000000LL
-#define DOMAIN_MAX 232 /* of ROS 2 */
 #define TICK_NS 100000000LL
 /* At the end clients get what waits for them, for so long. */
 #define LINGER_NS NS
@@ -49,64 +46,6 @@ static void parse_igtl(void *member, char *text)
 	igtl->address = text;
 }
 
-/* Words with '/' between them. */
-static bool is_ros_name(const char *name)
-{
-	static const char word[] = "abcdefghijklmnopqrstuvwxyz_0123456789"
-				   "ABCDEFGHIJKLMNOPQRSTUVWXYZ";
-	size_t n = strspn(name, word);
-
-	while (n && !isdigit(*name) && name[n] == '/') {
-		name += n + 1;
-		n = strspn(name, word);
-	}
-	return n && !isdigit(*name) && !name[n];
-}
-
-/* The variables by which nodes of ROS 2 find their domain. */
-static void parse_ros2_environment(struct serve_outlets_options *ros2)
-{
-	const char *domain = getenv("ROS_DOMAIN_ID"),
-		   *only = getenv("ROS_LOCALHOST_ONLY");
-	const char *range = getenv("ROS_AUTOMATIC_DISCOVERY_RANGE");
-
-	if (domain && *domain)
-		ros2->domain =
-			(int)cli_integer("ros2: ROS_DOMAIN_ID", domain, 0, DOMAIN_MAX);
-	if ((only && !strcmp(only, "1")) || (range && !strcmp(range, "LOCALHOST")))
-		ros2->interface = "lo";
-}
-
-/* "neck", "/lab/neck,domain=3,interface=lo" */
-static void parse_ros2(void *member, char *text)
-{
-	static const struct cli_option keys[] = {
-		{0, "ros2 domain", "N", NULL,
-		 CLI_INTEGER(struct serve_outlets_options, domain, 0, DOMAIN_MAX)},
-		{0, "ros2 interface", "IF", NULL,
-		 CLI_TEXT(struct serve_outlets_options, interface)},
-		{0},
-	};
-	struct serve_outlets_options *ros2 = member;
-	char *comma = strchr(text, ',');
-
-	parse_ros2_environment(ros2);
-	if (comma) {
-		*comma++ = '\0';
-		cli_keys(comma, keys, ros2);
-	}
-	if (ros2->interface && !if_nametoindex(ros2->interface))
-		cli_usage(
-			"--ros2: there is no network interface '%s'; 'ip link' lists them",
-			ros2->interface);
-	ros2->prefix = text + (*text == '/');
-	if (!is_ros_name(ros2->prefix))
-		cli_usage(
-			"--ros2: '%s' is no name in ROS 2; give letters, digits, '_' and '/', for "
-			"example neck",
-			text);
-}
-
 static const struct cli_option options[] = {
 	{'r', "rig", "RIG",
 	 "serve the devices of this rig: file rig.conf, or sim:KEY=VALUE,… for the "
@@ -125,7 +64,7 @@ static const struct cli_option options[] = {
 	{0, "ros2", "NAME[,KEY=VALUE…]",
 	 "publish topics of ROS 2, too: /NAME/measured_cp, measured_cf (of a loop: setpoint_cf) and events; to "
 	 "the whole network; keys domain=N (default: ROS_DOMAIN_ID, or 0), interface=IF (lo: this machine only)",
-	 CLI_PARSED(struct serve_job, ros2, parse_ros2)},
+	 CLI_PARSED(struct serve_job, ros2, serve_ros2_parse)},
 	{0, "rate", "HZ",
 	 "values per second of each kind at most, forces as means (default: 100)",
 	 CLI_NUMBER(struct serve_job, source.rate_hz, 0.1, 20000)},

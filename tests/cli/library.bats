@@ -127,7 +127,7 @@ declared_by() {
 }
 
 @test "the haptic loop maps no heavy library" {
-	heavy='sqlite|libcrypto|lapack|blas|gfortran|libopencv|libav|hdf5|libGL|epoxy|SDL|IGTL|stdc'
+	heavy='sqlite|libcrypto|lapack|blas|gfortran|libopencv|libav|hdf5|libGL|epoxy|SDL|IGTL|ddsc|stdc'
 	# names alone: a folder may be called blas
 	ldd "$INCISE_BUILD/bin/incise-haptic" | sed 's/ => .*//' >haptic
 	grep -q libincise.so haptic

@@ -9,6 +9,8 @@
  *     status    PREFIX-events      Markers   JSON, when the state         /NAME/events
  *                                            changes
  */
+#include <ctype.h>
+#include <net/if.h>
 #include <pthread.h>
 #include <signal.h>
 #include <stdio.h>
@@ -19,6 +21,8 @@
 #include "../cli/cli.h"
 #include "../cli/json.h"
 #include "serve.h"
+
+#define DOMAIN_MAX 232 /* of ROS 2 */
 
 enum output { POSE, FORCE, EVENTS, OUTPUTS };
 
@@ -242,4 +246,64 @@ struct serve_sink *serve_outlets_new(const struct serve_outlets_options *options
 			offer(outlets, (enum output)i, info);
 	pthread_sigmask(SIG_SETMASK, &before, NULL);
 	return &outlets->base;
+}
+
+/* --- the option of ROS 2 --------------------------------------------------------------- */
+
+/* Words with '/' between them. */
+static bool is_ros_name(const char *name)
+{
+	static const char word[] = "abcdefghijklmnopqrstuvwxyz_0123456789"
+				   "ABCDEFGHIJKLMNOPQRSTUVWXYZ";
+	size_t n = strspn(name, word);
+
+	while (n && !isdigit(*name) && name[n] == '/') {
+		name += n + 1;
+		n = strspn(name, word);
+	}
+	return n && !isdigit(*name) && !name[n];
+}
+
+/* The variables by which nodes of ROS 2 find their domain. */
+static void parse_ros2_environment(struct serve_outlets_options *ros2)
+{
+	const char *domain = getenv("ROS_DOMAIN_ID"),
+		   *only = getenv("ROS_LOCALHOST_ONLY");
+	const char *range = getenv("ROS_AUTOMATIC_DISCOVERY_RANGE");
+
+	if (domain && *domain)
+		ros2->domain =
+			(int)cli_integer("ros2: ROS_DOMAIN_ID", domain, 0, DOMAIN_MAX);
+	if ((only && !strcmp(only, "1")) || (range && !strcmp(range, "LOCALHOST")))
+		ros2->interface = "lo";
+}
+
+/* "neck", "/lab/neck,domain=3,interface=lo" */
+void serve_ros2_parse(void *member, char *text)
+{
+	static const struct cli_option keys[] = {
+		{0, "ros2 domain", "N", NULL,
+		 CLI_INTEGER(struct serve_outlets_options, domain, 0, DOMAIN_MAX)},
+		{0, "ros2 interface", "IF", NULL,
+		 CLI_TEXT(struct serve_outlets_options, interface)},
+		{0},
+	};
+	struct serve_outlets_options *ros2 = member;
+	char *comma = strchr(text, ',');
+
+	parse_ros2_environment(ros2);
+	if (comma) {
+		*comma++ = '\0';
+		cli_keys(comma, keys, ros2);
+	}
+	if (ros2->interface && !if_nametoindex(ros2->interface))
+		cli_usage(
+			"--ros2: there is no network interface '%s'; 'ip link' lists them",
+			ros2->interface);
+	ros2->prefix = text + (*text == '/');
+	if (!is_ros_name(ros2->prefix))
+		cli_usage(
+			"--ros2: '%s' is no name in ROS 2; give letters, digits, '_' and '/', for "
+			"example neck",
+			text);
 }

@@ -65,7 +65,6 @@ struct serve_info {
 	double rate_hz;	  /* poses and forces at most */
 	bool kinds[SERVE_KINDS];
 	bool commanded; /* forces are a loop's commands, in the tracker's frame */
-	bool live;	/* t_ns is CLOCK_MONOTONIC of this machine */
 };
 
 struct serve_sink {
@@ -118,6 +117,9 @@ struct serve_outlets_options {
 	int domain;	       /* of ROS 2 */
 	const char *interface; /* of ROS 2; NULL: any */
 };
+
+/* The argument of --ros2 into a struct serve_outlets_options, behind the environment of ROS 2. */
+void serve_ros2_parse(void *options, char *text);
 
 struct serve_sink *serve_outlets_new(const struct serve_outlets_options *options,
 				     const struct serve_info *info);

@@ -156,7 +156,7 @@ struct serve_source *serve_loop_open(const struct serve_source_options *options,
 	if (incise_state_alive(page->state) != 1)
 		cli_warn("loop %s does not run; its next run is followed", page->name);
 	info->name = cli_text("loop %s", page->name);
-	info->live = info->commanded = true;
+	info->commanded = true;
 	info->kinds[SERVE_POSE] = info->kinds[SERVE_FORCE] = true;
 	return &loop->base;
 }

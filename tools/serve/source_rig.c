@@ -221,7 +221,6 @@ struct serve_source *serve_rig_open(const struct serve_source_options *options,
 		       : rig->poll_ns > POLL_MAX_NS ? POLL_MAX_NS
 						    : rig->poll_ns;
 	info->name = cli_text("rig %s", incise_rig_spec(rig->rig));
-	info->live = true;
 	info->kinds[SERVE_POSE] = info->kinds[SERVE_FORCE] = true;
 	info->kinds[SERVE_FRAME] = rig->camera;
 	return &rig->base;

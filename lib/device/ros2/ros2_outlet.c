@@ -67,7 +67,7 @@ static void set_wrench(struct stamped *message, const double *values)
 	memcpy(message->values, values, 3 * sizeof(*values));
 }
 
-/* The hash of a type is that of its definition (REP 2016): ROS 2 compares it from Iron on. */
+/* The hash of a type is that of its definition (REP 2016): nodes read it from Iron on. */
 static const struct type {
 	const char *name, *hash;
 	uint32_t size, n;
