@@ -9,9 +9,10 @@
  *     ▲                │
  *     └── events ◀─────┘
  *
- * Locks, outer first: stepper.loading (LOAD_PLAN), stepper.mutex (set-up, owner, unbind), motor.lock (raw; all
- * that moves), plan.lock (raw; stops), events.lock (raw). sync.lock is on its own. No memory of
- * a user is touched under any of them: mmap() comes with the user's memory locked already.
+ * Locks, outer first: stepper.loading (LOAD_PLAN), stepper.mutex (set-up, owner, unbind),
+ * motor.lock (raw; all that moves), plan.lock (raw; stops), events.lock (raw). sync.lock is on
+ * its own. No memory of a user is touched under any of them: mmap() comes with the user's
+ * memory locked already.
  */
 #ifndef INCISE_DRIVER_STEPPER_H
 #define INCISE_DRIVER_STEPPER_H

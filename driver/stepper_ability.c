@@ -9,9 +9,9 @@
  *                              fires                     line has changed
  *
  * Then it fires SHOTS times more, each PULSE_NS behind the write of the one before, as edges
- * of pulses do, and computes when the next one is due: with C the median of what a firing costs then,
- * from when it is due to its write, and a 16th more, and W the least lateness, the way into the interrupt
- * and about that out of it, a step takes
+ * of pulses do, and computes when the next one is due: with C the median of what a firing
+ * costs then, from when it is due to its write, and a 16th more, and W the least lateness, the
+ * way into the interrupt and about that out of it, a step takes
  *
  *   high + low + 2(C + 2W)     with two firings
  *   high + low + C + W + E     with one that waits for the end of the pulse
@@ -24,9 +24,9 @@
  *   rate = ────────────────────────       n motors: k = 2; one: k = 7/4
  *          max(2p + S, kn(S + p))
  *
- * with S the shorter of the two costs of a step. First: high and low last p each. Second: n motors share
- * one processor, and their steps, with a pulse that is waited for, shall take half of it at most; four
- * sevenths where no motor waits for another.
+ * with S the shorter of the two costs of a step. First: high and low last p each. Second: n
+ * motors share one processor, and their steps, with a pulse that is waited for, shall take half
+ * of it at most; four sevenths where no motor waits for another.
  *
  * Motors that stand cost ticks. With T the median cost of a shot and of what a tick
  * computes, the ticks of n motors shall take a quarter of the processor at most:

@@ -22,7 +22,7 @@ struct stepper_file {
 	struct stepper *stepper;
 	bool owner;
 	struct mutex mutex; /* after, among threads that read */
-	u64 after; /* seq of the last event read; poll() may see it torn on 32 bits, and read() again */
+	u64 after; /* seq of the last event read; on 32 bits poll() may see it torn */
 };
 
 static int stepper_file_open(struct inode *inode, struct file *file)

@@ -10,8 +10,8 @@
  *   home             the position at its leading edge is kept, and with power compared with that
  *                    at homing. Without a home input, the lower limit is the home
  *
- * With debounce_ns, and power, a level counts when the looks have found it for so long; a pulse that is
- * shorter is none.
+ * With debounce_ns, and power, a level counts when the looks have found it for so long; a pulse
+ * that is shorter is none.
  *
  * All under motor->lock. A line that cannot be read counts as active, except home, which
  * keeps its state.

@@ -147,7 +147,7 @@ int stepper_lines_get(struct stepper *stepper, struct device *dev)
 	return 0;
 }
 
-/* More edges in a time than a contact has: the ticks look at the input, until it has calmed down. */
+/* More edges in a time than a contact has: ticks look at the input until it has calmed down. */
 #define STORM_EDGES 32
 #define STORM_NS NSEC_PER_MSEC
 #define CALM_MS 100

@@ -140,8 +140,8 @@ static void stepper_motor_trail(struct stepper_motor *motor, s64 now, s64 due)
 }
 
 /*
- * End a short pulse here, which costs less than another interrupt. A sum ends when the motor that began
- * it has another step, which is of another interrupt, or after a pause.
+ * End a short pulse here, which costs less than another interrupt. A sum ends when the motor
+ * that began it has another step, which is of another interrupt, or after a pause.
  */
 static void stepper_motor_wait(struct stepper_motor *motor)
 {
@@ -373,7 +373,7 @@ static enum hrtimer_restart stepper_motor_fire(struct hrtimer *timer)
 	return restart;
 }
 
-/* For the self-test: what a firing that gives a step does besides its edge, on a motor that seems to move. */
+/* For the self-test: what a firing does besides its edge, on a motor that seems to move. */
 void stepper_motor_compute(struct stepper_motor *motor)
 {
 	unsigned long flags;

@@ -3,7 +3,7 @@
  * From the wires that configfs names to a platform device whose driver finds them: by a
  * lookup table, whose chips go by their labels.
  *
- *   incise-stepper.N { label, incise,motors, incise,lost-steps-max, incise,debounce-ns, incise,cpu }
+ *   incise-stepper.N { label, incise,motors, -lost-steps-max, -debounce-ns, -cpu }
  *   lookup table of incise-stepper.N:  estop, sync, motor0-step, motor0-dir, …
  */
 #include <linux/gpio/machine.h>

@@ -263,7 +263,10 @@ int stepper_setup_config(struct stepper_motor *motor,
 		motor->config = *config;
 		motor->interval_ns =
 			div_u64(NSEC_PER_SEC + config->velocity - 1, config->velocity);
-		/* An edge is late by what its firing costs: only more catches up. An eighth of a step is not felt. */
+		/*
+		 * An edge is late by what its firing costs: only more catches up. An eighth
+		 * of a step is not felt.
+		 */
 		motor->catch_ns = (motor->interval_ns >> 3) + motor->stepper->firing_ns;
 		motor->lag_ns =
 			max(motor->catch_ns, (s64)motor->stepper->info.lateness_ns) +

@@ -151,9 +151,10 @@ struct incise_stepper_setpoint {
  * @steps_down: since bind
  * @late: edges that came more than their shortest time too late, since bind
  * @shifted_ns: by how much the time line of the motion was put off by late edges, since bind
- * @lost_steps: where the home edge was passed last since homing, less where it was at homing; where
- *              it was due and did not come, how far the motor went beyond. Of the home input's leading
- *              edge, without one of the lower limit's; with power, in the direction of homing only
+ * @lost_steps: where the home edge was passed last since homing, less where it was at homing;
+ *              where it was due and did not come, how far the motor went beyond. Of the home
+ *              input's leading edge, without one of the lower limit's; with power, in the
+ *              direction of homing only
  * @reserved: zero
  */
 struct incise_stepper_motor_status {
@@ -335,7 +336,7 @@ struct incise_stepper_controller {
 #define INCISE_STEPPER_CONFIG_RETRACT (1U << 1)
 /* Without power the machine moves: it is not homed any more. */
 #define INCISE_STEPPER_CONFIG_VOLATILE_HOME (1U << 2)
-/* The timer ends each pulse; else it waits for the end of one of at most INCISE_STEPPER_WAIT_MAX_NS. */
+/* The timer ends each pulse; else it waits for the end of one of at most …_WAIT_MAX_NS. */
 #define INCISE_STEPPER_CONFIG_NO_WAIT (1U << 3)
 #define INCISE_STEPPER_WAIT_MAX_NS 2000
 /* debounce_ns is the e-stop's too. */
@@ -359,21 +360,22 @@ struct incise_stepper_controller {
  * @hold_ns: from a step's leading edge to a change of dir, 0 … 1000000
  * @enable_ns: from enable to the first step, 0 … 1000000000
  * @late_max: edges in a row, each late by its shortest time, until the fault LATE; 1 … 1000. A
- *            motion that is put off by more than 1/64 of its time for a second is the same fault. Of
- *            a plan's first motor also ticks of the plan in a row, each late by its tick_ns, or
- *            taking more than half of it
+ *            motion that is put off by more than 1/64 of its time for a second is the same fault.
+ *            Of a plan's first motor also ticks of the plan in a row, each late by its tick_ns,
+ *            or taking more than half of it
  * @lost_steps_max: more |lost_steps| of the status are the fault STEPS, which brakes; 0: never
- * @cpu: 1 + the number of the processor on which its timer fires, and that of a plan it leads; 0: that
- *       which calls ENABLE
- * @debounce_ns: with power, limits, home and ALARM change when a level was seen for so long, at most
- *               100000000: it is looked at at each tick and step. home_position is that of the edge. 0: at once
+ * @cpu: 1 + the number of the processor on which its timer fires, and that of a plan it leads;
+ *       0: that which calls ENABLE
+ * @debounce_ns: with power, limits, home and ALARM change when a level was seen for so long, at
+ *               most 100000000: each tick and step looks at it. home_position is that of the
+ *               edge. 0: at once
  * @reserved: zero
  *
  * SET_CONFIG gives EBUSY while the motor is enabled, EINVAL for a value out of its range
  * and ERANGE for what this machine or a step cannot hold: velocity beyond info.rate_max,
  * tick_ns below info.tick_min_ns, high_ns or low_ns below info.pulse_ns, high_ns + low_ns and
- * info.step_ns or wait_step_ns longer than a step at velocity, and a jerk so low that the profile would take more than 256
- * ticks for it.
+ * info.step_ns or wait_step_ns longer than a step at velocity, and a jerk so low that the
+ * profile would take more than 256 ticks for it.
  */
 struct incise_stepper_config {
 	__u32 motor;
@@ -477,11 +479,12 @@ struct incise_stepper_plan {
 #define INCISE_STEPPER_SET_CONFIG \
 	_IOW(INCISE_STEPPER_IOC, 2, struct incise_stepper_config)
 /*
- * A mask of motors, not 0: all get power or no motor does, and motors that had power keep it. The
- * timers of those that get it, and of their plan, fire on the processor of their config, or that this call
- * runs on. ENXIO: it is off. ENOSPC: motors of other controllers leave it no time for this one's largest velocity.
- * ENOTRECOVERABLE: a fault is latched, until CLEAR; EBUSY: an input forbids it, e-stop say, or it is still coming to rest;
- * ERANGE: it stands outside of its position limits; ESHUTDOWN: the machine goes down.
+ * A mask of motors, not 0: all get power or no motor does, and motors that had power keep it.
+ * The timers of those that get it, and of their plan, fire on the processor of their config, or
+ * that this call runs on. ENXIO: it is off. ENOSPC: motors of other controllers leave it no time
+ * for this one's largest velocity. ENOTRECOVERABLE: a fault is latched, until CLEAR; EBUSY: an
+ * input forbids it, e-stop say, or it is still coming to rest; ERANGE: it stands outside of its
+ * position limits; ESHUTDOWN: the machine goes down.
  */
 #define INCISE_STEPPER_ENABLE _IOW(INCISE_STEPPER_IOC, 3, __u32)
 /*

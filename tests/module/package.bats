@@ -55,19 +55,28 @@ tree() {
 	project -s dkms_install DESTDIR="$dest" prefix=/usr
 	source=$dest/usr/src
 	[ ! -e "$source/incise-$version/driver/sim" ]
-	mkdir tree modules
+	mkdir -p tree "lib/modules/$release"
+	# What depmod looks for in a kernel's folder.
+	touch "lib/modules/$release"/modules.{order,builtin}
 	dkms() {
 		command dkms "$@" -m incise -v "$version" --dkmstree "$PWD/tree" \
-			--sourcetree "$source" --installtree "$PWD/modules"
+			--sourcetree "$source" --installtree "$PWD/lib/modules"
 	}
+	# dkms is a script of bash: it takes this one.
+	depmod() {
+		command depmod --basedir "$BATS_TEST_TMPDIR" "$@"
+	}
+	export -f depmod
 	dkms add
 	dkms build -k "$release" --kernelsourcedir "$INCISE_KDIR"
 	built=$(find tree -name 'incise_stepper.ko*' | head -n 1)
 	[ -n "$built" ]
 	[[ "$(modinfo -F vermagic "$built")" == "$release "* ]]
+	dkms install -k "$release"
+	grep '^updates/dkms/incise_stepper\.ko' "lib/modules/$release/modules.dep"
 	dkms remove --all
-	[ -z "$(find tree -name '*incise*')" ]
-	[ -z "$(find modules -type f)" ]
+	[ -z "$(find tree lib -name '*incise*')" ]
+	run ! grep incise "lib/modules/$release/modules.dep"
 	project -s dkms_uninstall DESTDIR="$dest" prefix=/usr
 	[ -z "$(find "$dest" -type f)" ]
 	[ ! -e "$source/incise-$version" ]
