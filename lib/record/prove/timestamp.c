@@ -82,7 +82,7 @@ int incise_timestamp_query(const uint8_t digest[INCISE_SHA256_BYTES],
 
 /* --- server ---------------------------------------------------------------------------- */
 
-#ifdef OPENSSL_HTTP_H
+#if OPENSSL_VERSION_NUMBER >= 0x30000000L
 /* The reply, which libcrypto has read into memory. Returns 0 or -errno. */
 static int copy_reply(BIO *bio, struct incise_bytes *to)
 {
