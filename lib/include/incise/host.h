@@ -104,7 +104,7 @@ INCISE_API void incise_host_free(struct incise_host *host);
  * tick, returns the same wrench.
  *
  * @param t_ns     any start, within ±4e18
- * @param velocity of the pose's position, mm/s, or NULL; read with options.gives_velocity only
+ * @param velocity_mm_s of the position, or NULL; read with options.gives_velocity only
  * @param wrench   always finite, the force at most limits.force_N
  * @return 0;
  *         -ESTALE: the step was longer than checked, or the clock is ahead. The force ramps to 0 by the plan's own
