@@ -771,7 +771,7 @@ static void note_lost(const struct incise_scene *scene, int k, double gain)
 }
 
 /* Stiffer than it is drawn, so that most are lowered. */
-#define STIFFER 4
+#define STIFFER 30
 static void try_hosted(uint64_t seed)
 {
 	static const double rates_hz[] = {30, 60, 100};
