@@ -71,7 +71,7 @@ static void send_life(struct incise_plan *plan, int64_t now_ns)
 		give_pose(plan, false, NULL, now_ns);
 }
 
-static bool has_faded(const struct incise_plan *plan)
+static INCISE_REALTIME bool has_faded(const struct incise_plan *plan)
 {
 	enum incise_stepper_plan_state state = plan->kernel.last_seen.state;
 
@@ -111,7 +111,8 @@ static void take_watched(struct incise_plan *plan,
 	find_tip(plan, tick);
 }
 
-static int find_rendered(struct incise_plan *plan, struct incise_tick *tick)
+static INCISE_REALTIME int find_rendered(struct incise_plan *plan,
+					 struct incise_tick *tick)
 {
 	struct incise_stepper_rendered rendered;
 	int rc;
@@ -135,8 +136,8 @@ static int find_rendered(struct incise_plan *plan, struct incise_tick *tick)
 	return incise_axes_watch(&plan->axes, tick);
 }
 
-static int watch_tick(struct incise_plan *plan, int64_t t_ns, struct incise_tick *tick,
-		      int64_t *stage_ns)
+static INCISE_REALTIME int watch_tick(struct incise_plan *plan, int64_t t_ns,
+				      struct incise_tick *tick, int64_t *stage_ns)
 {
 	*tick = (struct incise_tick){.t_ns = t_ns, .tool = plan->held};
 	if (plan->fault)
@@ -153,8 +154,9 @@ static int watch_tick(struct incise_plan *plan, int64_t t_ns, struct incise_tick
 	return 0;
 }
 
-static void take_watched_pose(struct incise_plan *plan, bool tube,
-			      const struct incise_tracker_sample *sample, int64_t now_ns)
+static INCISE_REALTIME void take_watched_pose(struct incise_plan *plan, bool tube,
+					      const struct incise_tracker_sample *sample,
+					      int64_t now_ns)
 {
 	give_pose(plan, tube, sample, now_ns);
 }
