@@ -126,7 +126,7 @@ static double n_from(double mm)
 #define n_to n_from
 #define d_to n_from
 
-static int set_tip(struct incise_plan *plan, const double tip_mm[3])
+static INCISE_REALTIME int set_tip(struct incise_plan *plan, const double tip_mm[3])
 {
 	v3_copy(plan->doubles.plan.numbers.tip, tip_mm);
 	return 0;

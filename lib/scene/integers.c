@@ -489,7 +489,7 @@ static double d_to(int32_t value)
 	return value / UNIT;
 }
 
-static int set_tip(struct incise_plan *plan, const double tip_mm[3])
+static INCISE_REALTIME int set_tip(struct incise_plan *plan, const double tip_mm[3])
 {
 	for (int i = 0; i < 3; i++)
 		if (!(fabs(tip_mm[i]) <= 4096))

@@ -6,8 +6,9 @@
  *   n_from(), d_from(), n_to(), d_to()                      conversions of numbers and directions
  *   D_LEAST      the smallest part of a direction          set_tip()  of struct incise_plan_ops
  */
-static void take_pose(struct incise_plan *plan, bool tube,
-		      const struct incise_tracker_sample *sample, int64_t now_ns)
+static INCISE_REALTIME void take_pose(struct incise_plan *plan, bool tube,
+				      const struct incise_tracker_sample *sample,
+				      int64_t now_ns)
 {
 	struct T(pose) pose = {
 		.t_ns = sample->t_ns,
@@ -91,20 +92,20 @@ static inline __attribute__((always_inline)) int run_stages(struct incise_plan *
 	return 0;
 }
 
-static int run_tick(struct incise_plan *plan, int64_t t_ns, struct incise_tick *tick,
-		    int64_t *stage_ns)
+static INCISE_REALTIME int run_tick(struct incise_plan *plan, int64_t t_ns,
+				    struct incise_tick *tick, int64_t *stage_ns)
 {
 	return stage_ns ? run_stages(plan, t_ns, tick, stage_ns)
 			: run_stages(plan, t_ns, tick, NULL);
 }
 
-static void hold_tool(struct incise_plan *plan)
+static INCISE_REALTIME void hold_tool(struct incise_plan *plan)
 {
 	OWN(plan)->state.wanted = (int32_t)plan->wanted;
 	OWN(plan)->state.fading = plan->fading;
 }
 
-static bool has_faded(const struct incise_plan *plan)
+static INCISE_REALTIME bool has_faded(const struct incise_plan *plan)
 {
 	const struct T(state) *state = &OWN(plan)->state;
 
@@ -112,13 +113,13 @@ static bool has_faded(const struct incise_plan *plan)
 	return !(state->gain > 0) && v3_length(plan->last_N) == 0;
 }
 
-static void zero_force(struct incise_plan *plan)
+static INCISE_REALTIME void zero_force(struct incise_plan *plan)
 {
 	for (int i = 0; i < 3; i++)
 		OWN(plan)->state.last[i] = 0;
 }
 
-static int32_t *puncture_of(struct incise_plan *plan)
+static INCISE_REALTIME int32_t *puncture_of(struct incise_plan *plan)
 {
 	return &OWN(plan)->state.membrane.punctured;
 }
@@ -129,7 +130,8 @@ static struct T(incision) *cuts_of(struct incise_plan *plan)
 	return plan->inserts ? T_PART(&OWN(plan)->state, incision) : NULL;
 }
 
-static bool get_cut(struct incise_plan *plan, int i, struct incise_cut *cut)
+static INCISE_REALTIME bool get_cut(struct incise_plan *plan, int i,
+				    struct incise_cut *cut)
 {
 	const struct T(incision) *cuts = cuts_of(plan);
 	const struct T(cut) *from;
@@ -153,7 +155,7 @@ static bool get_cut(struct incise_plan *plan, int i, struct incise_cut *cut)
 	return true;
 }
 
-static void clear_cuts(struct incise_plan *plan)
+static INCISE_REALTIME void clear_cuts(struct incise_plan *plan)
 {
 	struct T(incision) *cuts = cuts_of(plan);
 
@@ -163,7 +165,8 @@ static void clear_cuts(struct incise_plan *plan)
 	T(incision_leave)(cuts);
 }
 
-static bool add_cut(struct incise_plan *plan, const struct incise_cut *cut)
+static INCISE_REALTIME bool add_cut(struct incise_plan *plan,
+				    const struct incise_cut *cut)
 {
 	struct T(incision) *cuts = cuts_of(plan);
 	struct T(cut) *to;

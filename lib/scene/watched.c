@@ -10,7 +10,6 @@
 #include <math.h>
 #include <incise/plan_file.h>
 #include <incise/stepper_plan.h>
-#include "../base/monotonic.h"
 #include "../base/vector.h"
 #include "plan.h"
 
@@ -71,7 +70,7 @@ static void send_life(struct incise_plan *plan, int64_t now_ns)
 		give_pose(plan, false, NULL, now_ns);
 }
 
-static bool has_faded(const struct incise_plan *plan)
+static INCISE_REALTIME bool has_faded(const struct incise_plan *plan)
 {
 	enum incise_stepper_plan_state state = plan->kernel.last_seen.state;
 
@@ -111,7 +110,8 @@ static void take_watched(struct incise_plan *plan,
 	find_tip(plan, tick);
 }
 
-static int find_rendered(struct incise_plan *plan, struct incise_tick *tick)
+static INCISE_REALTIME int find_rendered(struct incise_plan *plan,
+					 struct incise_tick *tick)
 {
 	struct incise_stepper_rendered rendered;
 	int rc;
@@ -135,26 +135,9 @@ static int find_rendered(struct incise_plan *plan, struct incise_tick *tick)
 	return incise_axes_watch(&plan->axes, tick);
 }
 
-static int watch_tick(struct incise_plan *plan, int64_t t_ns, struct incise_tick *tick,
-		      int64_t *stage_ns)
-{
-	*tick = (struct incise_tick){.t_ns = t_ns, .tool = plan->held};
-	if (plan->fault)
-		return incise_plan_fail(plan, tick, plan->fault);
-	for (int i = 0; i < plan->n_stages; i++) {
-		int64_t begin = stage_ns ? incise_monotonic_ns() : 0;
-		int rc = plan->stage[i].run(plan, tick);
-
-		if (stage_ns)
-			stage_ns[i] = incise_monotonic_ns() - begin;
-		if (rc)
-			return incise_plan_fail(plan, tick, rc);
-	}
-	return 0;
-}
-
-static void take_watched_pose(struct incise_plan *plan, bool tube,
-			      const struct incise_tracker_sample *sample, int64_t now_ns)
+static INCISE_REALTIME void take_watched_pose(struct incise_plan *plan, bool tube,
+					      const struct incise_tracker_sample *sample,
+					      int64_t now_ns)
 {
 	give_pose(plan, tube, sample, now_ns);
 }
@@ -168,7 +151,6 @@ static void keep_stages(struct incise_plan *plan, bool feeds)
 		plan->stage[plan->n_stages++] = pose;
 	plan->stage[plan->n_stages++] =
 		(struct incise_stage){.name = "kernel", .run = find_rendered};
-	plan->ops.tick = watch_tick;
 	plan->ops.take_pose = take_watched_pose;
 	plan->ops.faded = has_faded;
 	plan->kernel.runs = true;
