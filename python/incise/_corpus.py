@@ -13,21 +13,19 @@ import os
 from typing import Any, List, Optional, Sequence
 
 from . import _library
-from ._library import ArrowArrayStream, Failure, Invalid, c_bool, c_char_p, c_double, c_int
-from ._library import c_uint64, c_void_p, function
+from ._library import ArrowArrayStream, Invalid, Struct, c_bool, c_char_p, c_double, c_int
+from ._library import c_uint64, c_void_p, call, function
 from ._producer import open_stream
-from .model import BaselinesStruct, INPUTS_MAX, Model, Stop, TrainOptionsStruct
-from .model import TrainReportStruct, has_cuts, is_path, is_recording, name_array, report_of
-from .recording import Recording
+from ._model import BaselinesStruct, INPUTS_MAX, Model, Stop, TrainOptionsStruct
+from ._model import TrainReportStruct, has_cuts, is_path, is_recording, name_array, report_of
+from ._recording import Recording
 
 TEXT_MAX = 1000  # INCISE_SOURCE_TEXT
 
 _Stream = ctypes.CFUNCTYPE(c_int, c_void_p, ctypes.POINTER(ArrowArrayStream), c_void_p)
 
 
-class SourceStruct(ctypes.Structure):
-    """struct incise_train_source"""
-
+class SourceStruct(Struct, of="struct incise_train_source"):
     _fields_ = [
         ("name", c_char_p),
         ("path", c_char_p),
@@ -41,12 +39,9 @@ class SourceStruct(ctypes.Structure):
         ("state", c_void_p),
         ("user", c_void_p),
     ]
-    c_name = "struct incise_train_source"
 
 
-class SourcesOptionsStruct(ctypes.Structure):
-    """struct incise_sources_options"""
-
+class SourcesOptionsStruct(Struct, of="struct incise_sources_options"):
     _fields_ = [
         ("columns", ctypes.POINTER(c_char_p)),
         ("n_inputs", c_int),
@@ -64,12 +59,9 @@ class SourcesOptionsStruct(ctypes.Structure):
         ("ranks", c_void_p),
         ("end", c_int),
     ]
-    c_name = "struct incise_sources_options"
 
 
-class PropagationReportStruct(ctypes.Structure):
-    """struct incise_propagation_report"""
-
+class PropagationReportStruct(Struct, of="struct incise_propagation_report"):
     _fields_ = [
         ("own", c_double),
         ("calibration", c_double),
@@ -78,12 +70,9 @@ class PropagationReportStruct(ctypes.Structure):
         ("recordings", c_int),
         ("calibrations", c_int),
     ]
-    c_name = "struct incise_propagation_report"
 
 
-class TrainedStruct(ctypes.Structure):
-    """struct incise_trained"""
-
+class TrainedStruct(Struct, of="struct incise_trained"):
     _fields_ = [
         ("model", c_void_p),
         ("uncertainty", c_void_p),
@@ -104,26 +93,23 @@ class TrainedStruct(ctypes.Structure):
         ("propagated", PropagationReportStruct),
         ("shared", c_bool),
     ]
-    c_name = "struct incise_trained"
 
 
-_library.declare(
+_library.prototypes(
     "libincise-record",
-    {"incise_source_text": (c_int, c_char_p, c_void_p, c_char_p, c_void_p)},
+    """
+    int incise_source_text(const char *path, struct incise_recording *recording, char *text,
+        struct incise_error *err);
+    """,
 )
-_library.declare(
+_library.prototypes(
     "libincise-learn",
-    {
-        "incise_train_sources": (
-            c_int,
-            ctypes.POINTER(SourceStruct),
-            c_int,
-            ctypes.POINTER(SourcesOptionsStruct),
-            ctypes.POINTER(TrainedStruct),
-            c_void_p,
-        ),
-        "incise_trained_free": (None, ctypes.POINTER(TrainedStruct)),
-    },
+    """
+    int incise_train_sources(struct incise_train_source *sources, int n,
+        const struct incise_sources_options *options, struct incise_trained *trained,
+        struct incise_error *err);
+    void incise_trained_free(struct incise_trained *trained);
+    """,
 )
 
 
@@ -137,8 +123,8 @@ def _without_choice(path: bytes) -> bytes:
 
 def _text(path: bytes, recording: Optional[int]) -> bytes:
     """What factors and models keep of a source."""
-    text, failure = ctypes.create_string_buffer(TEXT_MAX), Failure()
-    failure.check(function("incise_source_text")(path, recording, text, failure.ref))
+    text = ctypes.create_string_buffer(TEXT_MAX)
+    call("incise_source_text", path, recording, text)
     return text.value
 
 
@@ -225,6 +211,7 @@ def train_sources(
     all_rows: bool,
     mf_type: int,
     counts: Any,
+    progress: Any,
 ) -> Model:
     """incise.train() of a list."""
     if options.classic:
@@ -246,17 +233,16 @@ def train_sources(
         n_mfs=counts,
         train=options,
     )
-    stop, trained, failure = Stop(how.train), TrainedStruct(), Failure()
+    stop, trained = Stop(how.train, progress), TrainedStruct()
     structs = (SourceStruct * len(sources))(*(source.struct for source in sources))
 
     def learn() -> Model:
-        rc = function("incise_train_sources")(
-            structs, len(sources), ctypes.byref(how), ctypes.byref(trained), failure.ref
-        )
-        for source in sources:
-            if source.failure:
-                raise source.failure
-        failure.check(rc)
+        try:
+            call("incise_train_sources", structs, len(sources), how, trained)
+        finally:
+            for source in sources:
+                if source.failure:
+                    raise source.failure
         model = Model._of(trained.model)
         model._set_uncertainty(trained.uncertainty)
         model._notes = trained.notes
@@ -272,8 +258,8 @@ def train_sources(
         return model
 
     try:
-        return _library.call_interruptible(learn, stop.cancel)
+        return stop.run(learn)
     finally:
-        function("incise_trained_free")(ctypes.byref(trained))
+        function("incise_trained_free")(trained)
         for source in sources:
             source.close()

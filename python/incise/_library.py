@@ -7,7 +7,10 @@ those of the public headers; tests/python/abi compares every field with the comp
 
 import ctypes
 import errno
+import importlib
 import os
+import re
+from typing import Union
 
 VERSION = "0.1.0"
 SOVERSION = 2
@@ -19,6 +22,9 @@ c_int64, c_uint64, c_void_p, c_char_p = (
     ctypes.c_void_p,
     ctypes.c_char_p,
 )
+
+
+PathLike = Union[str, "os.PathLike[str]"]
 
 
 class Error(OSError):
@@ -39,8 +45,13 @@ class Invalid(Error, ValueError):
     """A value, a file or data that cannot be used."""
 
 
+class Exists(Error, FileExistsError):
+    """A file that is there, and is not overwritten unasked."""
+
+
 _kinds = {
     errno.ENOENT: NotFound,
+    errno.EEXIST: Exists,
     errno.EINVAL: Invalid,
     errno.ENODATA: Invalid,
     errno.ERANGE: Invalid,
@@ -58,7 +69,30 @@ def make_error(code, text):
     return _kinds.get(code, Error)(code, text)
 
 
-class _ErrorStruct(ctypes.Structure):
+# The types of C that functions have; other pointers are c_void_p.
+_types = {
+    "void": None,
+    "int": c_int,
+    "unsigned int": ctypes.c_uint,
+    "bool": c_bool,
+    "double": c_double,
+    "int64_t": c_int64,
+    "uint64_t": c_uint64,
+    "size_t": ctypes.c_size_t,
+    "char *": c_char_p,
+}
+_structs = {}
+
+
+class Struct(ctypes.Structure):
+    """A struct of a public header, by its name there."""
+
+    def __init_subclass__(cls, of):
+        cls.c_name = of
+        _structs[of] = cls
+
+
+class ErrorStruct(Struct, of="struct incise_error"):
     _fields_ = [("code", c_int), ("text", c_char * 500)]
 
 
@@ -66,7 +100,7 @@ class Failure:
     """An ``incise_error`` for one call."""
 
     def __init__(self):
-        self.struct = _ErrorStruct()
+        self.struct = ErrorStruct()
         self.ref = ctypes.byref(self.struct)
 
     def exception(self, code):
@@ -180,10 +214,33 @@ _signatures = {}
 _functions = {}
 
 
+def _type(declaration):
+    """The type of a parameter or a result, without its name."""
+    words = re.sub(r"\bconst\b", " ", declaration).replace("*", " * ").split()
+    name = " ".join(words[: 2 if words[0] in ("struct", "unsigned") else 1])
+    stars = words.count("*") or declaration.endswith("]")
+    if words[0] == "enum" and not stars:
+        return c_int
+    if stars == 1 and name in _structs:
+        return ctypes.POINTER(_structs[name])
+    return _types.get(name + " *" * stars, c_void_p)  # also for a typedef of a function
+
+
 def declare(library, signatures):
     """Note the functions of a library: {name: (result, *arguments)}; nothing is loaded yet."""
     for name, signature in signatures.items():
         _signatures[name] = (library,) + signature
+
+
+declared = []  # all prototypes, for tests
+
+
+def prototypes(library, text):
+    """Note the functions of a library by their prototypes, as in its headers."""
+    declared.append(text)
+    for result, name, arguments in re.findall(r"(\w[^;]*?)(\w+)\(([^;]*)\);", text):
+        types = [_type(argument.strip()) for argument in arguments.split(",")]
+        declare(library, {name: (_type(result), *types)})
 
 
 def function(name):
@@ -198,6 +255,14 @@ def function(name):
     return found
 
 
+def call(name, *arguments):
+    """Call a function whose last argument is an incise_error; return its result, or raise."""
+    failure, called = Failure(), function(name)
+    result = called(*arguments, failure.ref)
+    checked = failure.check if called.restype in (c_int, c_int64) else failure.require
+    return checked(result)
+
+
 def path_bytes(path):
     """A path as the C library takes it."""
     text = os.fsencode(os.fspath(path))
@@ -206,12 +271,40 @@ def path_bytes(path):
     return text
 
 
+def new_path(path, ending, overwrite=None):
+    """The path of a file to write: it has that ending, and is new or may be overwritten.
+
+    overwrite: None where the caller has no such choice.
+    """
+    name = path_bytes(path)
+    if not name.endswith(ending.encode()):
+        raise Invalid(errno.EINVAL, f"{os.fsdecode(name)}: expected a name that ends in {ending}")
+    if not overwrite and os.path.lexists(name):
+        remedy = "" if overwrite is None else ", or overwrite=True"
+        raise Exists(errno.EEXIST, f"{os.fsdecode(name)}: exists; give another name{remedy}")
+    return name
+
+
+_pip_names = {"PIL": "pillow", "sklearn": "scikit-learn"}
+
+
+def package(name, purpose):
+    """Import an optional package, or raise one line that names it."""
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        top = name.partition(".")[0]
+        raise NotFound(
+            errno.ENOENT,
+            f"{purpose} needs {top}; install python3-{top.lower()}, "
+            f"or pip install {_pip_names.get(top, top)}",
+        ) from None
+
+
 # --- structs ----------------------------------------------------------------------------
 
 
-class Stream(ctypes.Structure):
-    """struct incise_stream"""
-
+class Stream(Struct, of="struct incise_stream"):
     _fields_ = [
         ("name", c_char * 16),
         ("device", c_char * 64),
@@ -232,12 +325,9 @@ class Stream(ctypes.Structure):
         ("ended", c_char * 200),
         ("note", c_char * 300),
     ]
-    c_name = "struct incise_stream"
 
 
-class RecordingInfo(ctypes.Structure):
-    """struct incise_recording_info"""
-
+class RecordingInfo(Struct, of="struct incise_recording_info"):
     _fields_ = [
         ("complete", c_bool),
         ("start_ns", c_int64),
@@ -268,12 +358,9 @@ class RecordingInfo(ctypes.Structure):
         ("start_utc_ns", c_int64),
         ("summary", c_bool),
     ]
-    c_name = "struct incise_recording_info"
 
 
-class CalibrationStruct(ctypes.Structure):
-    """struct incise_calibration"""
-
+class CalibrationStruct(Struct, of="struct incise_calibration"):
     _fields_ = [
         ("force_mV_N", c_double),
         ("force_zero_mV", c_double),
@@ -292,12 +379,9 @@ class CalibrationStruct(ctypes.Structure):
         ("stepper_stiction_N", c_double),
         ("stepper_steps_s", c_double),
     ]
-    c_name = "struct incise_calibration"
 
 
-class FrameStruct(ctypes.Structure):
-    """struct incise_camera_frame"""
-
+class FrameStruct(Struct, of="struct incise_camera_frame"):
     _fields_ = [
         ("t_ns", c_int64),
         ("seq", c_uint64),
@@ -308,15 +392,12 @@ class FrameStruct(ctypes.Structure):
         ("data", c_void_p),
         ("size", ctypes.c_size_t),
     ]
-    c_name = "struct incise_camera_frame"
 
 
 ExportProgress = ctypes.CFUNCTYPE(c_int, c_void_p, c_double)
 
 
-class ExportOptions(ctypes.Structure):
-    """struct incise_export_options"""
-
+class ExportOptions(Struct, of="struct incise_export_options"):
     _fields_ = [
         ("rate_hz", c_double),
         ("depth_bins", c_int),
@@ -338,25 +419,18 @@ class ExportOptions(ctypes.Structure):
         ("progress", ExportProgress),
         ("context", c_void_p),
     ]
-    c_name = "struct incise_export_options"
 
 
-class ArrowSchema(ctypes.Structure):
-    """struct ArrowSchema"""
-
-    c_name = "struct ArrowSchema"
+class ArrowSchema(Struct, of="struct ArrowSchema"):
+    pass
 
 
-class ArrowArray(ctypes.Structure):
-    """struct ArrowArray"""
-
-    c_name = "struct ArrowArray"
+class ArrowArray(Struct, of="struct ArrowArray"):
+    pass
 
 
-class ArrowArrayStream(ctypes.Structure):
-    """struct ArrowArrayStream"""
-
-    c_name = "struct ArrowArrayStream"
+class ArrowArrayStream(Struct, of="struct ArrowArrayStream"):
+    pass
 
 
 ArrowSchema._fields_ = [
@@ -453,5 +527,3 @@ def call_interruptible(call, cancel):
     if not good:
         raise value
     return value
-
-

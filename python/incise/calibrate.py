@@ -13,13 +13,11 @@ import math
 from typing import Any, Dict, List, NamedTuple, Sequence, Tuple
 
 from . import _library
-from ._library import Failure, Invalid, c_bool, c_char, c_double, c_int, c_int64, c_void_p
-from ._library import function, text
+from ._library import Invalid, Struct, c_bool, c_char, c_double, c_int, c_int64
+from ._library import call, function, text
 
 
-class ForcePairStruct(ctypes.Structure):
-    """struct incise_calibrate_force_pair"""
-
+class ForcePairStruct(Struct, of="struct incise_calibrate_force_pair"):
     _fields_ = [
         ("mass_g", c_double),
         ("force_N", c_double),
@@ -27,12 +25,9 @@ class ForcePairStruct(ctypes.Structure):
         ("series", c_int),
         ("descending", c_bool),
     ]
-    c_name = "struct incise_calibrate_force_pair"
 
 
-class ForceSetupStruct(ctypes.Structure):
-    """struct incise_calibrate_force_setup"""
-
+class ForceSetupStruct(Struct, of="struct incise_calibrate_force_setup"):
     _fields_ = [
         ("gravity_m_s2", c_double),
         ("gravity_u_m_s2", c_double),
@@ -48,12 +43,9 @@ class ForceSetupStruct(ctypes.Structure):
         ("nominal_mV_N", c_double),
         ("tolerance", c_double),
     ]
-    c_name = "struct incise_calibrate_force_setup"
 
 
-class PartStruct(ctypes.Structure):
-    """struct incise_calibration_part"""
-
+class PartStruct(Struct, of="struct incise_calibration_part"):
     _fields_ = [
         ("source", ctypes.c_char_p),
         ("type", c_char),
@@ -62,19 +54,13 @@ class PartStruct(ctypes.Structure):
         ("sensitivity", c_double),
         ("contribution", c_double),
     ]
-    c_name = "struct incise_calibration_part"
 
 
-class BudgetStruct(ctypes.Structure):
-    """struct incise_calibration_budget"""
-
+class BudgetStruct(Struct, of="struct incise_calibration_budget"):
     _fields_ = [("n", c_int), ("part", PartStruct * 6)]
-    c_name = "struct incise_calibration_budget"
 
 
-class ForceStruct(ctypes.Structure):
-    """struct incise_calibrate_force"""
-
+class ForceStruct(Struct, of="struct incise_calibrate_force"):
     _fields_ = [
         ("sensitivity_mV_N", c_double),
         ("sensitivity_u_mV_N", c_double),
@@ -102,13 +88,10 @@ class ForceStruct(ctypes.Structure):
         ("passed", c_bool),
         ("budget", BudgetStruct),
     ]
-    c_name = "struct incise_calibrate_force"
     c_fields = {"passed": "pass"}  # a word of Python
 
 
-class DepthFitStruct(ctypes.Structure):
-    """struct incise_depth_fit"""
-
+class DepthFitStruct(Struct, of="struct incise_depth_fit"):
     _fields_ = [
         ("mm_px", c_double),
         ("u_mm_px", c_double),
@@ -126,12 +109,9 @@ class DepthFitStruct(ctypes.Structure):
         ("bend_sd_mm", c_double),
         ("budget", BudgetStruct),
     ]
-    c_name = "struct incise_depth_fit"
 
 
-class DepthLengthsStruct(ctypes.Structure):
-    """struct incise_depth_lengths"""
-
+class DepthLengthsStruct(Struct, of="struct incise_depth_lengths"):
     _fields_ = [
         ("depth_mm", ctypes.POINTER(c_double)),
         ("length_px", ctypes.POINTER(c_double)),
@@ -139,19 +119,13 @@ class DepthLengthsStruct(ctypes.Structure):
         ("u_scale", c_double),
         ("u_depth_mm", c_double),
     ]
-    c_name = "struct incise_depth_lengths"
 
 
-class TipPoseStruct(ctypes.Structure):
-    """struct incise_tip_pose"""
-
+class TipPoseStruct(Struct, of="struct incise_tip_pose"):
     _fields_ = [("t_ns", c_int64), ("position_mm", c_double * 3), ("quaternion", c_double * 4)]
-    c_name = "struct incise_tip_pose"
 
 
-class TipFitStruct(ctypes.Structure):
-    """struct incise_tip_fit"""
-
+class TipFitStruct(Struct, of="struct incise_tip_fit"):
     _fields_ = [
         ("tip_mm", c_double * 3),
         ("covariance", c_double * 9),
@@ -170,39 +144,21 @@ class TipFitStruct(ctypes.Structure):
         ("block", c_int),
         ("blocks", c_int),
     ]
-    c_name = "struct incise_tip_fit"
 
 
-_library.declare(
+_library.prototypes(
     "libincise-learn",
-    {
-        "incise_calibrate_force_init": (None, ctypes.POINTER(ForceSetupStruct)),
-        "incise_calibrate_gravity": (c_double, c_double, c_double),
-        "incise_calibrate_force": (
-            c_int,
-            ctypes.POINTER(ForcePairStruct),
-            c_int,
-            ctypes.POINTER(ForceSetupStruct),
-            ctypes.POINTER(ForceStruct),
-            c_void_p,
-            c_void_p,
-        ),
-        "incise_calibrate_depth_line": (
-            c_int,
-            ctypes.POINTER(DepthLengthsStruct),
-            c_void_p,
-            ctypes.POINTER(DepthFitStruct),
-            c_void_p,
-        ),
-        "incise_calibrate_tip": (
-            c_int,
-            ctypes.POINTER(TipPoseStruct),
-            c_int,
-            c_void_p,
-            ctypes.POINTER(TipFitStruct),
-            c_void_p,
-        ),
-    },
+    """
+    void incise_calibrate_force_init(struct incise_calibrate_force_setup *setup);
+    double incise_calibrate_gravity(double latitude_deg, double altitude_m);
+    int incise_calibrate_force(const struct incise_calibrate_force_pair *pairs, int n,
+        const struct incise_calibrate_force_setup *setup, struct incise_calibrate_force *result,
+        enum incise_calibrate_force_state *states, struct incise_error *err);
+    int incise_calibrate_depth_line(const struct incise_depth_lengths *pairs, bool *inlier,
+        struct incise_depth_fit *fit, struct incise_error *err);
+    int incise_calibrate_tip(const struct incise_tip_pose *poses, int n, bool *inlier,
+        struct incise_tip_fit *fit, struct incise_error *err);
+    """,
 )
 
 
@@ -287,7 +243,7 @@ def force(
     down = [bool(d) for d in descending] or [False] * len(masses)
     n = _same_length(mass_g=masses, reading_mV=readings, series=runs, descending=down)
     given = ForceSetupStruct()
-    function("incise_calibrate_force_init")(ctypes.byref(given))
+    function("incise_calibrate_force_init")(given)
     names = [name for name, _ in ForceSetupStruct._fields_]
     for name, value in setup.items():
         if name not in names:
@@ -299,12 +255,8 @@ def force(
             for mass, reading, run, is_down in zip(masses, readings, runs, down)
         )
     )
-    result, failure = ForceStruct(), Failure()
-    failure.check(
-        function("incise_calibrate_force")(
-            pairs, n, ctypes.byref(given), ctypes.byref(result), None, failure.ref
-        )
-    )
+    result = ForceStruct()
+    call("incise_calibrate_force", pairs, n, given, result, None)
     return Force(*(getattr(result, name) for name in Force._fields[:-1]), _parts(result.budget))
 
 
@@ -334,12 +286,8 @@ def depth(
     n = _same_length(depth_mm=depths, length_px=lengths)
     kind = c_double * max(n, 1)
     pairs = DepthLengthsStruct(kind(*depths), kind(*lengths), n, u_scale, u_depth_mm)
-    fit, failure = DepthFitStruct(), Failure()
-    failure.check(
-        function("incise_calibrate_depth_line")(
-            ctypes.byref(pairs), None, ctypes.byref(fit), failure.ref
-        )
-    )
+    fit = DepthFitStruct()
+    call("incise_calibrate_depth_line", pairs, None, fit)
     return Depth(*(getattr(fit, name) for name in Depth._fields[:-1]), _parts(fit.budget))
 
 
@@ -358,7 +306,7 @@ class Tip(NamedTuple):
 def tip(poses: Any) -> Tip:
     """Pivot calibration from poses: a table such as ``rec.tracker``, or {t_ns, x_mm, y_mm, z_mm, qw,
     qx, qy, qz}."""
-    from .plan import _columns
+    from ._plan import _columns
 
     columns: Dict[str, Any] = _columns(poses)
     missing = [name for name in ("qw", "qx", "qy", "qz") if name not in columns]
@@ -373,10 +321,8 @@ def tip(poses: Any) -> Tip:
         made[i].t_ns = times[i]
         made[i].position_mm[:] = [values[name][i] for name in names[:3]]
         made[i].quaternion[:] = [values[name][i] for name in names[3:]]
-    fit, failure = TipFitStruct(), Failure()
-    failure.check(
-        function("incise_calibrate_tip")(made, n, None, ctypes.byref(fit), failure.ref)
-    )
+    fit = TipFitStruct()
+    call("incise_calibrate_tip", made, n, None, fit)
     u = [math.sqrt(max(fit.covariance[4 * i], 0)) for i in range(3)]
     return Tip(
         (fit.tip_mm[0], fit.tip_mm[1], fit.tip_mm[2]),

@@ -7,6 +7,7 @@ import threading
 import unittest
 
 import incise
+from incise import _plan
 from fixtures import Case, has, run
 
 
@@ -35,7 +36,7 @@ class Plans(Case):
         poses = [position for _, position in stroke(125)]
         for k in range(1000):
             ticks.append(plan.step(1 + k * 1e-3, poses[k // 8] if k % 8 == 0 else None))
-        contact = [tick for tick in ticks if tick.flags & incise.plan.FLAGS["contact"]]
+        contact = [tick for tick in ticks if tick.flags & incise.FLAGS["contact"]]
         self.assertGreater(len(contact), 100)
         self.assertGreater(max(tick.command_N[2] for tick in contact), 0.2)
         self.assertEqual(ticks[-1].tool, "blade")
@@ -87,7 +88,7 @@ class Plans(Case):
         os.environ["INCISE_LIBDIR"] = self.path("opt/lib")
         try:
             self.assertEqual(
-                os.path.realpath(incise.plan.find_scene("own")),
+                os.path.realpath(_plan.find_scene("own")),
                 os.path.realpath(os.path.join(folder, "own.scene")),
             )
         finally:

@@ -57,7 +57,7 @@ class Recordings(Case):
     def test_parquet_needs_pyarrow(self):
         with unittest.mock.patch.dict(sys.modules, {"pyarrow": None}):
             path = self.path("force.parquet")
-            self.says(ImportError, "pip install pyarrow", self.rec.force.parquet, path)
+            self.says(incise.NotFound, "pip install pyarrow", self.rec.force.parquet, path)
         self.assertEqual(os.listdir(self.folder), [])
 
     def test_streams_are_the_blocks(self):
@@ -407,7 +407,7 @@ class Recordings(Case):
 
     @unittest.skipUnless(has("numpy", "pandas"), "pandas is not installed")
     def test_pandas(self):
-        frame = self.rec.pairs(12, 10, by_cut=True).pandas()
+        frame = self.rec.pairs(12, 10, by_cut=True).to_pandas()
         self.assertEqual(frame.columns[0], "cut")
         self.assertEqual(frame.attrs["units"]["force_N"], "N")
         self.assertEqual(frame.cut.nunique(), 14)

@@ -10,8 +10,8 @@ import os
 from typing import Any, Iterator, List, NamedTuple, Tuple, Union
 
 from . import _library
-from ._library import Failure, Invalid, c_bool, c_char, c_char_p, c_int, c_int64, c_uint64, c_void_p
-from ._library import function, text
+from ._library import Invalid, Struct, c_bool, c_char, c_char_p, c_int, c_int64, c_uint64, c_void_p
+from ._library import call, function, text
 
 KINDS = (
     "lost",
@@ -31,9 +31,7 @@ VERDICTS = ("unchecked", "good", "bad")
 _ROWS, _ALL = 2, 3  # enum incise_prove_level
 
 
-class FindingStruct(ctypes.Structure):
-    """struct incise_verify_finding"""
-
+class FindingStruct(Struct, of="struct incise_verify_finding"):
     _fields_ = [
         ("kind", c_int),
         ("stream", c_char_p),
@@ -46,12 +44,9 @@ class FindingStruct(ctypes.Structure):
         ("count", c_uint64),
         ("text", c_char_p),
     ]
-    c_name = "struct incise_verify_finding"
 
 
-class StreamStruct(ctypes.Structure):
-    """struct incise_verify_stream"""
-
+class StreamStruct(Struct, of="struct incise_verify_stream"):
     _fields_ = [
         ("name", c_char * 16),
         ("expected", c_uint64),
@@ -61,12 +56,9 @@ class StreamStruct(ctypes.Structure):
         ("blocks", c_uint64),
         ("altered", c_uint64),
     ]
-    c_name = "struct incise_verify_stream"
 
 
-class FramesStruct(ctypes.Structure):
-    """struct incise_verify_frames"""
-
+class FramesStruct(Struct, of="struct incise_verify_frames"):
     _fields_ = [
         ("checked", c_bool),
         ("present", c_uint64),
@@ -75,12 +67,9 @@ class FramesStruct(ctypes.Structure):
         ("extra", c_uint64),
         ("ahead", c_uint64),
     ]
-    c_name = "struct incise_verify_frames"
 
 
-class ReportStruct(ctypes.Structure):
-    """struct incise_verify_report"""
-
+class ReportStruct(Struct, of="struct incise_verify_report"):
     _fields_ = [
         ("complete", c_bool),
         ("intact", c_bool),
@@ -93,26 +82,20 @@ class ReportStruct(ctypes.Structure):
         ("sealed", ctypes.c_bool),
         ("commits", ctypes.c_uint64),
     ]
-    c_name = "struct incise_verify_report"
 
 
 _Found = ctypes.CFUNCTYPE(None, c_void_p, ctypes.POINTER(FindingStruct))
 _Progress = ctypes.CFUNCTYPE(c_int, c_void_p, ctypes.c_double)
 
 
-class WatchStruct(ctypes.Structure):
-    """struct incise_verify_watch"""
-
+class WatchStruct(Struct, of="struct incise_verify_watch"):
     _fields_ = [("found", _Found), ("progress", _Progress), ("user", c_void_p)]
-    c_name = "struct incise_verify_watch"
 
 
 _Write = ctypes.CFUNCTYPE(c_int, c_void_p, c_char_p)
 
 
-class OptionsStruct(ctypes.Structure):
-    """struct incise_prove_options"""
-
+class OptionsStruct(Struct, of="struct incise_prove_options"):
     _fields_ = [
         ("level", c_int),
         ("signers", c_char_p),
@@ -126,12 +109,9 @@ class OptionsStruct(ctypes.Structure):
         ("write", _Write),
         ("user", c_void_p),
     ]
-    c_name = "struct incise_prove_options"
 
 
-class VoucherStruct(ctypes.Structure):
-    """struct incise_proof_voucher"""
-
+class VoucherStruct(Struct, of="struct incise_proof_voucher"):
     _fields_ = [
         ("file", c_char * 100),
         ("kind", c_int),
@@ -144,19 +124,13 @@ class VoucherStruct(ctypes.Structure):
         ("t_s", c_int64),
         ("why", c_char * 500),
     ]
-    c_name = "struct incise_proof_voucher"
 
 
-class HeadStruct(ctypes.Structure):
-    """struct incise_seal_head"""
-
+class HeadStruct(Struct, of="struct incise_seal_head"):
     _fields_ = [("commit", c_int64), ("t_ns", c_int64), ("head", c_char * 65)]
-    c_name = "struct incise_seal_head"
 
 
-class SealStruct(ctypes.Structure):
-    """struct incise_proof_seal"""
-
+class SealStruct(Struct, of="struct incise_proof_seal"):
     _fields_ = [
         ("path", c_char_p),
         ("join", c_bool),
@@ -172,40 +146,31 @@ class SealStruct(ctypes.Structure):
         ("vouched", c_bool),
         ("bad", c_int),
     ]
-    c_name = "struct incise_proof_seal"
 
 
-class ProofStruct(ctypes.Structure):
-    """struct incise_proof"""
-
+class ProofStruct(Struct, of="struct incise_proof"):
     _fields_ = [
         ("report", ReportStruct),
         ("altered", c_char * 400),
         ("n", c_int),
         ("seals", ctypes.POINTER(SealStruct)),
     ]
-    c_name = "struct incise_proof"
 
 
-_library.declare(
+_library.prototypes(
     "libincise-record",
-    {
-        "incise_prove": (
-            c_int,
-            c_char_p,
-            ctypes.POINTER(OptionsStruct),
-            ctypes.POINTER(ProofStruct),
-            c_void_p,
-        ),
-        "incise_proof_free": (None, ctypes.POINTER(ProofStruct)),
-    },
+    """
+    int incise_prove(const char *path, const struct incise_prove_options *options,
+        struct incise_proof *proof, struct incise_error *err);
+    void incise_proof_free(struct incise_proof *proof);
+    """,
 )
 
 
 class Finding(NamedTuple):
     """One finding and its place."""
 
-    kind: str  #: one of incise.verify.KINDS
+    kind: str  #: lost, altered, ledger, extra, count, interrupted, frames, unverified, …
     stream: str  #: force, tracker, camera; empty: all
     first_seq: int
     last_seq: int  #: below first_seq: not known
@@ -229,7 +194,7 @@ class Voucher(NamedTuple):
 
     file: str
     statement: int  #: number of the statement that it is for
-    verdict: str  #: one of incise.verify.VERDICTS; unchecked without signers or authorities
+    verdict: str  #: good, bad, or unchecked: without signers or authorities
     by: str  #: signer, or subject of the authority's certificate; empty: not known
     key: str  #: of a signature, kind and fingerprint; empty: not known
     utc: str  #: of a time-stamp; empty: a signature
@@ -281,21 +246,15 @@ def _proved(
     files = [None if file is None else _library.path_bytes(file) for file in trust]
     options = OptionsStruct(level, *files)
     options.watch = ctypes.pointer(watch)
-    failure, proof, call = Failure(), ProofStruct(), function("incise_prove")
+    proof = ProofStruct()
     try:
-        rc = _library.call_interruptible(
-            lambda: call(
-                _library.path_bytes(path),
-                ctypes.byref(options),
-                ctypes.byref(proof),
-                failure.ref,
-            ),
+        _library.call_interruptible(
+            lambda: call("incise_prove", _library.path_bytes(path), options, proof),
             lambda: stop.append(True),
         )
-        failure.check(rc)
         yield proof
     finally:
-        function("incise_proof_free")(ctypes.byref(proof))
+        function("incise_proof_free")(proof)
 
 
 def _seal(seal: SealStruct) -> Seal:

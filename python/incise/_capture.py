@@ -11,10 +11,10 @@ from typing import Any, List, Optional
 from . import _library
 from ._library import (
     CalibrationStruct,
-    Failure,
     Invalid,
     Stream,
-    _ErrorStruct,
+    ErrorStruct,
+    Struct,
     c_bool,
     c_char_p,
     c_double,
@@ -22,19 +22,18 @@ from ._library import (
     c_int64,
     c_uint64,
     c_void_p,
+    call,
     function,
     path_bytes,
     text,
 )
-from .recording import PathLike, Recording, load_calibration, open
+from ._recording import PathLike, Recording, load_calibration, open
 
 _TRACKER, _FORCE, _CAMERA = 1, 2, 4  # enum incise_rig_device
 _Warn = ctypes.CFUNCTYPE(None, c_void_p, c_char_p)
 
 
-class SetupStruct(ctypes.Structure):
-    """struct incise_recorder_setup"""
-
+class SetupStruct(Struct, of="struct incise_recorder_setup"):
     _fields_ = [
         ("calibration", ctypes.POINTER(CalibrationStruct)),
         ("calibration_path", c_char_p),
@@ -46,19 +45,13 @@ class SetupStruct(ctypes.Structure):
         ("cuts", c_bool),
         ("clock_source", c_char_p),
     ]
-    c_name = "struct incise_recorder_setup"
 
 
-class CountsStruct(ctypes.Structure):
-    """struct incise_pose_counts"""
-
+class CountsStruct(Struct, of="struct incise_pose_counts"):
     _fields_ = [("poses", c_uint64), ("unusable", c_uint64), ("flagged", c_uint64 * 128)]
-    c_name = "struct incise_pose_counts"
 
 
-class StatsStruct(ctypes.Structure):
-    """struct incise_recorder_stats"""
-
+class StatsStruct(Struct, of="struct incise_recorder_stats"):
     _fields_ = [
         ("force", c_uint64),
         ("tracker", c_uint64),
@@ -82,12 +75,9 @@ class StatsStruct(ctypes.Structure):
         ("streams", Stream * 3),
         ("n_streams", c_int),
     ]
-    c_name = "struct incise_recorder_stats"
 
 
-class OptionsStruct(ctypes.Structure):
-    """struct incise_capture_options"""
-
+class OptionsStruct(Struct, of="struct incise_capture_options"):
     _fields_ = [
         ("recorder", SetupStruct),
         ("duration_s", c_double),
@@ -100,48 +90,35 @@ class OptionsStruct(ctypes.Structure):
         ("warn", _Warn),
         ("context", c_void_p),
     ]
-    c_name = "struct incise_capture_options"
 
 
-class ResultStruct(ctypes.Structure):
-    """struct incise_capture_result"""
-
+class ResultStruct(Struct, of="struct incise_capture_result"):
     _fields_ = [
         ("seconds", c_double),
         ("start_ns", c_int64),
-        ("early", _ErrorStruct),
+        ("early", ErrorStruct),
         ("stats", StatsStruct),
         ("wall", c_void_p),
     ]
-    c_name = "struct incise_capture_result"
 
 
-_library.declare(
+_library.prototypes(
     "libincise",
-    {
-        "incise_rig_open": (c_void_p, c_char_p, ctypes.c_uint, c_void_p),
-        "incise_rig_close": (None, c_void_p),
-    },
+    """
+    struct incise_rig *incise_rig_open(const char *spec, unsigned int devices,
+        struct incise_error *err);
+    void incise_rig_close(struct incise_rig *rig);
+    """,
 )
-_library.declare(
+_library.prototypes(
     "libincise-record",
-    {
-        "incise_capture_run": (
-            c_int,
-            c_char_p,
-            c_void_p,
-            ctypes.POINTER(OptionsStruct),
-            ctypes.POINTER(ResultStruct),
-            c_void_p,
-        ),
-        "incise_capture_judge": (
-            c_int,
-            c_char_p,
-            ctypes.POINTER(OptionsStruct),
-            ctypes.POINTER(ResultStruct),
-            c_void_p,
-        ),
-    },
+    """
+    int incise_capture_run(const char *path, struct incise_rig *rig,
+        const struct incise_capture_options *options, struct incise_capture_result *result,
+        struct incise_error *err);
+    int incise_capture_judge(const char *path, const struct incise_capture_options *options,
+        const struct incise_capture_result *result, struct incise_error *err);
+    """,
 )
 
 
@@ -172,7 +149,7 @@ def capture(
             "duration_s, trigger_force_N: expected 0 or more, "
             f"found {duration_s!r}, {trigger_force_N!r}",
         )
-    failure, result, stop = Failure(), ResultStruct(), c_int(0)
+    result, stop = ResultStruct(), c_int(0)
     name = path_bytes(path)
     doubts: List[str] = []
 
@@ -197,15 +174,12 @@ def capture(
         stop.value = 1
 
     devices = _TRACKER | _FORCE | (_CAMERA if camera else 0)
-    opened = failure.require(function("incise_rig_open")(path_bytes(rig), devices, failure.ref))
+    opened = call("incise_rig_open", path_bytes(rig), devices)
     try:
-        run = function("incise_capture_run")
-        failure.check(
-            _library.call_interruptible(
-                lambda: run(name, opened, options, result, failure.ref), interrupt
-            )
+        _library.call_interruptible(
+            lambda: call("incise_capture_run", name, opened, options, result), interrupt
         )
-        failure.check(function("incise_capture_judge")(name, options, result, failure.ref))
+        call("incise_capture_judge", name, options, result)
     finally:
         function("incise_wall_free")(result.wall)
         function("incise_rig_close")(opened)
