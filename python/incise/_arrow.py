@@ -15,13 +15,13 @@ import errno
 import itertools
 import operator
 import os
-from typing import TYPE_CHECKING, Any, Callable, Dict, Iterator, List, NamedTuple, Optional
-from typing import Tuple, Union, overload
+from typing import Any, Callable, Dict, Iterator, List, NamedTuple, Optional, TYPE_CHECKING, Tuple
+from typing import Union, overload
 
 from . import _library
 from ._columns import Columns, Tabular
-from ._library import ArrowArray, ArrowArrayStream, ArrowSchema, Error, Invalid, PathLike
-from ._library import function, make_error, package
+from ._library import ArrowArray, ArrowArrayStream, ArrowSchema, Error, Invalid, PathLike, function
+from ._library import make_error, package
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

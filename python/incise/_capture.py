@@ -9,97 +9,59 @@ import warnings
 from typing import Any, List, Optional
 
 from . import _library
-from ._library import (
-    CalibrationStruct,
-    Invalid,
-    Stream,
-    ErrorStruct,
-    Struct,
-    c_bool,
-    c_char_p,
-    c_double,
-    c_int,
-    c_int64,
-    c_uint64,
-    c_void_p,
-    call,
-    function,
-    path_bytes,
-    text,
-)
+from ._library import Invalid, c_char_p, c_int, c_void_p, call, function, path_bytes, text
 from ._recording import PathLike, Recording, load_calibration, open
 
 _TRACKER, _FORCE, _CAMERA = 1, 2, 4  # enum incise_rig_device
 _Warn = ctypes.CFUNCTYPE(None, c_void_p, c_char_p)
 
 
-class SetupStruct(Struct, of="struct incise_recorder_setup"):
-    _fields_ = [
-        ("calibration", ctypes.POINTER(CalibrationStruct)),
-        ("calibration_path", c_char_p),
-        ("vision", c_void_p),
-        ("planned_s", c_double),
-        ("armed", c_bool),
-        ("trigger_force_N", c_double),
-        ("trigger_button", c_bool),
-        ("cuts", c_bool),
-        ("clock_source", c_char_p),
-    ]
-
-
-class CountsStruct(Struct, of="struct incise_pose_counts"):
-    _fields_ = [("poses", c_uint64), ("unusable", c_uint64), ("flagged", c_uint64 * 128)]
-
-
-class StatsStruct(Struct, of="struct incise_recorder_stats"):
-    _fields_ = [
-        ("force", c_uint64),
-        ("tracker", c_uint64),
-        ("depth", c_uint64),
-        ("frames", c_uint64),
-        ("poses", CountsStruct),
-        ("force_lost", c_uint64),
-        ("tracker_lost", c_uint64),
-        ("frames_lost", c_uint64),
-        ("frames_unlooked", c_uint64),
-        ("force_clipped", c_uint64),
-        ("depth_mm", c_double),
-        ("camera_depth_mm", c_double),
-        ("force_N", c_double),
-        ("full_scale_N", c_double),
-        ("zero_mV", c_double),
-        ("button", c_bool),
-        ("armed", c_bool),
-        ("bytes_per_s", c_double),
-        ("disk_s", c_double),
-        ("streams", Stream * 3),
-        ("n_streams", c_int),
-    ]
-
-
-class OptionsStruct(Struct, of="struct incise_capture_options"):
-    _fields_ = [
-        ("recorder", SetupStruct),
-        ("duration_s", c_double),
-        ("sync", c_char_p),
-        ("at_time", c_bool),
-        ("start_tai", c_bool),
-        ("start_ns", c_int64),
-        ("stop", ctypes.POINTER(c_int)),
-        ("step", c_void_p),
-        ("warn", _Warn),
-        ("context", c_void_p),
-    ]
-
-
-class ResultStruct(Struct, of="struct incise_capture_result"):
-    _fields_ = [
-        ("seconds", c_double),
-        ("start_ns", c_int64),
-        ("early", ErrorStruct),
-        ("stats", StatsStruct),
-        ("wall", c_void_p),
-    ]
+SetupStruct, CountsStruct, StatsStruct, OptionsStruct, ResultStruct = _library.structs(
+    """
+    struct incise_recorder_setup {
+        struct incise_calibration *calibration;
+        const char *calibration_path;
+        void *vision;
+        double planned_s;
+        bool armed;
+        double trigger_force_N;
+        bool trigger_button, cuts;
+        const char *clock_source;
+    };
+    struct incise_pose_counts {
+        uint64_t poses, unusable, flagged[128];
+    };
+    struct incise_recorder_stats {
+        uint64_t force, tracker, depth, frames;
+        struct incise_pose_counts poses;
+        uint64_t force_lost, tracker_lost, frames_lost, frames_unlooked, force_clipped;
+        double depth_mm, camera_depth_mm, force_N, full_scale_N, zero_mV;
+        bool button, armed;
+        double bytes_per_s, disk_s;
+        struct incise_stream streams[3];
+        int n_streams;
+    };
+    struct incise_capture_options {
+        struct incise_recorder_setup recorder;
+        double duration_s;
+        const char *sync;
+        bool at_time, start_tai;
+        int64_t start_ns;
+        int *stop;
+        void *step;
+        _Warn warn;
+        void *context;
+    };
+    struct incise_capture_result {
+        double seconds;
+        int64_t start_ns;
+        struct incise_error early;
+        struct incise_recorder_stats stats;
+        void *wall;
+    };
+    """,
+    _Warn=_Warn,
+)
 
 
 _library.prototypes(

@@ -13,11 +13,18 @@ import os
 from typing import Any, List, Optional, Sequence
 
 from . import _library
-from ._library import ArrowArrayStream, Invalid, Struct, c_bool, c_char_p, c_double, c_int
-from ._library import c_uint64, c_void_p, call, function
+from ._library import ArrowArrayStream, Invalid, c_int, c_void_p, call, function
+from ._model import (
+    Model,
+    Stop,
+    TrainOptionsStruct,
+    has_cuts,
+    is_path,
+    is_recording,
+    name_array,
+    report_of,
+)
 from ._producer import open_stream
-from ._model import BaselinesStruct, INPUTS_MAX, Model, Stop, TrainOptionsStruct
-from ._model import TrainReportStruct, has_cuts, is_path, is_recording, name_array, report_of
 from ._recording import Recording
 
 TEXT_MAX = 1000  # INCISE_SOURCE_TEXT
@@ -25,74 +32,49 @@ TEXT_MAX = 1000  # INCISE_SOURCE_TEXT
 _Stream = ctypes.CFUNCTYPE(c_int, c_void_p, ctypes.POINTER(ArrowArrayStream), c_void_p)
 
 
-class SourceStruct(Struct, of="struct incise_train_source"):
-    _fields_ = [
-        ("name", c_char_p),
-        ("path", c_char_p),
-        ("stream", _Stream),
-        ("cuts", c_bool),
-        ("hashed", c_char_p),
-        ("text", c_char_p),
-        ("rig", c_char_p),
-        ("calibration", c_char_p),
-        ("open", c_void_p),
-        ("state", c_void_p),
-        ("user", c_void_p),
-    ]
-
-
-class SourcesOptionsStruct(Struct, of="struct incise_sources_options"):
-    _fields_ = [
-        ("columns", ctypes.POINTER(c_char_p)),
-        ("n_inputs", c_int),
-        ("parts", c_void_p),
-        ("n_parts", c_int),
-        ("group", c_char_p),
-        ("all_rows", c_bool),
-        ("averaged", c_bool),
-        ("check", c_double),
-        ("premises", c_void_p),
-        ("type", c_int),
-        ("n_mfs", c_int * INPUTS_MAX),
-        ("train", TrainOptionsStruct),
-        ("progress", c_char_p),
-        ("ranks", c_void_p),
-        ("end", c_int),
-    ]
-
-
-class PropagationReportStruct(Struct, of="struct incise_propagation_report"):
-    _fields_ = [
-        ("own", c_double),
-        ("calibration", c_double),
-        ("rig", c_double),
-        ("weight", c_double),
-        ("recordings", c_int),
-        ("calibrations", c_int),
-    ]
-
-
-class TrainedStruct(Struct, of="struct incise_trained"):
-    _fields_ = [
-        ("model", c_void_p),
-        ("uncertainty", c_void_p),
-        ("notes", c_char_p),
-        ("report", TrainReportStruct),
-        ("baselines", BaselinesStruct),
-        ("pairs", c_uint64),
-        ("check_pairs", c_uint64),
-        ("left_out", c_uint64),
-        ("repeated", c_uint64),
-        ("check_outside", c_uint64),
-        ("group", c_char_p),
-        ("initial", c_void_p),
-        ("factor", c_void_p),
-        ("corpus", c_void_p),
-        ("noise", c_double),
-        ("coverage", c_double),
-        ("propagated", PropagationReportStruct),
-        ("shared", c_bool),
-    ]
+SourceStruct, SourcesOptionsStruct, PropagationReportStruct, TrainedStruct = _library.structs(
+    """
+    struct incise_train_source {
+        const char *name, *path;
+        _Stream stream;
+        bool cuts;
+        const char *hashed, *text, *rig, *calibration;
+        void *open, *state, *user;
+    };
+    struct incise_sources_options {
+        const char **columns;
+        int n_inputs;
+        void *parts;
+        int n_parts;
+        const char *group;
+        bool all_rows, averaged;
+        double check;
+        void *premises;
+        int type, n_mfs[8];
+        struct incise_train_options train;
+        const char *progress;
+        void *ranks;
+        int end;
+    };
+    struct incise_propagation_report {
+        double own, calibration, rig, weight;
+        int recordings, calibrations;
+    };
+    struct incise_trained {
+        void *model, *uncertainty;
+        const char *notes;
+        struct incise_train_report report;
+        struct incise_baselines baselines;
+        uint64_t pairs, check_pairs, left_out, repeated, check_outside;
+        const char *group;
+        void *initial, *factor, *corpus;
+        double noise, coverage;
+        struct incise_propagation_report propagated;
+        bool shared;
+    };
+    """,
+    _Stream=_Stream,
+)
 
 
 _library.prototypes(

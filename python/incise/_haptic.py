@@ -150,7 +150,9 @@ class Haptic:
             if ": warning: " in line:
                 warnings.warn(line.partition(": warning: ")[2], stacklevel=4)
         if code > 0:
-            raise Error(errno.EIO, lines[-1].partition(": ")[2] if lines else f"incise haptic: {code}")
+            raise Error(
+                errno.EIO, lines[-1].partition(": ")[2] if lines else f"incise haptic: {code}"
+            )
         if out:
             self.report = json.loads(out)
         if self._log and os.path.exists(self._log):

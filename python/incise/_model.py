@@ -11,12 +11,22 @@ import os
 import pathlib
 import tempfile
 import warnings
-from typing import TYPE_CHECKING, Any, Callable, Dict, Iterator, List, NamedTuple, Optional
-from typing import Sequence, Tuple, Union, overload
+from typing import Any, Callable, Dict, Iterator, List, NamedTuple, Optional, Sequence
+from typing import TYPE_CHECKING, Tuple, Union, overload
 
 from . import _library
-from ._library import Invalid, Struct, c_bool, c_char, c_double, c_int, c_void_p
-from ._library import PathLike, call, function, package, text
+from ._library import (
+    Invalid,
+    PathLike,
+    c_double,
+    c_int,
+    c_void_p,
+    call,
+    function,
+    package,
+    text,
+    values,
+)
 from ._producer import column_names, open_stream
 from ._recording import Recording
 from ._show import html_table, plot_model
@@ -36,85 +46,67 @@ _doubles = ctypes.POINTER(c_double)
 FIXED_ONE = 1 << 16  # 1.0 in a compiled model
 
 
-class VariableStruct(Struct, of="struct incise_variable"):
-    _fields_ = [("name", c_char * NAME_MAX), ("min", c_double), ("max", c_double)]
-
-
-class ModelInfoStruct(Struct, of="struct incise_model_info"):
-    _fields_ = [
-        ("name", c_char * NAME_MAX),
-        ("n_inputs", c_int),
-        ("n_rules", c_int),
-        ("and_method", c_int),
-        ("input", VariableStruct * INPUTS_MAX),
-        ("output", VariableStruct),
-        ("n_mfs", c_int * INPUTS_MAX),
-    ]
-
-
-class PairsStruct(Struct, of="struct incise_pairs"):
-    _fields_ = [("rows", _doubles), ("n", ctypes.c_size_t), ("n_inputs", c_int)]
-
-
-class SideStruct(Struct, of="struct incise_train_side"):
-    _fields_ = [("pairs", PairsStruct), ("groups", ctypes.POINTER(c_int)), ("n_groups", c_int)]
-
-
-class StepStruct(Struct, of="struct incise_train_step"):
-    _fields_ = [
-        ("phase", c_int),
-        ("epoch", c_int),
-        ("train_rmse", c_double),
-        ("check_rmse", c_double),
-        ("source", c_int),
-        ("sources", c_int),
-        ("resumed", c_int),
-        ("rows", ctypes.c_uint64),
-        ("total", ctypes.c_uint64),
-    ]
+VariableStruct, ModelInfoStruct, PairsStruct, SideStruct, StepStruct = _library.structs("""
+    struct incise_variable {
+        char name[64];
+        double min, max;
+    };
+    struct incise_model_info {
+        char name[64];
+        int n_inputs, n_rules, and_method;
+        struct incise_variable input[8], output;
+        int n_mfs[8];
+    };
+    struct incise_pairs {
+        double *rows;
+        uint64_t n;
+        int n_inputs;
+    };
+    struct incise_train_side {
+        struct incise_pairs pairs;
+        int *groups, n_groups;
+    };
+    struct incise_train_step {
+        int phase, epoch;
+        double train_rmse, check_rmse;
+        int source, sources, resumed;
+        uint64_t rows, total;
+    };
+    """)
 
 
 _Progress = ctypes.CFUNCTYPE(c_int, c_void_p, ctypes.POINTER(StepStruct))
 
 
-class TrainOptionsStruct(Struct, of="struct incise_train_options"):
-    _fields_ = [
-        ("epochs", c_int),
-        ("step", c_double),
-        ("ridge", c_double),
-        ("classic", c_bool),
-        ("groups", ctypes.POINTER(c_int)),
-        ("seed", ctypes.c_uint64),
-        ("progress", _Progress),
-        ("user", c_void_p),
-        ("starts", c_int),
-        ("tuned", ctypes.c_size_t),
-        ("uncertainty", ctypes.POINTER(c_void_p)),
-        ("ranges", ctypes.POINTER(VariableStruct)),
-    ]
-
-
-class TrainReportStruct(Struct, of="struct incise_train_report"):
-    _fields_ = [
-        ("epochs", c_int),
-        ("best_epoch", c_int),
-        ("ridge", c_double),
-        ("train_rmse", c_double),
-        ("check_rmse", c_double),
-        ("condition", c_double),
-        ("parameters", c_int),
-        ("rules_unfired", c_int),
-        ("train_r2", c_double),
-        ("check_r2", c_double),
-        ("crossval_rmse", c_double),
-        ("start", c_int),
-        ("pairs_tuned", ctypes.c_size_t),
-        ("unfired", c_bool * RULES_MAX),
-        ("averaged", c_int),
-        ("plane_weight", c_double),
-        ("mean_weight", c_double),
-        ("cut_weight", c_double),
-    ]
+TrainOptionsStruct, TrainReportStruct = _library.structs(
+    """
+    struct incise_train_options {
+        int epochs;
+        double step, ridge;
+        bool classic;
+        int *groups;
+        uint64_t seed;
+        _Progress progress;
+        void *user;
+        int starts;
+        size_t tuned;
+        void **uncertainty;
+        struct incise_variable *ranges;
+    };
+    struct incise_train_report {
+        int epochs, best_epoch;
+        double ridge, train_rmse, check_rmse, condition;
+        int parameters, rules_unfired;
+        double train_r2, check_r2, crossval_rmse;
+        int start;
+        size_t pairs_tuned;
+        bool unfired[256];
+        int averaged;
+        double plane_weight, mean_weight, cut_weight;
+    };
+    """,
+    _Progress=_Progress,
+)
 
 
 PHASES = ("survey", "search", "add", "solve")
@@ -166,41 +158,28 @@ class Stop:
             raise
 
 
-class BaselinesStruct(Struct, of="struct incise_baselines"):
-    _fields_ = [("mean", c_double), ("linear", c_double), ("knn", c_double), ("k", c_int)]
-
-
-class FixedOptionsStruct(Struct, of="struct incise_fixed_options"):
-    _fields_ = [("budget", c_double), ("arithmetic", c_int), ("cells", c_int)]
-
-
-class FixedInputStruct(Struct, of="struct incise_fixed_input"):
-    _fields_ = [
-        ("name", ctypes.c_char_p),
-        ("min", ctypes.c_int32),
-        ("max", ctypes.c_int32),
-        ("n_mfs", ctypes.c_int32),
-        ("cell_shift", ctypes.c_int32),
-        ("cells", ctypes.c_int32),
-        ("values", ctypes.POINTER(ctypes.c_int32)),
-    ]
-
-
-class FixedStruct(Struct, of="struct incise_fixed"):
-    _fields_ = [
-        ("arithmetic", c_int),
-        ("n_inputs", ctypes.c_int32),
-        ("n_rules", ctypes.c_int32),
-        ("shift_a", ctypes.c_int32),
-        ("shift_b", ctypes.c_int32),
-        ("bound", ctypes.c_uint64),
-        ("input", FixedInputStruct * 4),
-        ("name", ctypes.c_char_p),
-        ("output", ctypes.c_char_p),
-        ("data", c_void_p),
-        ("blob", c_void_p),
-        ("size", ctypes.c_uint32),
-    ]
+BaselinesStruct, FixedOptionsStruct, FixedInputStruct, FixedStruct = _library.structs("""
+    struct incise_baselines {
+        double mean, linear, knn;
+        int k;
+    };
+    struct incise_fixed_options {
+        double budget;
+        int arithmetic, cells;
+    };
+    struct incise_fixed_input {
+        const char *name;
+        int min, max, n_mfs, cell_shift, cells, *values;
+    };
+    struct incise_fixed {
+        int arithmetic, n_inputs, n_rules, shift_a, shift_b;
+        uint64_t bound;
+        struct incise_fixed_input input[4];
+        const char *name, *output;
+        void *data, *blob;
+        uint32_t size;
+    };
+    """)
 
 
 _path = ctypes.c_char_p
@@ -214,7 +193,7 @@ _library.prototypes(
     const struct incise_model_info *incise_model_info(const struct incise_model *model);
     void incise_model_set_clamp(struct incise_model *model, bool clamp);
     int incise_inputs_check(const struct incise_variable *inputs, int n_inputs, const double *x,
-        size_t n, size_t *outside, struct incise_error *err);
+        uint64_t n, uint64_t *outside, struct incise_error *err);
     void incise_model_eval_many(const struct incise_model *model, const double *x, size_t n,
         double *y, double *gradient);
     struct incise_uncertainty *incise_uncertainty_load(const char *path,
@@ -239,7 +218,7 @@ _library.prototypes(
     void incise_fixed_options_init(struct incise_fixed_options *options);
     double incise_fixed_eval_double(const struct incise_fixed *fx, const double *x);
     void incise_fixed_eval_batch(const struct incise_fixed *fx, const int32_t *x, int32_t *y,
-        size_t n);
+        uint64_t n);
     """,
 )
 _names = ctypes.POINTER(ctypes.c_char_p)
@@ -772,6 +751,9 @@ def baselines(fit: SideStruct, check: SideStruct, progress: Any) -> BaselinesStr
     return result
 
 
+_BASELINES = ("mean", "linear", "knn")
+
+
 def report_of(
     report: TrainReportStruct,
     pairs: int,
@@ -779,22 +761,9 @@ def report_of(
     left_out: int,
     others: Optional[BaselinesStruct],
 ) -> TrainReport:
-    return TrainReport(
-        pairs,
-        check_pairs,
-        left_out,
-        report.epochs,
-        report.ridge,
-        report.train_rmse,
-        report.check_rmse,
-        report.crossval_rmse,
-        report.condition,
-        report.parameters,
-        report.rules_unfired,
-        report.train_r2,
-        report.check_r2,
-        {"mean": others.mean, "linear": others.linear, "knn": others.knn} if others else {},
-    )
+    names = [name.replace("rms_error", "rmse") for name in TrainReport._fields[3:-1]]
+    errors = {} if others is None else {name: getattr(others, name) for name in _BASELINES}
+    return TrainReport(pairs, check_pairs, left_out, *values(report, names), errors)
 
 
 class _Training:

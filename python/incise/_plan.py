@@ -11,10 +11,9 @@ import threading
 from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple, Union
 
 from . import _library
-from ._library import Invalid, NotFound, Struct, c_bool, c_char, c_double, c_int, c_int64
-from ._library import call, function, text
-from ._library import PathLike, package
 from ._columns import Columns
+from ._library import Invalid, NotFound, PathLike, c_bool, c_double, c_int, call, function, package
+from ._library import text, values
 from ._model import CompiledModel, Model, model_file
 
 AXES_MAX, POSES_MAX = 3, 32
@@ -41,65 +40,40 @@ FLAGS = {
 }
 
 
-class SampleStruct(Struct, of="struct incise_tracker_sample"):
-    _fields_ = [
-        ("t_ns", c_int64),
-        ("seq", ctypes.c_uint64),
-        ("position_mm", c_double * 3),
-        ("quaternion", c_double * 4),
-        ("status", c_char),
-        ("station", ctypes.c_uint8),
-        ("button", c_bool),
-        ("restarted", c_bool),
-        ("after_ns", ctypes.c_uint32),
-    ]
-
-
-class TrackerStruct(Struct, of="struct incise_tracker_info"):
-    _fields_ = [
-        ("name", c_char * 64),
-        ("rate_hz", c_double),
-        ("latency_ns", c_int64),
-        ("stations", c_int),
-        ("external_sync", c_bool),
-        ("grain_ns", c_int64),
-        ("scalpel_station", ctypes.c_uint8),
-        ("tube_station", ctypes.c_uint8),
-        ("network", c_bool),
-        ("note", c_char * 300),
-        ("lost_unsure", c_bool),
-    ]
-
-
-class TickStruct(Struct, of="struct incise_tick"):
-    _fields_ = [
-        ("t_ns", c_int64),
-        ("position_mm", c_double * 3),
-        ("quaternion", c_double * 4),
-        ("tool_mm", c_double * 3),
-        ("proxy_mm", c_double * 3),
-        ("normal", c_double * 3),
-        ("depth_mm", c_double),
-        ("velocity_mm_s", c_double),
-        ("command_N", c_double * 3),
-        ("actuated_N", c_double * AXES_MAX),
-        ("rendered_N", c_double * AXES_MAX),
-        ("unfelt_N", c_double),
-        ("flags", ctypes.c_uint),
-        ("phase", c_int),
-        ("tool", c_int),
-    ]
-
-
-class DeviceStruct(Struct, of="struct incise_haptic_device"):
-    _fields_ = [
-        ("mass_kg", c_double),
-        ("damping_N_s_mm", c_double),
-        ("coulomb_N", c_double),
-        ("encoder_mm", c_double),
-        ("period_s", c_double),
-        ("delay_ticks", c_int),
-    ]
+SampleStruct, TrackerStruct, TickStruct, DeviceStruct = _library.structs("""
+    struct incise_tracker_sample {
+        int64_t t_ns;
+        uint64_t seq;
+        double position_mm[3], quaternion[4];
+        char status;
+        uint8_t station;
+        bool button, restarted;
+        uint32_t after_ns;
+    };
+    struct incise_tracker_info {
+        char name[64];
+        double rate_hz;
+        int64_t latency_ns;
+        int stations;
+        bool external_sync;
+        int64_t grain_ns;
+        uint8_t scalpel_station, tube_station;
+        bool network;
+        char note[300];
+        bool lost_unsure;
+    };
+    struct incise_tick {
+        int64_t t_ns;
+        double position_mm[3], quaternion[4], tool_mm[3], proxy_mm[3], normal[3], depth_mm;
+        double velocity_mm_s, command_N[3], actuated_N[3], rendered_N[3], unfelt_N;
+        uint32_t flags;
+        int phase, tool;
+    };
+    struct incise_haptic_device {
+        double mass_kg, damping_N_s_mm, coulomb_N, encoder_mm, period_s;
+        int delay_ticks;
+    };
+    """)
 
 
 class _Worst(ctypes.Structure):
@@ -118,45 +92,31 @@ class _Worst(ctypes.Structure):
     ]
 
 
-class _Weakest(Struct, of="struct incise_plan_weakest"):
-    _fields_ = [
-        ("margin", c_double),
-        ("along", c_double * 3),
-        ("hz", c_double),
-        ("lean_N", c_double),
-        ("depth_mm", c_double),
-        ("place_mm", c_double * 3),
-        ("tool", c_int),
-        ("held", c_int),
-        ("tilted", c_bool),
-        ("states", c_int),
-        ("paid", c_int),
-    ]
-
-
-class StabilityStruct(Struct, of="struct incise_plan_stability"):
-    _fields_ = [
-        ("device", DeviceStruct),
-        ("own_delay", c_bool),
-        ("stiffness_N_mm", c_double),
-        ("damping_N_s_mm", c_double),
-        ("late_ticks", c_int),
-        ("n_axes", c_int),
-        ("axis_late_ticks", c_int * AXES_MAX),
-        ("speed_slope_N_s_mm", c_double),
-        ("slope_N_mm", c_double),
-        ("unloading_N_mm", c_double),
-        ("support_mm", c_double),
-        ("beyond_N_mm", c_double),
-        ("runs", c_int),
-        ("ticks", c_int64),
-        ("worst", _Worst),
-        ("weakest", _Weakest),
-        ("noise_mm", c_double),
-        ("noise_N", c_double),
-        ("certified", c_bool),
-        ("acceleration_slope_N_s2_mm", c_double),
-    ]
+_Weakest, StabilityStruct = _library.structs(
+    """
+    struct incise_plan_weakest {
+        double margin, along[3], hz, lean_N, depth_mm, place_mm[3];
+        int tool, held;
+        bool tilted;
+        int states, paid;
+    };
+    struct incise_plan_stability {
+        struct incise_haptic_device device;
+        bool own_delay;
+        double stiffness_N_mm, damping_N_s_mm;
+        int late_ticks, n_axes, axis_late_ticks[3];
+        double speed_slope_N_s_mm, slope_N_mm, unloading_N_mm, support_mm, beyond_N_mm;
+        int runs;
+        int64_t ticks;
+        _Worst worst;
+        struct incise_plan_weakest weakest;
+        double noise_mm, noise_N;
+        bool certified;
+        double acceleration_slope_N_s2_mm;
+    };
+    """,
+    _Worst=_Worst,
+)
 
 
 _library.prototypes(
@@ -185,7 +145,7 @@ _library.prototypes(
     int incise_plan_tick(struct incise_plan *plan, int64_t t_ns, struct incise_tick *tick);
     int incise_plan_cause(const struct incise_plan *plan, char *text, size_t size);
     int64_t incise_plan_run(struct incise_plan *plan, const struct incise_tracker_sample *poses,
-        size_t n, int64_t start_ns, int64_t period_ns, struct incise_tick *ticks, size_t n_ticks);
+        uint64_t n, int64_t start_ns, int64_t period_ns, struct incise_tick *ticks, uint64_t n_ticks);
     """,
 )
 
@@ -380,17 +340,8 @@ class Plan:
         """Stiffness of the plan, and its margin on its device."""
         s = StabilityStruct()
         function("incise_plan_stability")(self._plan, s)
-        return Stability(
-            s.stiffness_N_mm,
-            s.damping_N_s_mm,
-            s.weakest.margin,
-            s.slope_N_mm,
-            s.unloading_N_mm,
-            s.support_mm,
-            s.runs,
-            s.worst.settle_s,
-            s.certified,
-        )
+        s.margin, s.settle_s = s.weakest.margin, s.worst.settle_s
+        return Stability(*values(s, Stability._fields))
 
     def set_tool(self, tool: str) -> None:
         """Say what the hand holds: auto, blade, handle or tube. It changes out of the tissue."""
@@ -437,20 +388,7 @@ class Plan:
         rc = function("incise_plan_tick")(self._plan, t_ns, tick)
         if rc < 0:
             self._fail(rc)
-        return Tick(
-            tick.t_ns,
-            tuple(tick.position_mm),
-            tuple(tick.quaternion),
-            tuple(tick.tool_mm),
-            tuple(tick.proxy_mm),
-            tuple(tick.normal),
-            tick.depth_mm,
-            tick.velocity_mm_s,
-            tuple(tick.command_N),
-            tick.flags,
-            PHASES[tick.phase],
-            TOOLS[tick.tool],
-        )
+        return Tick(*values(tick, Tick._fields[:-2]), PHASES[tick.phase], TOOLS[tick.tool])
 
     def run(self, poses: Any, *, arrival: Optional[str] = None) -> Columns:
         """Run the whole stroke in one C call; needs numpy.

@@ -8,24 +8,12 @@ import errno
 import math
 import os
 import threading
-from typing import Any, Dict, Iterator, NamedTuple, Optional, Tuple
+from typing import Any, Dict, NamedTuple, Optional, Tuple
 
 from . import _library
 from ._arrow import Table
-from ._library import (
-    ArrowArrayStream,
-    CalibrationStruct,
-    Error,
-    ExportOptions,
-    FrameStruct,
-    Invalid,
-    PathLike,
-    RecordingInfo,
-    call,
-    function,
-    package,
-    text,
-)
+from ._library import ArrowArrayStream, CalibrationStruct, Error, ExportOptions, FrameStruct
+from ._library import Invalid, PathLike, RecordingInfo, call, function, package, values
 from ._show import html_table
 from ._wall import Wall
 from ._wall import read as read_wall
@@ -109,16 +97,6 @@ class Info(NamedTuple):
     force_max_N: float
     newtons: bool  #: the force channel measures N: full_scale_V and offset_V are in N
     streams: Tuple[Stream, ...]
-
-
-def _values(struct: ctypes.Structure, names: Tuple[str, ...]) -> Iterator[Any]:
-    for name in names:
-        value = getattr(struct, name)
-        if isinstance(value, bytes):
-            value = text(value)
-        elif isinstance(value, ctypes.Array) and not isinstance(value, bytes):
-            value = tuple(value)
-        yield value
 
 
 class Frame(NamedTuple):
@@ -272,9 +250,9 @@ class Recording:
         with self._lock:
             call("incise_recording_info", self._open(), struct)
         streams = tuple(
-            Stream(*_values(struct.streams[i], Stream._fields)) for i in range(struct.n_streams)
+            Stream(*values(struct.streams[i], Stream._fields)) for i in range(struct.n_streams)
         )
-        return Info(*_values(struct, Info._fields[:-1]), streams)
+        return Info(*values(struct, Info._fields[:-1]), streams)
 
     @property
     def wall(self) -> Optional[Wall]:
@@ -356,7 +334,9 @@ class Recording:
                     limits["from_s"], limits["to_s"] = self._span(limits.pop("cut"))
             if between is not None:
                 limits["from_s"], limits["to_s"] = _times(*between)
-                label += f", {between[0]} s to {'its end' if between[1] is None else f'{between[1]} s'}"
+                label += (
+                    f", {between[0]} s to {'its end' if between[1] is None else f'{between[1]} s'}"
+                )
             return self._whole(what, label, limits)
 
         struct = ExportOptions()

@@ -7,11 +7,10 @@ import contextlib
 import ctypes
 import errno
 import os
-from typing import Any, Iterator, List, NamedTuple, Tuple, Union
+from typing import Any, Iterator, List, NamedTuple, Optional, Tuple
 
 from . import _library
-from ._library import Invalid, Struct, c_bool, c_char, c_char_p, c_int, c_int64, c_uint64, c_void_p
-from ._library import call, function, text
+from ._library import Invalid, PathLike, c_char_p, c_int, c_void_p, call, function, text, values
 
 KINDS = (
     "lost",
@@ -31,130 +30,99 @@ VERDICTS = ("unchecked", "good", "bad")
 _ROWS, _ALL = 2, 3  # enum incise_prove_level
 
 
-class FindingStruct(Struct, of="struct incise_verify_finding"):
-    _fields_ = [
-        ("kind", c_int),
-        ("stream", c_char_p),
-        ("first_block", c_int64),
-        ("last_block", c_int64),
-        ("first_seq", c_int64),
-        ("last_seq", c_int64),
-        ("first_ns", c_int64),
-        ("last_ns", c_int64),
-        ("count", c_uint64),
-        ("text", c_char_p),
-    ]
-
-
-class StreamStruct(Struct, of="struct incise_verify_stream"):
-    _fields_ = [
-        ("name", c_char * 16),
-        ("expected", c_uint64),
-        ("present", c_uint64),
-        ("lost", c_uint64),
-        ("lost_at_capture", c_uint64),
-        ("blocks", c_uint64),
-        ("altered", c_uint64),
-    ]
-
-
-class FramesStruct(Struct, of="struct incise_verify_frames"):
-    _fields_ = [
-        ("checked", c_bool),
-        ("present", c_uint64),
-        ("missing", c_uint64),
-        ("altered", c_uint64),
-        ("extra", c_uint64),
-        ("ahead", c_uint64),
-    ]
-
-
-class ReportStruct(Struct, of="struct incise_verify_report"):
-    _fields_ = [
-        ("complete", c_bool),
-        ("intact", c_bool),
-        ("unverified", c_bool),
-        ("interrupted", c_bool),
-        ("findings", c_uint64),
-        ("n_streams", c_int),
-        ("streams", StreamStruct * 3),
-        ("frames", FramesStruct),
-        ("sealed", ctypes.c_bool),
-        ("commits", ctypes.c_uint64),
-    ]
+FindingStruct, StreamStruct, FramesStruct, ReportStruct = _library.structs("""
+    struct incise_verify_finding {
+        int kind;
+        const char *stream;
+        int64_t first_block, last_block, first_seq, last_seq, first_ns, last_ns;
+        uint64_t count;
+        const char *text;
+    };
+    struct incise_verify_stream {
+        char name[16];
+        uint64_t expected, present, lost, lost_at_capture, blocks, altered;
+    };
+    struct incise_verify_frames {
+        bool checked;
+        uint64_t present, missing, altered, extra, ahead;
+    };
+    struct incise_verify_report {
+        bool complete, intact, unverified, interrupted;
+        uint64_t findings;
+        int n_streams;
+        struct incise_verify_stream streams[3];
+        struct incise_verify_frames frames;
+        bool sealed;
+        uint64_t commits;
+    };
+    """)
 
 
 _Found = ctypes.CFUNCTYPE(None, c_void_p, ctypes.POINTER(FindingStruct))
 _Progress = ctypes.CFUNCTYPE(c_int, c_void_p, ctypes.c_double)
 
 
-class WatchStruct(Struct, of="struct incise_verify_watch"):
-    _fields_ = [("found", _Found), ("progress", _Progress), ("user", c_void_p)]
+(WatchStruct,) = _library.structs(
+    """
+    struct incise_verify_watch {
+        _Found found;
+        _Progress progress;
+        void *user;
+    };
+    """,
+    _Found=_Found,
+    _Progress=_Progress,
+)
 
 
 _Write = ctypes.CFUNCTYPE(c_int, c_void_p, c_char_p)
 
 
-class OptionsStruct(Struct, of="struct incise_prove_options"):
-    _fields_ = [
-        ("level", c_int),
-        ("signers", c_char_p),
-        ("revoked", c_char_p),
-        ("authorities", c_char_p),
-        ("watch", ctypes.POINTER(WatchStruct)),
-        ("key", c_char_p),
-        ("timestamp", c_char_p),
-        ("recorded", c_bool),
-        ("renew", c_bool),
-        ("write", _Write),
-        ("user", c_void_p),
-    ]
-
-
-class VoucherStruct(Struct, of="struct incise_proof_voucher"):
-    _fields_ = [
-        ("file", c_char * 100),
-        ("kind", c_int),
-        ("statement", c_int),
-        ("verdict", c_int),
-        ("made", c_bool),
-        ("by", c_char * 300),
-        ("key", c_char * 160),
-        ("utc", c_char * 32),
-        ("t_s", c_int64),
-        ("why", c_char * 500),
-    ]
-
-
-class HeadStruct(Struct, of="struct incise_seal_head"):
-    _fields_ = [("commit", c_int64), ("t_ns", c_int64), ("head", c_char * 65)]
-
-
-class SealStruct(Struct, of="struct incise_proof_seal"):
-    _fields_ = [
-        ("path", c_char_p),
-        ("join", c_bool),
-        ("identity", c_char * 33),
-        ("head", HeadStruct),
-        ("why", c_char * 200),
-        ("n_statements", c_int),
-        ("n_vouchers", c_int),
-        ("statements", c_void_p),
-        ("vouchers", ctypes.POINTER(VoucherStruct)),
-        ("signatures", c_int),
-        ("timestamps", c_int),
-        ("vouched", c_bool),
-        ("bad", c_int),
-    ]
-
-
-class ProofStruct(Struct, of="struct incise_proof"):
-    _fields_ = [
-        ("report", ReportStruct),
-        ("altered", c_char * 400),
-        ("n", c_int),
-        ("seals", ctypes.POINTER(SealStruct)),
-    ]
+OptionsStruct, VoucherStruct, HeadStruct, SealStruct, ProofStruct = _library.structs(
+    """
+    struct incise_prove_options {
+        int level;
+        const char *signers, *revoked, *authorities;
+        struct incise_verify_watch *watch;
+        const char *key, *timestamp;
+        bool recorded, renew;
+        _Write write;
+        void *user;
+    };
+    struct incise_proof_voucher {
+        char file[100];
+        int kind, statement, verdict;
+        bool made;
+        char by[300], key[160], utc[32];
+        int64_t t_s;
+        char why[500];
+    };
+    struct incise_seal_head {
+        int64_t commit, t_ns;
+        char head[65];
+    };
+    struct incise_proof_seal {
+        const char *path;
+        bool join;
+        char identity[33];
+        struct incise_seal_head head;
+        char why[200];
+        int n_statements, n_vouchers;
+        void *statements;
+        struct incise_proof_voucher *vouchers;
+        int signatures, timestamps;
+        bool vouched;
+        int bad;
+    };
+    struct incise_proof {
+        struct incise_verify_report report;
+        char altered[400];
+        int n;
+        struct incise_proof_seal *seals;
+    };
+    """,
+    _Write=_Write,
+)
 
 
 _library.prototypes(
@@ -223,24 +191,13 @@ class Report(NamedTuple):
 
 
 @contextlib.contextmanager
-def _proved(
-    path: Union[str, "os.PathLike[str]"], level: int, found: List[Finding], *trust: Any
-) -> Iterator[ProofStruct]:
+def _proved(path: PathLike, level: int, found: List[Finding], *trust: Any) -> Iterator[ProofStruct]:
     """What incise_prove() says. Ctrl-C ends it."""
     stop: List[bool] = []
 
     def on_found(user: Any, pointer: Any) -> None:
         finding = pointer.contents
-        found.append(
-            Finding(
-                KINDS[finding.kind],
-                text(finding.stream or b""),
-                finding.first_seq,
-                finding.last_seq,
-                finding.count,
-                text(finding.text or b""),
-            )
-        )
+        found.append(Finding(KINDS[finding.kind], *values(finding, Finding._fields[1:])))
 
     watch = WatchStruct(_Found(on_found), _Progress(lambda user, share: len(stop)), None)
     files = [None if file is None else _library.path_bytes(file) for file in trust]
@@ -259,53 +216,32 @@ def _proved(
 
 def _seal(seal: SealStruct) -> Seal:
     vouchers = tuple(
-        Voucher(
-            text(one.file),
-            one.statement,
-            VERDICTS[one.verdict],
-            text(one.by),
-            text(one.key),
-            text(one.utc),
-            text(one.why),
-        )
+        Voucher(*values(one, Voucher._fields))._replace(verdict=VERDICTS[one.verdict])
         for one in seal.vouchers[: seal.n_vouchers]
     )
     return Seal(text(seal.path), seal.vouched, seal.bad, vouchers)
 
 
 def verify(
-    path: Union[str, "os.PathLike[str]"],
-    signers: Union[None, str, "os.PathLike[str]"] = None,
-    revoked: Union[None, str, "os.PathLike[str]"] = None,
-    authorities: Union[None, str, "os.PathLike[str]"] = None,
+    path: PathLike,
+    signers: Optional[PathLike] = None,
+    revoked: Optional[PathLike] = None,
+    authorities: Optional[PathLike] = None,
 ) -> Report:
     """Verify a recording as `incise verify` does, with its options --signers, --revoked and --ca."""
     found: List[Finding] = []
     with _proved(path, _ALL, found, signers, revoked, authorities) as proof:
         report = proof.report
-        streams = tuple(
-            StreamReport(
-                text(stream.name),
-                stream.expected,
-                stream.present,
-                stream.lost,
-                stream.lost_at_capture,
-                stream.altered,
-            )
-            for stream in report.streams[: report.n_streams]
-        )
+        streams = report.streams[: report.n_streams]
         return Report(
-            report.complete,
-            report.intact,
-            report.unverified,
-            report.interrupted,
-            streams,
+            *values(report, Report._fields[:4]),
+            tuple(StreamReport(*values(stream, StreamReport._fields)) for stream in streams),
             tuple(found),
             tuple(_seal(seal) for seal in proof.seals[: proof.n]),
         )
 
 
-def check_rows(path: Union[str, "os.PathLike[str]"]) -> None:
+def check_rows(path: PathLike) -> None:
     """Raise :class:`incise.Invalid` unless the rows are those that were recorded."""
     with _proved(path, _ROWS, []) as proof:
         altered = text(proof.altered)

@@ -10,25 +10,20 @@ import os
 from typing import NamedTuple, Optional, Tuple
 
 from . import _library
-from ._library import Handle, Invalid, Struct, call, function, text
+from ._library import Handle, Invalid, call, function, values
 
 _UNKNOWN = 2**63 - 1
 
 
-class WallPointStruct(Struct, of="struct incise_wall_point"):
-    _fields_ = [
-        ("t_ns", ctypes.c_int64),
-        ("tai_ns", ctypes.c_int64),
-        ("uncertainty_ns", ctypes.c_double),
-        ("rate_ppb", ctypes.c_double),
-        ("rate_uncertainty_ppb", ctypes.c_double),
-        ("utc_offset_s", ctypes.c_int),
-        ("held", ctypes.c_bool),
-        ("source", ctypes.c_char * 24),
-        ("reference", ctypes.c_char * 24),
-        ("leap", ctypes.c_char * 24),
-        ("restart", ctypes.c_char * 24),
-    ]
+(WallPointStruct,) = _library.structs("""
+    struct incise_wall_point {
+        int64_t t_ns, tai_ns;
+        double uncertainty_ns, rate_ppb, rate_uncertainty_ppb;
+        int utc_offset_s;
+        bool held;
+        char source[24], reference[24], leap[24], restart[24];
+    };
+    """)
 
 
 _library.prototypes(
@@ -83,15 +78,7 @@ class Wall:
         """All readings, in order."""
         points = ctypes.POINTER(WallPointStruct)()
         n = function("incise_wall_points")(self._handle, ctypes.byref(points))
-        return tuple(
-            WallPoint(
-                *(
-                    text(value) if isinstance(value, bytes) else value
-                    for value in (getattr(points[i], name) for name in WallPoint._fields)
-                )
-            )
-            for i in range(n)
-        )
+        return tuple(WallPoint(*values(point, WallPoint._fields)) for point in points[:n])
 
     def _convert(self, name: str, what: str, time_ns: int) -> Tuple[int, float]:
         result, bound = ctypes.c_int64(), ctypes.c_int64()

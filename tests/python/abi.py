@@ -57,13 +57,12 @@ def program():
     for name, struct in found.items():
         lines.append(f'\tHOLDS("{name}", sizeof({name}), {ctypes.sizeof(struct)});')
         for field, *_ in struct._fields_:
-            c_field = getattr(struct, "c_fields", {}).get(field, field)
             place = getattr(struct, field)
             lines.append(
-                f'\tHOLDS("{name} {c_field}", offsetof({name}, {c_field}), {place.offset});'
+                f'\tHOLDS("{name} {field}", offsetof({name}, {field}), {place.offset});'
             )
             lines.append(
-                f'\tHOLDS("{name} {c_field}, size", sizeof((({name} *)0)->{c_field}), {place.size});'
+                f'\tHOLDS("{name} {field}, size", sizeof((({name} *)0)->{field}), {place.size});'
             )
             count += 1
     lines.append(f'\tif (!bad) puts("{len(found)} structs, {count} fields");')
