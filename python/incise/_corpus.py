@@ -230,7 +230,7 @@ def train_sources(
         model._notes = trained.notes
         trained.model = trained.uncertainty = None
         known = not math.isnan(trained.coverage)
-        model.report = report_of(
+        model._report = report_of(
             trained.report,
             trained.pairs,
             trained.check_pairs,

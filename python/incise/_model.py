@@ -15,18 +15,8 @@ from typing import Any, Callable, Dict, Iterator, List, NamedTuple, Optional, Se
 from typing import TYPE_CHECKING, Tuple, Union, overload
 
 from . import _library
-from ._library import (
-    Invalid,
-    PathLike,
-    c_double,
-    c_int,
-    c_void_p,
-    call,
-    function,
-    package,
-    text,
-    values,
-)
+from ._library import Invalid, PathLike, c_double, c_int, c_void_p, call, function, package
+from ._library import text, values
 from ._producer import column_names, open_stream
 from ._recording import Recording
 from ._show import html_table, plot_model
@@ -38,7 +28,8 @@ if TYPE_CHECKING:
 
     Point = Union[Tuple[float, ...], List[float], Dict[str, float]]
     Array = NDArray[Any]
-    Yes, No = Literal[True], Literal[False]
+    Yes = Literal[True]
+    No = Literal[False]
 
 INPUTS_MAX, RULES_MAX, NAME_MAX = 8, 256, 64
 _doubles = ctypes.POINTER(c_double)
@@ -503,7 +494,7 @@ class Model:
     def _own(self, pointer: int) -> None:
         self._pointer = _library.Handle(pointer, "incise_model_free")
         self._set_uncertainty(None)
-        self.report: Optional[TrainReport] = None  #: of the training, if it was trained here
+        self._report: Optional[TrainReport] = None
         self._notes = b""  # of a training from many sources: version, options and sources
 
     @classmethod
@@ -523,7 +514,7 @@ class Model:
             self.save(path)
             files = (pathlib.Path(path), pathlib.Path(path + ".sd"))
             texts = [file.read_bytes() if file.exists() else None for file in files]
-        return _model_of_bytes, (*texts, self.report, self._notes)
+        return _model_of_bytes, (*texts, self._report, self._notes)
 
     def __repr__(self) -> str:
         inputs = ", ".join(variable.name for variable in self.inputs)
@@ -551,6 +542,13 @@ class Model:
     def n_rules(self) -> int:
         """Rules."""
         return self._info().n_rules
+
+    @property
+    def report(self) -> TrainReport:
+        """Report of the training that made it."""
+        if self._report is None:
+            raise Invalid(errno.EINVAL, "the model is of a file; a report comes of incise.train()")
+        return self._report
 
     @property
     def noise(self) -> float:
@@ -662,7 +660,7 @@ def _model_of_bytes(
         if sd is not None:
             path.with_suffix(".fis.sd").write_bytes(sd)
         model = Model(path)
-    model.report, model._notes = report, notes
+    model._report, model._notes = report, notes
     return model
 
 
@@ -826,8 +824,9 @@ def _table_of(
     names = column_names(x)
     if group is None and names and "cut" in names:
         group = "cut"
+    column = group if isinstance(group, str) else None
     if names and inputs is None:
-        inputs = [str(name) for name in names if name != group]
+        inputs = [str(name) for name in names if name != column]
     try:
         if not names:
             x = numpy.asarray(x, numpy.float64)
@@ -835,14 +834,16 @@ def _table_of(
             if inputs is None or x.ndim != 2 or x.shape[1] != len(inputs):
                 raise ValueError(f"X has the shape {x.shape}; name its columns by inputs=(…)")
             x = {name: x[:, i] for i, name in enumerate(inputs)}
-        table = {name: numpy.asarray(x[name], numpy.float64) for name in inputs}
         name = getattr(y, "name", None)
         target = target or (name if isinstance(name, str) else _TARGET)
+        table = {name: numpy.asarray(x[name], numpy.float64) for name in inputs}
         table[target] = numpy.asarray(y, numpy.float64).reshape(-1)
-        if group is not None and group != "none":
-            table["group"] = numpy.asarray(x[group] if isinstance(group, str) else group)
+        if group is not None and column != "none":
+            table["group"] = numpy.asarray(x[column] if column else group)
             group = "group"
-    except (TypeError, ValueError, KeyError, IndexError) as failure:
+    except KeyError as missing:
+        raise Invalid(errno.EINVAL, f"train(X, y): X has no column {missing}") from None
+    except (TypeError, ValueError, IndexError) as failure:
         raise Invalid(errno.EINVAL, f"train(X, y): {failure}") from None
     return table, inputs, target, group
 
@@ -940,7 +941,7 @@ def train(
     def learn() -> Model:
         model = Model._of(start(training.fit.pairs, names, _mf_types[mf_type], counts, options))
         report = training.run(model)
-        model.report = report_of(
+        model._report = report_of(
             report,
             training.fit.pairs.n,
             training.check.pairs.n,
