@@ -413,9 +413,9 @@ class Table(Tabular):
         """Write all rows to a Parquet file, with units and provenance, in bounded memory; needs pyarrow.
 
         The file appears when it is complete."""
+        name = os.fsdecode(_library.new_path(path, ".parquet", overwrite))
         pyarrow = package("pyarrow", "Parquet")
         parquet = package("pyarrow.parquet", "Parquet")
-        name = os.fsdecode(_library.new_path(path, ".parquet", overwrite))
         part = name + ".part"
         try:
             reader = pyarrow.RecordBatchReader.from_stream(self)

@@ -112,7 +112,7 @@ def capture(
             f"found {duration_s!r}, {trigger_force_N!r}",
         )
     result, stop = ResultStruct(), c_int(0)
-    name = path_bytes(path)
+    name = _library.new_path(path, ".rec")
     doubts: List[str] = []
 
     def on_doubt(context: Any, line: bytes) -> None:

@@ -146,13 +146,13 @@ class Haptic:
     def _read(self, out: str, lines: List[str]) -> None:
         """The report and the ticks."""
         code = self._process.returncode
+        prefix = "incise haptic: "
         for line in lines:
-            if ": warning: " in line:
-                warnings.warn(line.partition(": warning: ")[2], stacklevel=4)
+            if line.startswith(prefix + "warning: "):
+                warnings.warn(line.partition("warning: ")[2], stacklevel=4)
         if code > 0:
-            raise Error(
-                errno.EIO, lines[-1].partition(": ")[2] if lines else f"incise haptic: {code}"
-            )
+            said = [line[len(prefix) :] for line in lines if line.startswith(prefix)]
+            raise Error(errno.EIO, said[-1] if said else f"incise haptic ended with {code}")
         if out:
             self.report = json.loads(out)
         if self._log and os.path.exists(self._log):

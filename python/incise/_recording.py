@@ -290,11 +290,12 @@ class Recording:
     def between(self, from_s: float = 0, to_s: Optional[float] = None) -> "Recording":
         """The recording with tables from from_s to before to_s, seconds from its first force sample;
         its info stays that of the whole."""
+        _times(from_s, to_s)
         return self._part(between=(from_s, to_s))
 
     def cut(self, number: int) -> "Recording":
         """The recording with the tables of one cut, from 1; its info stays that of the whole."""
-        return self._part(cut=number)
+        return self._part(cut=_cut_number(number))
 
     def _span(self, number: int) -> Tuple[float, float]:
         """Where a cut begins and ends, in seconds."""

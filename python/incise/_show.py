@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import html
+import re
 from typing import Any, Iterable, Optional, Sequence, Tuple
 
 from ._columns import Tabular, unit_of
@@ -63,7 +64,7 @@ def plot_columns(table: Any, names: Sequence[str], ax: Any) -> Any:
     seconds = table.seconds(arrays)
     if seconds is None and not names and {"depth_mm", "velocity_mm_s", "force_N"} <= set(flat):
         return _plot_pairs(table, arrays, ax)
-    chosen = [n for n in flat if any(n == name or n.startswith(name + "_") for name in names)]
+    chosen = [n for n in flat if n in names or re.sub("_[wxyz0-9]$", "", n) in names]
     if not names:
         chosen = [name for name, (_, unit) in flat.items() if unit in ("N", "mm")]
         chosen = [name for name in chosen if "_u_" not in name and "_sd_" not in name]
