@@ -52,6 +52,7 @@ VariableStruct, ModelInfoStruct, PairsStruct, SideStruct, StepStruct = _library.
         double *rows;
         uint64_t n;
         int n_inputs;
+        const double *weights;
     };
     struct incise_train_side {
         struct incise_pairs pairs;
@@ -848,6 +849,23 @@ def _table_of(
     return table, inputs, target, group
 
 
+def _weighed(table: Dict[str, Any], weights: Sequence[float]) -> Tuple[Dict[str, Any], Any]:
+    """The rows that count, and their weights."""
+    numpy = package("numpy", "sample_weight")
+    rows = len(next(iter(table.values())))
+    found = numpy.asarray(weights, numpy.float64)
+    if found.shape not in ((), (rows,)):
+        raise Invalid(
+            errno.EINVAL, f"sample_weight: expected one for each row, found {found.size} for {rows}"
+        )
+    found = numpy.broadcast_to(found, rows)
+    if not (numpy.isfinite(found).all() and (found >= 0).all()):
+        raise Invalid(errno.EINVAL, "sample_weight: expected finite numbers, 0 or more")
+    if not found.any():
+        raise Invalid(errno.EINVAL, "sample_weight: all are zero; no row counts")
+    return {name: values[found > 0] for name, values in table.items()}, found[found > 0]
+
+
 def train(
     data: Any,
     y: Any = None,
@@ -855,6 +873,7 @@ def train(
     inputs: Optional[Sequence[str]] = None,
     target: Optional[str] = None,
     group: Union[str, Sequence[Any], None] = None,
+    sample_weight: Optional[Sequence[float]] = None,
     check: float = 0,
     seed: int = 1,
     mf: Union[str, Sequence[int], None] = None,
@@ -895,6 +914,7 @@ def train(
     group: column that names the cut, or with y the cut of each row; cross-validation and check keep whole cuts together. In a list
     also "recording" or "rig"; cuts of different sources are different ones. Without it data are
     grouped by "cut" where all have it; "none" takes each row by itself.
+    sample_weight: of each row of X, 0 or more: one of weight 2 counts as two; without check.
     check: share that is kept back, 0 to 1; its error is in ``model.report``.
     mf: membership functions of each input (default 5, 4; else 3 each), or "auto".
     classic: the method of MATLAB's anfis; not for a list.
@@ -906,8 +926,13 @@ def train(
         raise Invalid(errno.EINVAL, f"mf_type={mf_type!r}: gaussmf or gbellmf")
     if not 0 <= check < 1:
         raise Invalid(errno.EINVAL, f"check={check!r}: a share from 0 to below 1")
+    weights = None
     if y is not None:
         data, inputs, target, group = _table_of(data, y, inputs, target, group)
+        if sample_weight is not None:
+            data, weights = _weighed(data, sample_weight)
+    if sample_weight is not None and (y is None or check):
+        raise Invalid(errno.EINVAL, "sample_weight: only of rows of X and y, and without check")
     inputs = inputs or _INPUTS
     names = [*inputs, target or _TARGET]
     if group is not None and not isinstance(group, str):
@@ -937,6 +962,8 @@ def train(
     )
     stop = Stop(options, progress)
     training = _Training(dataset, check, options)
+    if weights is not None:
+        training.fit.pairs.weights = (c_double * len(weights))(*weights)
 
     def learn() -> Model:
         model = Model._of(start(training.fit.pairs, names, _mf_types[mf_type], counts, options))

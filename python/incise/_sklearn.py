@@ -55,8 +55,9 @@ class ForceRegressor(RegressorMixin, BaseEstimator):
         self.starts = starts
         self.seed = seed
 
-    def fit(self, X: Any, y: Any, groups: Any = None) -> "ForceRegressor":
-        """Learn; groups: the cut of each row, which cross-validation keeps together.
+    def fit(self, X: Any, y: Any, groups: Any = None, sample_weight: Any = None) -> "ForceRegressor":
+        """Learn; groups: the cut of each row, which cross-validation keeps together;
+        sample_weight: a row of weight 2 counts as two.
 
         The model's names are those of the columns of a DataFrame and of a Series y."""
         target = getattr(y, "name", None)
@@ -72,6 +73,7 @@ class ForceRegressor(RegressorMixin, BaseEstimator):
             inputs=[str(name) for name in names],
             target=target if isinstance(target, str) else "y",
             group=groups,
+            sample_weight=sample_weight,
             seed=self.seed,
             mf=self.mf,
             mf_type=self.mf_type,

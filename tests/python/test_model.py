@@ -528,6 +528,8 @@ class Estimator(Case):
                 "check_estimators_dtypes",
                 "check_supervised_y_2d",
                 "check_regressors_no_decision_function",
+                "check_all_zero_sample_weights_error",
+                "check_sample_weight_equivalence_on_dense_data",
             },
         )
 

@@ -88,6 +88,12 @@ train(X[:, 0], y)                                   !! name its columns by input
 train(X, y[:-1])                                    !! different lengths
 train(X, y, group="cut")                            !! train(X, y): X has no column 'cut'
 train(X, y, group=cut)                              -> force_N of depth_mm, velocity_mm_s
+train(X, y, sample_weight=1)((5, 20)) == train(X, y)((5, 20))  -> True
+train(X, y, sample_weight=weight)                   -> force_N of depth_mm, velocity_mm_s
+train(X, y, sample_weight=0 * y)                    !! sample_weight: all are zero
+train(X, y, sample_weight=[1, 2])                   !! sample_weight: expected one for each row, found 2
+train(X, y, sample_weight=-1)                       !! sample_weight: expected finite numbers, 0 or more
+train(columns, sample_weight=weight)                !! only of rows of X and y
 train(X, None)                                      !! a ndarray is no table
 train(columns)                                      -> force_N of depth_mm, velocity_mm_s
 train(columns, target="force")                      !! no column 'force'
@@ -150,7 +156,7 @@ class Typed(Case):
             "incise": incise, "rec": rec, "fis": fis, "model": incise.Model(fis), "columns": columns,
             "plan": incise.Plan("liver"), "train": train, "loop": loop, "steps": [],
             "X": numpy.column_stack((columns["depth_mm"], columns["velocity_mm_s"])),
-            "y": columns["force_N"], "cut": columns["cut"], "nan": numpy.nan, "inf": numpy.inf,
+            "y": columns["force_N"], "cut": columns["cut"], "weight": numpy.where(columns["force_N"] < 1, 10.0, 0.1), "nan": numpy.nan, "inf": numpy.inf,
             "name": lambda n: list(dict.fromkeys(rec.pairs()["cut"]))[n - 1],
             "axis": lambda: None,
             "regressor": lambda X, y: incise.ForceRegressor(mf=(2, 2), starts=1, epochs=1).fit(X, y),
