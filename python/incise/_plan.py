@@ -19,25 +19,12 @@ from ._model import CompiledModel, Model, model_file
 AXES_MAX, POSES_MAX = 3, 32
 PHASES = ("free", "cutting", "insertion")
 TOOLS = ("auto", "blade", "handle", "tube")
-#: Bits of a tick's flags, in order; see incise/tick_flags.h.
-FLAGS = {
-    "contact": 1,
-    "extrapolated": 2,
-    "stale": 4,
-    "clamped": 8,
-    "fault": 16,
-    "slewed": 32,
-    "travel": 64,
-    "unpaid": 128,
-    "starting": 256,
-    "not_finite": 512,
-    "unusable": 1024,
-    "in_cut": 2048,
-    "membrane": 4096,
-    "lumen": 8192,
-    "back_wall": 16384,
-    "full": 32768,
-}
+_FLAGS = """
+    contact extrapolated stale clamped fault slewed travel unpaid starting not_finite unusable in_cut
+    membrane lumen back_wall full
+"""
+#: Bits of a tick's flags, {name: value}; see incise/tick_flags.h.
+FLAGS = {name: 1 << bit for bit, name in enumerate(_FLAGS.split())}
 
 
 SampleStruct, TrackerStruct, TickStruct, DeviceStruct = _library.structs("""

@@ -55,7 +55,9 @@ class ForceRegressor(RegressorMixin, BaseEstimator):
         self.starts = starts
         self.seed = seed
 
-    def fit(self, X: Any, y: Any, groups: Any = None, sample_weight: Any = None) -> "ForceRegressor":
+    def fit(
+        self, X: Any, y: Any, groups: Any = None, sample_weight: Any = None
+    ) -> "ForceRegressor":
         """Learn; groups: the cut of each row, which cross-validation keeps together;
         sample_weight: a row of weight 2 counts as two.
 

@@ -12,20 +12,9 @@ from typing import Any, Iterator, List, NamedTuple, Optional, Tuple
 from . import _library
 from ._library import Invalid, PathLike, c_char_p, c_int, c_void_p, call, function, text, values
 
-KINDS = (
-    "lost",
-    "altered",
-    "ledger",
-    "extra",
-    "count",
-    "interrupted",
-    "frames",
-    "unverified",
-    "damaged",
-    "ended",
-    "times",
-    "seal",
-)
+KINDS = """
+    lost altered ledger extra count interrupted frames unverified damaged ended times seal
+""".split()
 VERDICTS = ("unchecked", "good", "bad")
 _ROWS, _ALL = 2, 3  # enum incise_prove_level
 
