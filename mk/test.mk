@@ -200,7 +200,7 @@ check-python: all $(O)/tests/sql ## tests of incise for Python on libraries unde
 	+@$(MAKE) --no-print-directory O=$(O)/check $(sanitized) libs
 	cd tests/python && INCISE_BUILD=$(abspath $(O)) INCISE_LIBDIR=$(abspath $(O))/check/lib \
 		LD_PRELOAD=$$($(CC) -print-file-name=libasan.so) ASAN_OPTIONS=detect_leaks=0 \
-		PYTHONPATH=../../python PYTHONDONTWRITEBYTECODE=1 \
+		PATH=$(abspath $(O))/bin:$$PATH PYTHONPATH=../../python PYTHONDONTWRITEBYTECODE=1 \
 		/usr/bin/python3 -m unittest test_recording test_model test_plan test_names test_typed
 
 # Threads that share memory without a lock, under ThreadSanitizer; what is not of the page
@@ -229,7 +229,7 @@ doc: ## reference of the public headers in build/doc/html; fails where a comment
 	@mk/doc $(abspath $(O))/doc $(version)
 	@cd $(O)/doc/html && PYTHONPATH=$(abspath python) PYTHONDONTWRITEBYTECODE=1 \
 		python3 -m pydoc -w incise $(patsubst python/incise/%.py,incise.%,$(filter-out \
-		python/incise/_% python/incise/sklearn.py,$(wildcard python/incise/*.py))) >/dev/null
+		python/incise/_%,$(wildcard python/incise/*.py))) >/dev/null
 	@echo $(O)/doc/html/index.html and $(O)/doc/html/incise.html, of incise for Python
 
 # The documents of the notebooks, with figures; tests only run the code.

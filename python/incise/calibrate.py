@@ -14,6 +14,13 @@ from typing import Any, Dict, List, NamedTuple, Sequence, Tuple
 from . import _library
 from ._library import Invalid, c_double, call, function, values
 
+__all__ = ["Depth", "Force", "Part", "Tip", "depth", "force", "gravity", "tip"]
+
+
+def __dir__() -> List[str]:
+    return __all__
+
+
 (
     ForcePairStruct,
     ForceSetupStruct,

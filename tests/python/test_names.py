@@ -42,6 +42,13 @@ class Names(unittest.TestCase):
         names = [name for name in sorted(incise.__all__) if callable(getattr(incise, name))]
         self.assertEqual(done.stdout.split(), names)
 
+    def test_what_is_public_is_listed(self):
+        self.assertEqual(dir(incise), sorted([*incise.__all__, "ForceRegressor"]))
+        self.assertEqual(dir(incise.calibrate), sorted(incise.calibrate.__all__))
+        modules = [name for name in dir(incise) if isinstance(vars(incise).get(name), type(sys))]
+        self.assertEqual(modules, ["calibrate"])
+        self.assertEqual(incise.Model.__module__, "incise")
+
     def test_a_class_takes_a_path(self):
         fis = str(pathlib.Path(__file__).parents[2] / "scenes" / "liver.fis")
         self.assertEqual(incise.Model(fis)((5, 20)), incise.load(fis)((5, 20)))
