@@ -67,16 +67,15 @@ class ColumnStream:
         return kept
 
     def _column(self, i, name, values):
-        if hasattr(values, "tolist") and getattr(values, "dtype", None) is not None:
-            numbers = values.dtype.kind in "biuf"
-        else:
-            numbers = all(isinstance(value, (int, float)) for value in values)
-        if numbers:
+        kind = getattr(getattr(values, "dtype", None), "kind", None)  # of an array of numpy
+        whole = kind in ("i", "u") or all(isinstance(value, int) for value in values)
+        if whole or kind in ("b", "f") or all(isinstance(v, (int, float)) for v in values):
+            letter = "q" if whole else "d"  # a group of whole numbers stays one
             try:
-                data = array.array("d", values)
+                data = values.astype(letter).tobytes() if kind else array.array(letter, values)
             except (TypeError, OverflowError) as failure:
                 raise Invalid(errno.EINVAL, f"column {name}: {failure}") from None
-            form, buffers = b"g", self._keep(None, memoryview(data).cast("B"))
+            form, buffers = b"l" if whole else b"g", self._keep(None, memoryview(data).cast("B"))
         else:
             words = [str(value).encode() for value in values]
             offsets = array.array("q", [0])

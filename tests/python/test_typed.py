@@ -94,6 +94,8 @@ train(X, y, sample_weight=0 * y)                    !! sample_weight: all are ze
 train(X, y, sample_weight=[1, 2])                   !! sample_weight: expected one for each row, found 2
 train(X, y, sample_weight=-1)                       !! sample_weight: expected finite numbers, 0 or more
 train(columns, sample_weight=weight)                !! only of rows of X and y
+train(X, y, group=[n // 20 for n in range(len(y))])  -> force_N of depth_mm, velocity_mm_s
+train({**columns, "hand": (y > 1).astype(int)}, group="hand")  -> force_N of depth_mm, velocity_mm_s
 train(X, None)                                      !! a ndarray is no table
 train(columns)                                      -> force_N of depth_mm, velocity_mm_s
 train(columns, target="force")                      !! no column 'force'
