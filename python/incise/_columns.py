@@ -22,10 +22,9 @@ class Tabular:
 
     columns: Any  #: the names of the columns
     metadata: Any  #: where the rows come from
+    numpy: Callable[[], Dict[str, Any]]
+    _head: Callable[[], Tuple[Mapping[str, Any], str]]  # the first rows, and a caption
     _start_ns: Optional[Callable[[], int]] = None  # zero of the times, else the first
-
-    def numpy(self) -> Dict[str, Any]:
-        raise NotImplementedError
 
     def units(self) -> Dict[str, str]:
         """The unit of each column."""
@@ -82,10 +81,6 @@ class Tabular:
         from ._show import plot_columns
 
         return plot_columns(self, columns, ax)
-
-    def _head(self) -> Tuple[Mapping[str, Any], str]:
-        """The first rows, and a caption."""
-        raise NotImplementedError
 
     def _repr_html_(self) -> str:
         from ._show import html_table

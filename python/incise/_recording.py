@@ -151,6 +151,12 @@ def _cut_number(number: int) -> int:
     return number
 
 
+def _limit(limits: Dict[str, Any], from_s: float, to_s: float) -> None:
+    """Limit a part further; to_s 0: to its end."""
+    ends = [end for end in (limits.get("to_s"), to_s) if end]
+    limits.update(from_s=max(limits.get("from_s", 0), from_s), to_s=min(ends, default=0))
+
+
 def _times(from_s: float, to_s: Optional[float]) -> Tuple[float, float]:
     """A part as the library takes it, where 0 stands for the end."""
     try:
@@ -328,16 +334,15 @@ class Recording:
         ) -> Table:
             limits, label = dict(options), about
             if cut is not None:
-                label += f", cut {cut}"
-                limits["cut"] = _cut_number(cut)
-                # Only rows of cuts have the number of one.
-                if what != "table" or options.get("resample"):
-                    limits["from_s"], limits["to_s"] = self._span(limits.pop("cut"))
+                label += f", cut {_cut_number(cut)}"
+                if what == "table" and not options.get("resample"):
+                    limits["cut"] = cut
+                else:  # only rows of cuts have the number of one
+                    _limit(limits, *self._span(cut))
             if between is not None:
-                limits["from_s"], limits["to_s"] = _times(*between)
-                label += (
-                    f", {between[0]} s to {'its end' if between[1] is None else f'{between[1]} s'}"
-                )
+                from_s, to_s = _times(*between)
+                label += f", {from_s} s to {f'{to_s} s' if to_s else 'its end'}"
+                _limit(limits, from_s, to_s)
             return self._whole(what, label, limits)
 
         struct = ExportOptions()

@@ -68,6 +68,8 @@ class Recordings(Case):
                 (table.between(42.5), 42.5, math.inf),
                 (table.cut(3), cut[0], cut[-1] + 1e-9),
                 (getattr(self.rec.cut(3), name), cut[0], cut[-1] + 1e-9),
+                (table.cut(3).between(cut[0] + 0.3), cut[0] + 0.3, cut[-1] + 1e-9),
+                (table.between(8, 10).between(0, 8.5).between(1), 8, 8.5),
             ):
                 inside = [from_s <= round(t - start_ns) * 1e-9 < to_s for t in whole["t_ns"]]
                 wanted = {c: [v for v, i in zip(values, inside) if i] for c, values in whole.items()}
