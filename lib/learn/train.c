@@ -80,7 +80,7 @@ static int check_all(const struct incise_model *model,
 		return rc;
 	if (options->classic && train->weights)
 		return incise_error_set(err, EINVAL,
-					"the classic method knows no weights; leave "
+					"the classic method takes no weights; leave "
 					"classic out");
 	if (options->epochs < 1 || !(options->step > 0) || !isfinite(options->step) ||
 	    options->ridge < 0 || isinf(options->ridge) || options->starts < 1)

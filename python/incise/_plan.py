@@ -15,6 +15,7 @@ from ._columns import Columns
 from ._library import Invalid, NotFound, PathLike, c_bool, c_double, c_int, call, function, package
 from ._library import text, values
 from ._model import CompiledModel, Model, model_file
+from ._show import html_table
 
 AXES_MAX, POSES_MAX = 3, 32
 PHASES = ("free", "cutting", "insertion")
@@ -298,6 +299,10 @@ class Plan:
 
     def __repr__(self) -> str:
         return f"<incise.Plan {self.path}: {' '.join(self.stages)}>"
+
+    def _repr_html_(self) -> str:
+        rows = [(name, "runs") for name in self.stages] + list(self.left_out.items())
+        return html_table(f"incise.Plan {self.path}, {self.rate_hz:g} Hz", ("stage", ""), rows)
 
     @property
     def stages(self) -> List[str]:
