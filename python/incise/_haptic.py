@@ -44,22 +44,31 @@ def _values(texts: List[str]) -> Any:
 
 
 def read_log(path: PathLike) -> Columns:
-    """The columns of a CSV file that incise wrote: ticks of a loop or a replay, or an export."""
+    """The columns of a log: a CSV file of ticks or an export, or the trace of a .session, which has the
+    rest of the session as its metadata."""
+    about: Dict[str, Any] = {}
     try:
         with open(path, newline="") as file:
-            header, *rows = csv.reader(line for line in file if not line.startswith("#"))
+            if _library.path_bytes(path).endswith(b".session"):
+                about = json.load(file)
+                trace = about.pop("trace")
+                header, rows = trace["columns"], trace["rows"]
+            else:
+                header, *rows = csv.reader(line for line in file if not line.startswith("#"))
     except OSError as failure:
         raise _library.make_error(
-            failure.errno or errno.EIO, f"{path}: {failure.strerror}; give a CSV file of incise"
+            failure.errno or errno.EIO, f"{path}: {failure.strerror}; give a log of incise"
         ) from None
-    except (ValueError, csv.Error):
-        raise Invalid(errno.EINVAL, f"{path}: no CSV file with a row of names") from None
+    except (ValueError, KeyError, TypeError, AttributeError, csv.Error):
+        raise Invalid(
+            errno.EINVAL, f"{path}: no .session, and no CSV with a row of names"
+        ) from None
     if any(len(row) != len(header) for row in rows):
-        raise Invalid(errno.EINVAL, f"{path}: has rows of different lengths") from None
+        raise Invalid(errno.EINVAL, f"{path}: has rows of different lengths")
     columns = zip(*rows) if rows else [()] * len(header)
-    return Columns(
-        {name: _values(list(texts)) for name, texts in zip(header, columns)}, f"rows of {path}"
-    )
+    log = Columns({n: _values(list(c)) for n, c in zip(header, columns)}, f"rows of {path}")
+    log.metadata = about
+    return log
 
 
 class Haptic:
@@ -67,7 +76,7 @@ class Haptic:
 
     scene: a .scene file, or the name of a shipped one. rig: path of a rig.conf, or "sim:KEY=VALUE,…";
     None: the command's default. model: a path, or a model that was trained or compiled here.
-    duration_s: 0 runs until stop(). realtime: ask the kernel for it. session: a .session file to write.
+    duration_s: 0 runs until stop(). realtime: False is the option --no-rt. session: a .session file to write.
     More options of the command have its names, for example policy="deadline", procedure=True.
 
         ticks = incise.Haptic("neck", "sim:clock=simulated", duration_s=4).wait()

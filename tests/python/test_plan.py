@@ -168,7 +168,9 @@ class Haptics(Case):
         for name, values in wanted.items():
             self.assertEqual(list(ticks[name]), list(values), name)
         self.assertEqual(loop.report["ticks"], 2000)
-        self.assertTrue(os.path.exists(session))
+        trace = incise.read_log(session)
+        self.assertEqual(list(trace)[:2], ["t_s", "tool"])
+        self.assertEqual(trace.metadata["ticks"], 2000)
 
     def test_it_ends_behind_the_block(self):
         with incise.Haptic("neck", "sim:", realtime=False) as loop:

@@ -119,7 +119,8 @@ loop(duration_s=1).wait()                           -> <incise.Columns ticks of 
 loop("lver", duration_s=1).wait()                   !! lver
 loop("neck", duration_s=1, tool="knife").wait()     !! expected auto, blade, handle or tube
 loop("liver", duration_s=1, model=model).wait()     -> ticks of liver: 1000 rows
-incise.read_log("none.csv")                         !! none.csv
+incise.read_log("none.csv")                         !! none.csv: No such file
+incise.read_log(rec.path + "/recording.db")         !! no .session, and no CSV with a row of names
 incise.verify(rec.path).complete                    -> True
 incise.nothing                                      !! module 'incise' has no attribute 'nothing'
 """
