@@ -7,7 +7,7 @@ import re
 import warnings
 
 import incise
-from fixtures import Case, has, run
+from fixtures import Case, has
 
 # A line of Python, then -> and a part of the result's repr(), or !! and a part of the exception's line.
 # Both end at two blanks, behind which may be a comment.
