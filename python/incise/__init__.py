@@ -8,6 +8,7 @@ Lengths are millimetres, forces newtons, times seconds, or nanoseconds of CLOCK_
 name ends in _ns. Everything is in the C library; this package calls it by ctypes.
 """
 
+import importlib.util
 from typing import TYPE_CHECKING, Any, List
 
 from . import calibrate
@@ -69,7 +70,7 @@ for _name in __all__:
 
 
 def __dir__() -> List[str]:
-    return [*__all__, "ForceRegressor"]
+    return __all__ + ["ForceRegressor"] * bool(importlib.util.find_spec("sklearn"))
 
 
 def __getattr__(name: str) -> Any:
