@@ -266,14 +266,8 @@ class Table(Tabular):
         raise TypeError("a Table comes of a recording: incise.open(path).pairs() and the like")
 
     @classmethod
-    def _of(
-        cls,
-        open_stream: Callable[[ArrowArrayStream], None],
-        about: str,
-        part: Callable[..., "Table"],
-        start_ns: Callable[[], int],
-    ) -> "Table":
-        """part: makes the same table of a part of the recording."""
+    def _of(cls, open_stream: Any, about: str, part: Any, start_ns: Any) -> "Table":
+        """open_stream fills in an ArrowArrayStream, part makes the same table of a part."""
         table = cls.__new__(cls)
         table._open, table._about, table._part = open_stream, about, part
         table._start_ns = start_ns

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import errno
 import html
 import re
 from typing import Any, Iterable, Optional, Sequence, Tuple
@@ -69,7 +70,9 @@ def plot_columns(table: Any, names: Sequence[str], ax: Any) -> Any:
         chosen = [name for name, (_, unit) in flat.items() if unit in ("N", "mm")]
         chosen = [name for name in chosen if "_u_" not in name and "_sd_" not in name]
     if not chosen:
-        raise Invalid(22, f"plot: none of the columns; the columns are: {', '.join(flat)}")
+        raise Invalid(
+            errno.EINVAL, f"plot: none of the columns; the columns are: {', '.join(flat)}"
+        )
     units = list(dict.fromkeys(flat[name][1] for name in chosen))
     axes = _axes(len(units), ax, sharex=True)
     for name in chosen:
