@@ -133,8 +133,8 @@ mcap-reader: ## other readers for the tests of MCAP, $(O)/tests/mcap/check and r
 	@tests/venv tests/mcap $(O)/tests/mcap 'tests read MCAP with our own reader alone' check:--package ros2
 
 # What reads Arrow streams in place, for the tests of incise for Python.
-python-peers: ## pyarrow, polars, DuckDB, pandas 3 and scikit-learn for the tests of python/
-	@tests/venv tests/python $(O)/tests/python 'tests with pyarrow, polars, DuckDB, pandas 3 and scikit-learn are skipped'
+python-peers: ## pyarrow, polars, DuckDB, pandas 3, xarray, scikit-learn and mypy for the tests of python/
+	@tests/venv tests/python $(O)/tests/python 'tests with pyarrow, polars, DuckDB, pandas 3, xarray, scikit-learn and mypy are skipped'
 
 # Programs of others that send and receive streams over a network.
 receiver := $(wildcard /usr/share/doc/openigtlink-examples/examples/Receiver/ReceiveClient.cxx)
@@ -211,8 +211,8 @@ check-python: all $(O)/tests/sql ## tests of incise for Python on libraries unde
 	+@$(MAKE) --no-print-directory O=$(O)/check $(sanitized) libs
 	cd tests/python && INCISE_BUILD=$(abspath $(O)) INCISE_LIBDIR=$(abspath $(O))/check/lib \
 		LD_PRELOAD=$$($(CC) -print-file-name=libasan.so) ASAN_OPTIONS=detect_leaks=0 \
-		PYTHONPATH=../../python PYTHONDONTWRITEBYTECODE=1 \
-		/usr/bin/python3 -m unittest test_recording test_model test_plan test_names
+		PATH=$(abspath $(O))/bin:$$PATH PYTHONPATH=../../python PYTHONDONTWRITEBYTECODE=1 \
+		/usr/bin/python3 -m unittest test_recording test_model test_plan test_names test_typed
 
 # Threads that share memory without a lock, under ThreadSanitizer; what is not of the page
 # comes from the library as it is.
@@ -240,7 +240,7 @@ doc: ## reference of the public headers in build/doc/html; fails where a comment
 	@mk/doc $(abspath $(O))/doc $(version)
 	@cd $(O)/doc/html && PYTHONPATH=$(abspath python) PYTHONDONTWRITEBYTECODE=1 \
 		python3 -m pydoc -w incise $(patsubst python/incise/%.py,incise.%,$(filter-out \
-		python/incise/_% python/incise/sklearn.py,$(wildcard python/incise/*.py))) >/dev/null
+		python/incise/_%,$(wildcard python/incise/*.py))) >/dev/null
 	@echo $(O)/doc/html/index.html and $(O)/doc/html/incise.html, of incise for Python
 
 # The documents of the notebooks, with figures; tests only run the code.

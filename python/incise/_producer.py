@@ -67,16 +67,15 @@ class ColumnStream:
         return kept
 
     def _column(self, i, name, values):
-        if hasattr(values, "tolist") and getattr(values, "dtype", None) is not None:
-            numbers = values.dtype.kind in "biuf"
-        else:
-            numbers = all(isinstance(value, (int, float)) for value in values)
-        if numbers:
+        kind = getattr(getattr(values, "dtype", None), "kind", None)  # of an array of numpy
+        whole = kind in ("i", "u") or all(isinstance(value, int) for value in values)
+        if whole or kind in ("b", "f") or all(isinstance(v, (int, float)) for v in values):
+            letter = "q" if whole else "d"  # a group of whole numbers stays one
             try:
-                data = array.array("d", values)
+                data = values.astype(letter).tobytes() if kind else array.array(letter, values)
             except (TypeError, OverflowError) as failure:
                 raise Invalid(errno.EINVAL, f"column {name}: {failure}") from None
-            form, buffers = b"g", self._keep(None, memoryview(data).cast("B"))
+            form, buffers = b"l" if whole else b"g", self._keep(None, memoryview(data).cast("B"))
         else:
             words = [str(value).encode() for value in values]
             offsets = array.array("q", [0])
@@ -111,11 +110,21 @@ class ColumnStream:
         batch.n_buffers = 1
         batch.buffers = ctypes.cast(self._none, ctypes.POINTER(ctypes.c_void_p))
         batch.n_children = len(self._arrays)
-        batch.children = ctypes.cast(
-            self._array_list, ctypes.POINTER(ctypes.POINTER(ArrowArray))
-        )
+        batch.children = ctypes.cast(self._array_list, ctypes.POINTER(ctypes.POINTER(ArrowArray)))
         batch.release = self._release_array
         return 0
+
+
+def column_names(table):
+    """The names of the columns of a DataFrame, table, structured array or {column: values}, or None."""
+    found = getattr(getattr(table, "dtype", None), "names", None)
+    for attribute in ("column_names", "columns"):
+        found = getattr(table, attribute, None) if found is None else found
+    if found is None and hasattr(table, "keys"):
+        found = table.keys()
+    if found is None or not any(isinstance(name, str) for name in found):
+        return None
+    return list(found)
 
 
 def open_stream(table):
@@ -127,13 +136,15 @@ def open_stream(table):
         capsule = table.__arrow_c_stream__()
         address = _capsule_pointer(capsule, b"arrow_array_stream")
         return ArrowArrayStream.from_address(address), capsule
-    if hasattr(table, "columns") and hasattr(table, "to_numpy"):  # a DataFrame of pandas
-        table = {str(name): table[name].to_numpy() for name in table.columns}
-    if hasattr(table, "keys"):
-        made = ColumnStream({name: table[name] for name in table.keys()})
-        return made.stream, made
-    raise Invalid(
-        errno.EINVAL,
-        f"a {type(table).__name__} is no table; give a path, a DataFrame, {{column: values}}, or "
-        "anything with __arrow_c_stream__",
+    names = column_names(table)
+    if names is None and not hasattr(table, "keys"):
+        raise Invalid(
+            errno.EINVAL,
+            f"a {type(table).__name__} is no table; give a path, a DataFrame, {{column: values}}, "
+            "anything with __arrow_c_stream__, or inputs and output: train(X, y)",
+        )
+    columns = {str(name): table[name] for name in names or ()}
+    made = ColumnStream(
+        {name: v.to_numpy() if hasattr(v, "to_numpy") else v for name, v in columns.items()}
     )
+    return made.stream, made

@@ -7,6 +7,7 @@ import sys
 import unittest
 
 import incise
+from fixtures import has
 
 # In a process of its own: one that is ended has printed less than all.
 PROGRAM = """
@@ -41,6 +42,11 @@ class Names(unittest.TestCase):
         self.assertEqual(done.returncode, 0)
         names = [name for name in sorted(incise.__all__) if callable(getattr(incise, name))]
         self.assertEqual(done.stdout.split(), names)
+
+    def test_what_is_public_is_listed(self):
+        self.assertEqual(dir(incise), sorted(incise.__all__ + ["ForceRegressor"] * has("sklearn")))
+        self.assertEqual(dir(incise.calibrate), sorted(incise.calibrate.__all__))
+        self.assertEqual(incise.Model.__module__, "incise")
 
     def test_a_class_takes_a_path(self):
         fis = str(pathlib.Path(__file__).parents[2] / "scenes" / "liver.fis")

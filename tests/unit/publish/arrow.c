@@ -92,6 +92,32 @@ TEST(force_is_that_of_the_table, IN_FOLDER)
 	free(values);
 }
 
+/* Force samples of 10 kHz by their numbers: from the first of the part to before its end. */
+TEST(a_part_of_a_stream_has_its_rows, IN_FOLDER)
+{
+	struct incise_export_options options;
+	struct incise_recording *recording;
+	struct ArrowArrayStream stream;
+	struct ArrowArray batch;
+	int64_t seq = 20000;
+
+	record("a.rec", SHORT_SCRIPT, 8000 * MS);
+	incise_export_options_init(&options);
+	options.from_s = 2;
+	options.to_s = 5;
+	stream = open_stream("force", &options);
+	for (; (batch = next(&stream)).release; batch.release(&batch))
+		for (int64_t i = 0; i < batch.length; i++)
+			assert_int_equal(((const int64_t *)data(&batch, 0))[i], seq++);
+	assert_int_equal(seq, 50000);
+	stream.release(&stream);
+	options.cut = 1;
+	recording = open_it();
+	assert_error(incise_recording_stream(recording, "force", &options, &stream, &err),
+		     EINVAL, &err, "force have no cut");
+	incise_recording_close(recording);
+}
+
 TEST(poses_are_those_of_the_table, IN_FOLDER)
 {
 	struct incise_tracker_sample *poses;
