@@ -13,7 +13,6 @@
 
 # %%
 import os
-import subprocess
 import tempfile
 
 import matplotlib
@@ -22,29 +21,20 @@ import numpy as np
 import incise
 
 matplotlib.rcParams.update({"figure.figsize": (7, 4), "svg.hashsalt": "incise"})
-import matplotlib.pyplot as plt
 
 folder = tempfile.mkdtemp()
 path = os.path.join(folder, "liver.rec")
-subprocess.run(
-    ["incise", "capture", "-o", path, "--rig", "sim:seed=1,clock=simulated"],
-    check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-)
-rec = incise.open(path)
+rec = incise.capture("sim:seed=1,clock=simulated", path)
 print(f"{rec.info.cuts} cuts, {rec.info.force} force samples, {rec.info.force_lost} lost")
 
 # %% [markdown]
 # ## One cut
-# Tables have units; numpy arrays come without a copy of the rows.
+# Tables have units, and are cut by time and by the number of the cut.
 
 # %%
-cut = rec.pairs(rate_hz=200).numpy()
-first = cut["cut"] == cut["cut"][0]
-figure, axes = plt.subplots(2, sharex=True, layout="constrained")
-axes[0].plot(cut["t_s"][first], cut["force_N"][first])
-axes[0].set(title="The first cut", ylabel="force / N")
-axes[1].plot(cut["t_s"][first], cut["depth_mm"][first])
-axes[1].set(xlabel="time / s", ylabel="depth / mm")
+first = rec.pairs(rate_hz=200).cut(1)
+first.plot("depth_mm", "force_N")
+first
 
 # %% [markdown]
 # ## Training
@@ -61,17 +51,11 @@ assert report.check_rms_error < min(report.baselines.values())
 
 # %% [markdown]
 # ## Force over depth, with the interval of a new cut
-# The band is ± 1.96 standard deviations.
+# The bands are ± 1.96 standard deviations; below, the residuals of the pairs.
 
 # %%
-depth = np.linspace(0, 20, 200)
-figure, axis = plt.subplots(layout="constrained")
-for velocity in (5, 20, 40):
-    force, sd = model(np.column_stack((depth, np.full_like(depth, velocity))), sd=True)
-    (line,) = axis.plot(depth, force, label=f"{velocity} mm/s")
-    axis.fill_between(depth, force - 1.96 * sd, force + 1.96 * sd, color=line.get_color(), alpha=0.15)
-axis.set(title="Learnt force", xlabel="depth / mm", ylabel="force / N")
-axis.legend()
+model.plot(pairs)
+model
 
 # %% [markdown]
 # ## Fixed point

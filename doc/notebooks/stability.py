@@ -53,7 +53,7 @@ print("beyond a curve's end:", last.split(": ", 1)[-1])
 # The same motion by a tracker of 120 Hz and one of 480 Hz: what the slower one costs in force.
 
 # %%
-def stroke(rate):
+def stroke(rate: float) -> incise.Columns:
     """Force of a stroke of 5 mm that takes half a second, at each ms."""
     t = np.arange(0, 2, 1 / rate)
     poses = {

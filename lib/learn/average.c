@@ -238,7 +238,8 @@ static void sum_up(struct incise_average *a, const struct incise_basis *basis,
 
 		for (size_t i = 0; i < held->n; i++) {
 			make_row(basis, held->rows + i * (held->n_inputs + 1), row);
-			add_average_row(to, a->n, a->stride, row, 1);
+			add_average_row(to, a->n, a->stride, row,
+					incise_pairs_weight(held, i));
 			a->out[(size_t)f * a->n_units + folds->unit[f][i]] = true;
 		}
 		for (size_t i = 0; seen < n_pairs && i < triangle(a); i++)
@@ -263,13 +264,14 @@ static int sum_cuts(struct incise_average *a, const struct incise_basis *basis,
 
 		for (size_t i = 0; i < held->n; i++) {
 			int u = folds->unit[f][i];
-			double *to = a->cuts + (size_t)u * a->stride, z;
+			double *to = a->cuts + (size_t)u * a->stride, z, weight;
 
 			make_row(basis, held->rows + i * (held->n_inputs + 1), row);
 			z = dot(row, consequents, a->n) - folds->zero;
-			squares[u] += z * z;
+			weight = incise_pairs_weight(held, i);
+			squares[u] += weight * z * z;
 			for (int k = 0; k <= a->n; k++)
-				to[k] += z * row[k];
+				to[k] += weight * z * row[k];
 		}
 		seen += held->n;
 	}
@@ -311,7 +313,8 @@ static int predict(struct incise_average *a, const struct incise_basis *basis,
 				predicted[s] =
 					dot(row, a->consequents + (size_t)s * a->n, a->n);
 				e = predicted[s] - row[a->n];
-				a->setting[s].total += e * e;
+				a->setting[s].total +=
+					incise_pairs_weight(held, i) * e * e;
 			}
 		}
 	}
@@ -390,7 +393,8 @@ static void sum_errors(const struct incise_average *a, const struct incise_folds
 			for (int s = 0; s < a->n_settings; s++)
 				if (a->setting[s].weight > 0)
 					e += a->setting[s].weight * predicted[s];
-			error[folds->unit[f][i]] += e * e;
+			error[folds->unit[f][i]] +=
+				incise_pairs_weight(&folds->held[f], i) * e * e;
 		}
 }
 

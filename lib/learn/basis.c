@@ -286,7 +286,7 @@ void incise_basis_fold(const struct incise_basis *basis, const struct incise_pai
 
 		incise_basis_firing(basis, x, w);
 		incise_basis_row(basis, w, x, incise_lsq_row(lsq));
-		incise_lsq_add(lsq, x[d]);
+		incise_lsq_add_weighted(lsq, x[d], incise_pairs_weight(pairs, n));
 	}
 }
 

@@ -89,4 +89,10 @@ void incise_premises_project(struct incise_basis *basis);
 /* Another start, by seed: centres by up to 0.3 spacings, widths by up to a third. */
 void incise_premises_jitter(struct incise_basis *basis, uint64_t seed);
 
+/* The weight of a pair. */
+static inline double incise_pairs_weight(const struct incise_pairs *pairs, size_t i)
+{
+	return pairs->weights ? pairs->weights[i] : 1;
+}
+
 #endif

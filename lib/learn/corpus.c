@@ -632,7 +632,8 @@ static int take_sample(struct incise_corpus *corpus)
 		to->groups = corpus->grouped
 				     ? malloc((corpus->n_rows + 1) * sizeof(*to->groups))
 				     : NULL;
-		to->pairs = (struct incise_pairs){rows, 0, corpus->columns - 1};
+		to->pairs = (struct incise_pairs){
+			.rows = rows, .n = 0, .n_inputs = corpus->columns - 1};
 		if (!rows || (corpus->grouped && !to->groups))
 			return -ENOMEM;
 	}

@@ -42,8 +42,9 @@ static int fill_fold(struct incise_folds *folds, int at, const struct incise_pai
 		     int f)
 {
 	size_t width = pairs->n_inputs + 1, n_fit = 0, n_held = 0;
-	double *fit = malloc(pairs->n * width * sizeof(*fit));
-	double *held = malloc(pairs->n * width * sizeof(*held));
+	/* Weights follow the rows. */
+	double *fit = malloc(pairs->n * (width + 1) * sizeof(*fit));
+	double *held = malloc(pairs->n * (width + 1) * sizeof(*held));
 
 	folds->fit[at].rows = fit;
 	folds->held[at].rows = held;
@@ -54,14 +55,18 @@ static int fill_fold(struct incise_folds *folds, int at, const struct incise_pai
 		const double *row = pairs->rows + width * i;
 
 		if (place[grouped ? (size_t)unit[i] : i] % n_folds != (size_t)f) {
+			fit[width * pairs->n + n_fit] = incise_pairs_weight(pairs, i);
 			memcpy(fit + width * n_fit++, row, width * sizeof(*row));
 			continue;
 		}
 		folds->unit[at][n_held] = grouped ? unit[i] : (int)i;
+		held[width * pairs->n + n_held] = incise_pairs_weight(pairs, i);
 		memcpy(held + width * n_held++, row, width * sizeof(*row));
 	}
-	folds->fit[at] = (struct incise_pairs){fit, n_fit, pairs->n_inputs};
-	folds->held[at] = (struct incise_pairs){held, n_held, pairs->n_inputs};
+	folds->fit[at] = (struct incise_pairs){fit, n_fit, pairs->n_inputs,
+					       fit + width * pairs->n};
+	folds->held[at] = (struct incise_pairs){held, n_held, pairs->n_inputs,
+						held + width * pairs->n};
 	folds->n_held += n_held;
 	return 0;
 }
@@ -118,7 +123,7 @@ static void add_errors(const struct incise_folds *folds, int f,
 		const double *x = held->rows + i * (held->n_inputs + 1);
 		double e = incise_basis_error(basis, x, consequents);
 
-		error[folds->unit[f][i]] += e * e;
+		error[folds->unit[f][i]] += incise_pairs_weight(held, i) * e * e;
 	}
 }
 

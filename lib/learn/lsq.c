@@ -297,6 +297,15 @@ void incise_lsq_add(struct incise_lsq *lsq, double target)
 		fold_waiting(lsq);
 }
 
+void incise_lsq_add_weighted(struct incise_lsq *lsq, double target, double weight)
+{
+	double *row = incise_lsq_row(lsq), root = sqrt(weight);
+
+	for (int k = 0; k < lsq->n && weight != 1; k++)
+		row[k] *= root;
+	incise_lsq_add(lsq, target * root);
+}
+
 /*
  * Rows that penalise what sets the blocks apart: orthonormal contrasts of block b against
  * the mean of those behind it, a staircase from column b·width on.

@@ -47,6 +47,9 @@ double *incise_lsq_row(struct incise_lsq *lsq);
 /* The row filled in since then stands for row·x = target. */
 void incise_lsq_add(struct incise_lsq *lsq, double target);
 
+/* The same, so many times; above 0. */
+void incise_lsq_add_weighted(struct incise_lsq *lsq, double target, double weight);
+
 /*
  * The factor [R z; 0 ρ] of all rows and of a ridge (or NULL): row i of its n+1 starts at
  * i·*stride. Only the upper triangle has a meaning. It belongs to the lsq and is good until

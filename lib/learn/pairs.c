@@ -116,6 +116,12 @@ int incise_pairs_check(const struct incise_pairs *pairs, const char *what,
 		if (!isfinite(pairs->rows[i]))
 			return incise_error_set(err, EINVAL, "%s pair %zu is not finite",
 						what, i / width + 1);
+	for (size_t i = 0; i < pairs->n; i++)
+		if (!(incise_pairs_weight(pairs, i) > 0 &&
+		      isfinite(incise_pairs_weight(pairs, i))))
+			return incise_error_set(err, EINVAL,
+						"%s pair %zu: its weight is not above 0",
+						what, i + 1);
 	return 0;
 }
 
@@ -174,7 +180,7 @@ int incise_sample_take(struct incise_sample *sample, const struct incise_scaling
 		return -ENOMEM;
 	if (n < most)
 		most = n;
-	sample->rows = malloc(most * width * sizeof(double));
+	sample->rows = malloc(most * (width + 1) * sizeof(double)); /* and weights */
 	sample->groups = groups ? malloc(most * sizeof(int)) : NULL;
 	if (!sample->rows || (groups && !sample->groups)) {
 		free(chosen);
@@ -185,11 +191,13 @@ int incise_sample_take(struct incise_sample *sample, const struct incise_scaling
 			continue;
 		incise_scaling_row(scaling, pairs->rows + i * width,
 				   sample->rows + taken * width);
+		sample->rows[most * width + taken] = incise_pairs_weight(pairs, i);
 		if (groups)
 			sample->groups[taken] = groups[i];
 		taken++;
 	}
-	sample->pairs = (struct incise_pairs){sample->rows, taken, pairs->n_inputs};
+	sample->pairs = (struct incise_pairs){sample->rows, taken, pairs->n_inputs,
+					      sample->rows + most * width};
 	free(chosen);
 	return 0;
 }

@@ -39,6 +39,7 @@ struct learner {
 	double *consequents;
 	struct incise_lsq *lsq;
 	struct incise_design design; /* of all pairs, or those of a sample's factor: */
+	double heaviest; /* weight of a pair, by which those of the design are divided */
 	struct incise_factor *all;
 	bool failed; /* to find that */
 	struct incise_sample tuned;
@@ -77,6 +78,10 @@ static int check_all(const struct incise_model *model,
 		rc = check_pairs(model, check, "check", err);
 	if (rc)
 		return rc;
+	if (options->classic && train->weights)
+		return incise_error_set(err, EINVAL,
+					"the classic method knows no weights; leave "
+					"classic out");
 	if (options->epochs < 1 || !(options->step > 0) || !isfinite(options->step) ||
 	    options->ridge < 0 || isinf(options->ridge) || options->starts < 1)
 		return incise_error_set(
@@ -153,16 +158,20 @@ static int design_pairs(struct learner *l)
 	const double *y = l->train->rows + d;
 	double min = *y, max = *y;
 
+	l->heaviest = incise_pairs_weight(l->train, 0);
 	for (size_t i = 1; i < l->train->n; i++) {
 		min = fmin(min, y[i * (d + 1)]);
 		max = fmax(max, y[i * (d + 1)]);
+		l->heaviest = fmax(l->heaviest, incise_pairs_weight(l->train, i));
 	}
 	rc = incise_design_init(&l->design, l->model, min, max);
 	for (size_t i = 0; i < l->train->n && !rc; i++)
 		rc = incise_watch_count(&l->watch, pow(l->basis.n_rules * (d + 1), 2))
 			     ? -ECANCELED
-			     : incise_design_add(&l->design,
-						 l->train->rows + i * (d + 1));
+			     : incise_design_add_to(&l->design, l->design.gram,
+						    l->train->rows + i * (d + 1),
+						    incise_pairs_weight(l->train, i) /
+							    l->heaviest);
 	return rc;
 }
 
@@ -195,7 +204,11 @@ static int fold_all(struct learner *l)
 	unit = design->scaling.scale[d];
 	mean = (l->scaling.offset[d] - design->scaling.offset[d]) / unit;
 	scale = l->scaling.scale[d] / unit;
-	return incise_gram_factor(design->gram, mean, scale, l->lsq);
+	rc = incise_gram_factor(design->gram, mean, scale, l->lsq);
+	for (int i = 0, n = l->basis.n_rules * (d + 1); !l->sums && i <= n; i++)
+		for (int k = i; k <= n; k++)
+			incise_lsq_factor_row(l->lsq, i)[k] *= sqrt(l->heaviest);
+	return rc;
 }
 
 static int train_classic(struct learner *l, struct incise_tuning *tuning)

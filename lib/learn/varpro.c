@@ -93,7 +93,7 @@ static bool project(struct varpro_state *s, const struct incise_basis *basis,
 
 		incise_basis_row(basis, w, x, row);
 		derivative(s, basis, w, x, consequents, row + s->n);
-		incise_lsq_add(s->all, x[d]);
+		incise_lsq_add_weighted(s->all, x[d], incise_pairs_weight(s->pairs, i));
 	}
 	factor = incise_lsq_factor(s->all, s->ridge, &stride);
 	for (int i = 0; i < s->q && factor; i++)

@@ -519,14 +519,19 @@ static int describe_stream(struct stream *stream, struct incise_stream_rows *row
 
 static int export_stream(struct stream *stream)
 {
+	struct incise_export_pass pass = {&stream->recording, 1, &stream->options,
+					  .err = &stream->err};
 	struct incise_stream_rows rows;
-	int rc = incise_stream_rows_open(&rows, stream->recording, stream->what,
-					 &stream->options, &stream->err);
+	int rc = incise_messages_limit(&pass);
 
+	if (rc)
+		return rc;
+	rc = incise_stream_rows_open(&rows, stream->recording, stream->what,
+				     &stream->options, &stream->err);
 	if (!rc && describe_stream(stream, &rows))
 		rc = fail_memory(stream, &stream->err);
 	if (!rc)
-		rc = incise_export_stream(&rows, &stream->format, &stream->err);
+		rc = incise_export_stream(&rows, &pass, &stream->format);
 	incise_stream_rows_close(&rows);
 	return rc;
 }
@@ -653,8 +658,12 @@ static int start_export(struct stream *stream,
 			struct incise_error *err)
 {
 	const char *table = incise_stream_known(stream->what) ? stream->what : NULL;
-	int rc = table ? 0 : incise_export_check(options, err);
+	int rc = incise_export_check(options, err);
 
+	if (!rc && table && options->cut)
+		rc = incise_error_set(err, EINVAL,
+				      "%s: rows of %s have no cut; give a range of times",
+				      stream->recording->path, table);
 	if (!rc)
 		rc = incise_provenance_of(&stream->provenance, &stream->recording, 1,
 					  options, table, err);

@@ -198,9 +198,10 @@ void incise_stream_rows_close(struct incise_stream_rows *stream)
 }
 
 int incise_export_stream(struct incise_stream_rows *stream,
-			 const struct incise_table_format *format,
-			 struct incise_error *err)
+			 const struct incise_export_pass *pass,
+			 const struct incise_table_format *format)
 {
+	struct incise_error *err = pass->err;
 	struct incise_table table = {
 		.format = format,
 		.columns = stream->columns,
@@ -211,7 +212,10 @@ int incise_export_stream(struct incise_stream_rows *stream,
 	if (rc)
 		return rc;
 	while ((rc = next_streams_row(stream, err)) > 0) {
-		rc = incise_table_add(&table, stream, err);
+		rc = incise_range_has(&pass->recordings[0]->range,
+				      stream->rows.t_ns - pass->first_ns, 0)
+			     ? incise_table_add(&table, stream, err)
+			     : 0;
 		if (rc)
 			break;
 	}

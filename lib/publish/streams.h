@@ -52,10 +52,10 @@ int incise_stream_rows_open(struct incise_stream_rows *stream,
 
 void incise_stream_rows_close(struct incise_stream_rows *stream);
 
-/* Write the rows of a stream in this format. Returns 0 or -errno. */
+/* Write the rows of a stream in this format, of the part that the pass is limited to. Returns 0 or -errno. */
 int incise_export_stream(struct incise_stream_rows *stream,
-			 const struct incise_table_format *format,
-			 struct incise_error *err);
+			 const struct incise_export_pass *pass,
+			 const struct incise_table_format *format);
 
 /*
  * Write the rows of the streams that the format's open() opens, in order of time, as incise_export_rows()

@@ -8,25 +8,36 @@ Lengths are millimetres, forces newtons, times seconds, or nanoseconds of CLOCK_
 name ends in _ns. Everything is in the C library; this package calls it by ctypes.
 """
 
+from typing import TYPE_CHECKING, Any, List
+
 from . import calibrate, mujoco
+from ._arrow import Batch, Field, Table
+from ._capture import capture
+from ._columns import Columns
+from ._haptic import Haptic, read_log
 from ._host import Host, Wrench
 from ._library import VERSION as __version__
-from ._library import Error, Invalid, NotFound
-from .arrow import Batch, Field, Table
-from .capture import capture
-from .model import CompiledModel, Model, TrainReport, Variable, load, train
-from .plan import Plan, Stability, Tick
-from .recording import Frame, Info, Recording, Stream, open
-from .verify import Finding, Report, verify
-from .wall import Wall, WallPoint
+from ._library import Error, Exists, Invalid, NotFound
+from ._model import CompiledModel, Model, TrainReport, TrainStep, Variable, load, train
+from ._plan import FLAGS, Plan, Stability, Tick
+from ._recording import Frame, Info, Recording, Stream, open
+from ._verify import Finding, Report, verify
+from ._wall import Wall, WallPoint
+
+if TYPE_CHECKING:
+    from ._sklearn import ForceRegressor as ForceRegressor
 
 __all__ = [
     "Batch",
+    "Columns",
     "CompiledModel",
     "Error",
+    "Exists",
+    "FLAGS",
     "Field",
     "Finding",
     "Frame",
+    "Haptic",
     "Host",
     "Info",
     "Invalid",
@@ -40,6 +51,7 @@ __all__ = [
     "Table",
     "Tick",
     "TrainReport",
+    "TrainStep",
     "Variable",
     "Wall",
     "WallPoint",
@@ -49,16 +61,25 @@ __all__ = [
     "load",
     "mujoco",
     "open",
+    "read_log",
     "train",
     "verify",
     "__version__",
 ]
 
+for _name in __all__:
+    if hasattr(globals().get(_name), "__module__"):
+        globals()[_name].__module__ = "incise"
 
-def __getattr__(name):
+
+def __dir__() -> List[str]:
+    return [*__all__, "ForceRegressor"]
+
+
+def __getattr__(name: str) -> Any:
     """ForceRegressor needs scikit-learn, which is imported with it."""
     if name == "ForceRegressor":
-        from .sklearn import ForceRegressor
+        from ._sklearn import ForceRegressor
 
         return ForceRegressor
     raise AttributeError(f"module 'incise' has no attribute {name!r}")

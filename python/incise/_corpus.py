@@ -13,117 +13,85 @@ import os
 from typing import Any, List, Optional, Sequence
 
 from . import _library
-from ._library import ArrowArrayStream, Failure, Invalid, c_bool, c_char_p, c_double, c_int
-from ._library import c_uint64, c_void_p, function
+from ._library import ArrowArrayStream, Invalid, c_int, c_void_p, call, function
+from ._model import (
+    Model,
+    Stop,
+    TrainOptionsStruct,
+    has_cuts,
+    is_path,
+    is_recording,
+    name_array,
+    report_of,
+)
 from ._producer import open_stream
-from .model import BaselinesStruct, INPUTS_MAX, Model, Stop, TrainOptionsStruct
-from .model import TrainReportStruct, has_cuts, is_path, is_recording, name_array, report_of
-from .recording import Recording
+from ._recording import Recording
 
 TEXT_MAX = 1000  # INCISE_SOURCE_TEXT
 
 _Stream = ctypes.CFUNCTYPE(c_int, c_void_p, ctypes.POINTER(ArrowArrayStream), c_void_p)
 
 
-class SourceStruct(ctypes.Structure):
-    """struct incise_train_source"""
-
-    _fields_ = [
-        ("name", c_char_p),
-        ("path", c_char_p),
-        ("stream", _Stream),
-        ("cuts", c_bool),
-        ("hashed", c_char_p),
-        ("text", c_char_p),
-        ("rig", c_char_p),
-        ("calibration", c_char_p),
-        ("open", c_void_p),
-        ("state", c_void_p),
-        ("user", c_void_p),
-    ]
-    c_name = "struct incise_train_source"
-
-
-class SourcesOptionsStruct(ctypes.Structure):
-    """struct incise_sources_options"""
-
-    _fields_ = [
-        ("columns", ctypes.POINTER(c_char_p)),
-        ("n_inputs", c_int),
-        ("parts", c_void_p),
-        ("n_parts", c_int),
-        ("group", c_char_p),
-        ("all_rows", c_bool),
-        ("averaged", c_bool),
-        ("check", c_double),
-        ("premises", c_void_p),
-        ("type", c_int),
-        ("n_mfs", c_int * INPUTS_MAX),
-        ("train", TrainOptionsStruct),
-        ("progress", c_char_p),
-        ("ranks", c_void_p),
-        ("end", c_int),
-    ]
-    c_name = "struct incise_sources_options"
-
-
-class PropagationReportStruct(ctypes.Structure):
-    """struct incise_propagation_report"""
-
-    _fields_ = [
-        ("own", c_double),
-        ("calibration", c_double),
-        ("rig", c_double),
-        ("weight", c_double),
-        ("recordings", c_int),
-        ("calibrations", c_int),
-    ]
-    c_name = "struct incise_propagation_report"
-
-
-class TrainedStruct(ctypes.Structure):
-    """struct incise_trained"""
-
-    _fields_ = [
-        ("model", c_void_p),
-        ("uncertainty", c_void_p),
-        ("notes", c_char_p),
-        ("report", TrainReportStruct),
-        ("baselines", BaselinesStruct),
-        ("pairs", c_uint64),
-        ("check_pairs", c_uint64),
-        ("left_out", c_uint64),
-        ("repeated", c_uint64),
-        ("check_outside", c_uint64),
-        ("group", c_char_p),
-        ("initial", c_void_p),
-        ("factor", c_void_p),
-        ("corpus", c_void_p),
-        ("noise", c_double),
-        ("coverage", c_double),
-        ("propagated", PropagationReportStruct),
-        ("shared", c_bool),
-    ]
-    c_name = "struct incise_trained"
-
-
-_library.declare(
-    "libincise-record",
-    {"incise_source_text": (c_int, c_char_p, c_void_p, c_char_p, c_void_p)},
+SourceStruct, SourcesOptionsStruct, PropagationReportStruct, TrainedStruct = _library.structs(
+    """
+    struct incise_train_source {
+        const char *name, *path;
+        _Stream stream;
+        bool cuts;
+        const char *hashed, *text, *rig, *calibration;
+        void *open, *state, *user;
+    };
+    struct incise_sources_options {
+        const char **columns;
+        int n_inputs;
+        void *parts;
+        int n_parts;
+        const char *group;
+        bool all_rows, averaged;
+        double check;
+        void *premises;
+        int type, n_mfs[8];
+        struct incise_train_options train;
+        const char *progress;
+        void *ranks;
+        int end;
+    };
+    struct incise_propagation_report {
+        double own, calibration, rig, weight;
+        int recordings, calibrations;
+    };
+    struct incise_trained {
+        void *model, *uncertainty;
+        const char *notes;
+        struct incise_train_report report;
+        struct incise_baselines baselines;
+        uint64_t pairs, check_pairs, left_out, repeated, check_outside;
+        const char *group;
+        void *initial, *factor, *corpus;
+        double noise, coverage;
+        struct incise_propagation_report propagated;
+        bool shared;
+    };
+    """,
+    _Stream=_Stream,
 )
-_library.declare(
+
+
+_library.prototypes(
+    "libincise-record",
+    """
+    int incise_source_text(const char *path, struct incise_recording *recording, char *text,
+        struct incise_error *err);
+    """,
+)
+_library.prototypes(
     "libincise-learn",
-    {
-        "incise_train_sources": (
-            c_int,
-            ctypes.POINTER(SourceStruct),
-            c_int,
-            ctypes.POINTER(SourcesOptionsStruct),
-            ctypes.POINTER(TrainedStruct),
-            c_void_p,
-        ),
-        "incise_trained_free": (None, ctypes.POINTER(TrainedStruct)),
-    },
+    """
+    int incise_train_sources(struct incise_train_source *sources, int n,
+        const struct incise_sources_options *options, struct incise_trained *trained,
+        struct incise_error *err);
+    void incise_trained_free(struct incise_trained *trained);
+    """,
 )
 
 
@@ -137,8 +105,8 @@ def _without_choice(path: bytes) -> bytes:
 
 def _text(path: bytes, recording: Optional[int]) -> bytes:
     """What factors and models keep of a source."""
-    text, failure = ctypes.create_string_buffer(TEXT_MAX), Failure()
-    failure.check(function("incise_source_text")(path, recording, text, failure.ref))
+    text = ctypes.create_string_buffer(TEXT_MAX)
+    call("incise_source_text", path, recording, text)
     return text.value
 
 
@@ -225,6 +193,7 @@ def train_sources(
     all_rows: bool,
     mf_type: int,
     counts: Any,
+    progress: Any,
 ) -> Model:
     """incise.train() of a list."""
     if options.classic:
@@ -246,23 +215,22 @@ def train_sources(
         n_mfs=counts,
         train=options,
     )
-    stop, trained, failure = Stop(how.train), TrainedStruct(), Failure()
+    stop, trained = Stop(how.train, progress), TrainedStruct()
     structs = (SourceStruct * len(sources))(*(source.struct for source in sources))
 
     def learn() -> Model:
-        rc = function("incise_train_sources")(
-            structs, len(sources), ctypes.byref(how), ctypes.byref(trained), failure.ref
-        )
-        for source in sources:
-            if source.failure:
-                raise source.failure
-        failure.check(rc)
+        try:
+            call("incise_train_sources", structs, len(sources), how, trained)
+        finally:
+            for source in sources:
+                if source.failure:
+                    raise source.failure
         model = Model._of(trained.model)
         model._set_uncertainty(trained.uncertainty)
         model._notes = trained.notes
         trained.model = trained.uncertainty = None
         known = not math.isnan(trained.coverage)
-        model.report = report_of(
+        model._report = report_of(
             trained.report,
             trained.pairs,
             trained.check_pairs,
@@ -272,8 +240,8 @@ def train_sources(
         return model
 
     try:
-        return _library.call_interruptible(learn, stop.cancel)
+        return stop.run(learn)
     finally:
-        function("incise_trained_free")(ctypes.byref(trained))
+        function("incise_trained_free")(trained)
         for source in sources:
             source.close()

@@ -3,75 +3,53 @@
 
 from __future__ import annotations
 
-import ctypes
 import errno
 import threading
-from typing import Any, NamedTuple, Optional, Sequence
+from typing import Any, NamedTuple, Optional, Sequence, Union
 
 from . import _library
-from ._library import Failure, Invalid, c_bool, c_double, c_int, c_int64, c_void_p
-from ._library import function
-from .plan import PHASES, TOOLS, StabilityStruct, Tick, TickStruct, Vector, find_scene
-from .recording import PathLike
+from ._library import Invalid, PathLike, c_double, c_void_p, call, function, values
+from ._model import CompiledModel, Model
+from ._plan import PHASES, TOOLS, StabilityStruct, Tick, TickStruct, Vector, load_scene
 
+HostOptions, HostPose, HostWrench, HostInfo = _library.structs("""
+    struct incise_host_options {
+        double host_period_s;
+        bool gives_velocity, fit_gain;
+        double tip_mm[3];
+        int tool;
+        void *clock;
+    };
+    struct incise_host_pose {
+        double position_mm[3], quaternion[4];
+    };
+    struct incise_host_wrench {
+        double force_N[3], torque_N_mm[3];
+        unsigned int flags;
+    };
+    struct incise_host_info {
+        double tick_s;
+        int hold_ticks;
+        double gain, scene_gain;
+        struct incise_plan_stability stability;
+    };
+    """)
 
-class HostOptions(ctypes.Structure):
-    """struct incise_host_options"""
-
-    _fields_ = [
-        ("host_period_s", c_double),
-        ("gives_velocity", c_bool),
-        ("fit_gain", c_bool),
-        ("tip_mm", c_double * 3),
-        ("tool", c_int),
-        ("clock", c_void_p),
-    ]
-    c_name = "struct incise_host_options"
-
-
-class HostPose(ctypes.Structure):
-    """struct incise_host_pose"""
-
-    _fields_ = [("position_mm", c_double * 3), ("quaternion", c_double * 4)]
-    c_name = "struct incise_host_pose"
-
-
-class HostWrench(ctypes.Structure):
-    """struct incise_host_wrench"""
-
-    _fields_ = [("force_N", c_double * 3), ("torque_N_mm", c_double * 3), ("flags", ctypes.c_uint)]
-    c_name = "struct incise_host_wrench"
-
-
-class HostInfo(ctypes.Structure):
-    """struct incise_host_info"""
-
-    _fields_ = [
-        ("tick_s", c_double),
-        ("hold_ticks", c_int),
-        ("gain", c_double),
-        ("scene_gain", c_double),
-        ("stability", StabilityStruct),
-    ]
-    c_name = "struct incise_host_info"
-
-
-_options, _pose, _velocity, _wrench, _tick, _info = map(
-    ctypes.POINTER, (HostOptions, HostPose, c_double, HostWrench, TickStruct, HostInfo)
-)
-_library.declare(
+_library.declare("libincise", {"incise_clock_new_real": (c_void_p,)})
+_library.prototypes(
     "libincise",
-    {
-        "incise_clock_new_real": (c_void_p,),
-        "incise_clock_free": (None, c_void_p),
-        "incise_host_new": (c_void_p, c_void_p, _options, c_void_p),
-        "incise_host_free": (None, c_void_p),
-        "incise_host_step": (c_int, c_void_p, c_int64, _pose, _velocity, _wrench),
-        "incise_host_reset": (None, c_void_p),
-        "incise_host_set_tool": (c_int, c_void_p, c_int),
-        "incise_host_last": (None, c_void_p, _tick),
-        "incise_host_info": (None, c_void_p, _info),
-    },
+    """
+    void incise_clock_free(struct incise_clock *clock);
+    struct incise_host *incise_host_new(const struct incise_scene *scene,
+        const struct incise_host_options *options, struct incise_error *err);
+    void incise_host_free(struct incise_host *host);
+    int incise_host_step(struct incise_host *host, int64_t t_ns, const struct incise_host_pose *pose,
+        const double velocity_mm_s[3], struct incise_host_wrench *wrench);
+    void incise_host_reset(struct incise_host *host);
+    int incise_host_set_tool(struct incise_host *host, enum incise_tool tool);
+    void incise_host_last(struct incise_host *host, struct incise_tick *tick);
+    void incise_host_info(struct incise_host *host, struct incise_host_info *info);
+    """,
 )
 
 #: Reasons why the force of a step ramps to 0.
@@ -103,7 +81,7 @@ class Host:
     def __init__(
         self,
         scene: PathLike,
-        model: Optional[PathLike] = None,
+        model: Union[PathLike, Model, CompiledModel, None] = None,
         *,
         step_s: float = 0,
         arithmetic: Optional[str] = None,
@@ -113,21 +91,15 @@ class Host:
         tip_mm: Sequence[float] = (0, 0, 0),
         live: bool = False,
     ):
-        failure = Failure()
-        made, handle = failure.require, _library.Handle
-        self.path = find_scene(scene)
-        paths = [name and _library.path_bytes(name) for name in (self.path, model)]
-        loaded = made(function("incise_scene_load")(*paths, failure.ref))
-        self._scene = handle(loaded, "incise_scene_free")
-        if arithmetic is not None:
-            set_arithmetic = function("incise_scene_set_arithmetic")
-            failure.check(set_arithmetic(self._scene, arithmetic.encode(), failure.ref))
+        self.path, self._scene = load_scene(scene, model, arithmetic)
         options = HostOptions(step_s, velocity, fit_gain, tuple(tip_mm), find_tool(tool))
         if live:
-            self._clock = handle(made(function("incise_clock_new_real")()), "incise_clock_free")
-            options.clock = self._clock._as_parameter_
-        host = made(function("incise_host_new")(self._scene, options, failure.ref))
-        self._host = handle(host, "incise_host_free")
+            clock = function("incise_clock_new_real")()
+            self._clock = _library.Handle(clock, "incise_clock_free")
+            options.clock = clock
+        self._host = _library.Handle(
+            call("incise_host_new", self._scene, options), "incise_host_free"
+        )
         self._step = function("incise_host_step")
         self._use = threading.Lock()
         self.pose, self.wrench = HostPose(), HostWrench()
@@ -142,19 +114,18 @@ class Host:
         return f"<incise.Host {self.path}: gain {self.info.gain:g}, hold {self.info.hold_ticks} ticks>"
 
     @property
-    def info(self) -> HostInfo:
+    def info(self) -> Any:
         """Its tick_s, hold_ticks, gain in use and scene_gain."""
         info = HostInfo()
-        function("incise_host_info")(self._host, ctypes.byref(info))
+        function("incise_host_info")(self._host, info)
         return info
 
     @property
     def tick(self) -> Tick:
         """The last tick; all 0 before the first. Its t_ns is not the simulator's time."""
         last = TickStruct()
-        function("incise_host_last")(self._host, ctypes.byref(last))
-        values = [getattr(last, name) for name in Tick._fields]
-        tick = Tick(*(tuple(v) if isinstance(v, ctypes.Array) else v for v in values))
+        function("incise_host_last")(self._host, last)
+        tick = Tick(*values(last, Tick._fields))
         return tick._replace(phase=PHASES[last.phase], tool=TOOLS[last.tool])
 
     def set_tool(self, tool: str) -> None:

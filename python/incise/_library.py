@@ -7,7 +7,10 @@ those of the public headers; tests/python/abi compares every field with the comp
 
 import ctypes
 import errno
+import importlib
 import os
+import re
+from typing import Union
 
 VERSION = "0.1.0"
 SOVERSION = 2
@@ -19,6 +22,9 @@ c_int64, c_uint64, c_void_p, c_char_p = (
     ctypes.c_void_p,
     ctypes.c_char_p,
 )
+
+
+PathLike = Union[str, "os.PathLike[str]"]
 
 
 class Error(OSError):
@@ -39,8 +45,13 @@ class Invalid(Error, ValueError):
     """A value, a file or data that cannot be used."""
 
 
+class Exists(Error, FileExistsError):
+    """A file that is there, and is not overwritten unasked."""
+
+
 _kinds = {
     errno.ENOENT: NotFound,
+    errno.EEXIST: Exists,
     errno.EINVAL: Invalid,
     errno.ENODATA: Invalid,
     errno.ERANGE: Invalid,
@@ -58,15 +69,66 @@ def make_error(code, text):
     return _kinds.get(code, Error)(code, text)
 
 
-class _ErrorStruct(ctypes.Structure):
-    _fields_ = [("code", c_int), ("text", c_char * 500)]
+_types = {
+    "void": None,
+    "char": c_char,
+    "int": c_int,
+    "unsigned int": ctypes.c_uint,
+    "uint8_t": ctypes.c_uint8,
+    "uint32_t": ctypes.c_uint32,
+    "bool": c_bool,
+    "double": c_double,
+    "int64_t": c_int64,
+    "uint64_t": c_uint64,
+    "size_t": ctypes.c_size_t,
+}
+_structs = {}
+
+
+class Struct(ctypes.Structure):
+    """A struct of a public header, by its name there."""
+
+    def __init_subclass__(cls, of):
+        cls.c_name = of
+        _structs[of] = cls
+
+
+def _field(declarator, kind):
+    """Name and type of a member: "*path" or "tip_mm[3]" of its kind."""
+    for _ in range(declarator.count("*")):
+        kind = {None: c_void_p, c_char: c_char_p}.get(kind) or ctypes.POINTER(kind)
+    for n in reversed(re.findall(r"\[(\d+)\]", declarator)):
+        kind = kind * int(n)
+    return re.search(r"\w+", declarator).group(), kind
+
+
+def structs(text, **types):
+    """Structs by their declarations, as in the headers; types: of names that C does not have."""
+    made = []
+    for name, body in re.findall(r"(struct \w+) \{(.*?)\};", text, re.S):
+        fields = []
+        for kind, declarators in re.findall(
+            r"((?:struct |unsigned )?\w+) ([^;]+);", body.replace("const ", "")
+        ):
+            base = {**_types, **_structs, **types}[kind]
+            fields += [_field(declarator, base) for declarator in declarators.split(",")]
+        made.append(type(Struct)(name.split()[1], (Struct,), {"_fields_": fields}, of=name))
+    return made
+
+
+(ErrorStruct,) = structs("""
+    struct incise_error {
+        int code;
+        char text[500];
+    };
+    """)
 
 
 class Failure:
     """An ``incise_error`` for one call."""
 
     def __init__(self):
-        self.struct = _ErrorStruct()
+        self.struct = ErrorStruct()
         self.ref = ctypes.byref(self.struct)
 
     def exception(self, code):
@@ -180,10 +242,34 @@ _signatures = {}
 _functions = {}
 
 
+def _type(declaration):
+    """The type of a parameter or a result, without its name."""
+    words = re.sub(r"\bconst\b", " ", declaration).replace("*", " * ").split()
+    name = " ".join(words[: 2 if words[0] in ("struct", "unsigned") else 1])
+    stars = words.count("*") or declaration.endswith("]")
+    if words[0] == "enum" and not stars:
+        return c_int
+    if stars:
+        base = c_char if name == "char" else _structs.get(name)
+        return _field("*x", base)[1] if stars == 1 else c_void_p
+    return _types.get(name, c_void_p)  # also for a typedef of a function
+
+
 def declare(library, signatures):
     """Note the functions of a library: {name: (result, *arguments)}; nothing is loaded yet."""
     for name, signature in signatures.items():
         _signatures[name] = (library,) + signature
+
+
+declared = []  # all prototypes, for tests
+
+
+def prototypes(library, text):
+    """Note the functions of a library by their prototypes, as in its headers."""
+    declared.append(text)
+    for result, name, arguments in re.findall(r"(\w[^;]*?)(\w+)\(([^;]*)\);", text):
+        types = [_type(argument.strip()) for argument in arguments.split(",")]
+        declare(library, {name: (_type(result), *types)})
 
 
 def function(name):
@@ -198,6 +284,14 @@ def function(name):
     return found
 
 
+def call(name, *arguments):
+    """Call a function whose last argument is an incise_error; return its result, or raise."""
+    failure, called = Failure(), function(name)
+    result = called(*arguments, failure.ref)
+    checked = failure.check if called.restype in (c_int, c_int64) else failure.require
+    return checked(result)
+
+
 def path_bytes(path):
     """A path as the C library takes it."""
     text = os.fsencode(os.fspath(path))
@@ -206,157 +300,117 @@ def path_bytes(path):
     return text
 
 
+def new_path(path, ending, overwrite=None):
+    """The path of a file to write: it has that ending, and is new or may be overwritten.
+
+    overwrite: None where the caller has no such choice.
+    """
+    name = path_bytes(path)
+    if not name.endswith(ending.encode()):
+        raise Invalid(errno.EINVAL, f"{os.fsdecode(name)}: expected a name that ends in {ending}")
+    if not overwrite and os.path.lexists(name):
+        remedy = "" if overwrite is None else ", or overwrite=True"
+        raise Exists(errno.EEXIST, f"{os.fsdecode(name)}: exists; give another name{remedy}")
+    return name
+
+
+_pip_names = {"PIL": "pillow", "sklearn": "scikit-learn"}
+
+
+def package(name, purpose):
+    """Import an optional package, or raise one line that names it."""
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        top = name.partition(".")[0]
+        raise NotFound(
+            errno.ENOENT,
+            f"{purpose} needs {top}; install python3-{top.lower()}, "
+            f"or pip install {_pip_names.get(top, top)}",
+        ) from None
+
+
 # --- structs ----------------------------------------------------------------------------
 
 
-class Stream(ctypes.Structure):
-    """struct incise_stream"""
-
-    _fields_ = [
-        ("name", c_char * 16),
-        ("device", c_char * 64),
-        ("timestamped", c_bool),
-        ("nominal_hz", c_double),
-        ("delay_ms", c_double),
-        ("delay_sd_ms", c_double),
-        ("rows", c_uint64),
-        ("lost", c_uint64),
-        ("late", c_uint64),
-        ("rate_hz", c_double),
-        ("drift_ppm", c_double),
-        ("drift_sd_ppm", c_double),
-        ("jitter_ms", c_double),
-        ("jitter_max_ms", c_double),
-        ("offset_ms", c_double),
-        ("offset_sd_ms", c_double),
-        ("ended", c_char * 200),
-        ("note", c_char * 300),
-    ]
-    c_name = "struct incise_stream"
-
-
-class RecordingInfo(ctypes.Structure):
-    """struct incise_recording_info"""
-
-    _fields_ = [
-        ("complete", c_bool),
-        ("start_ns", c_int64),
-        ("end_ns", c_int64),
-        ("started", c_char * 32),
-        ("rig", c_char * 256),
-        ("force", c_uint64),
-        ("tracker", c_uint64),
-        ("depth", c_uint64),
-        ("force_lost", c_uint64),
-        ("tracker_lost", c_uint64),
-        ("force_clipped", c_uint64),
-        ("bits", c_int),
-        ("full_scale_V", c_double),
-        ("offset_V", c_double),
-        ("force_mV_N", c_double),
-        ("zero_mV", c_double),
-        ("depth_mm_px", c_double),
-        ("surface_normal", c_double * 3),
-        ("surface_point_mm", c_double * 3),
-        ("tip_mm", c_double * 3),
-        ("cuts", c_int),
-        ("depth_max_mm", c_double),
-        ("force_max_N", c_double),
-        ("streams", Stream * 3),
-        ("n_streams", c_int),
-        ("newtons", c_bool),
-        ("start_utc_ns", c_int64),
-        ("summary", c_bool),
-    ]
-    c_name = "struct incise_recording_info"
-
-
-class CalibrationStruct(ctypes.Structure):
-    """struct incise_calibration"""
-
-    _fields_ = [
-        ("force_mV_N", c_double),
-        ("force_zero_mV", c_double),
-        ("depth_mm_px", c_double),
-        ("force_delay_ms", c_double),
-        ("force_delay_sd_ms", c_double),
-        ("tracker_delay_ms", c_double),
-        ("tracker_delay_sd_ms", c_double),
-        ("camera_delay_ms", c_double),
-        ("camera_delay_sd_ms", c_double),
-        ("tip_mm", c_double * 3),
-        ("surface_u_mm", c_double),
-        ("stepper_N_step", c_double),
-        ("stepper_backlash_mm", c_double),
-        ("stepper_hysteresis_N", c_double),
-        ("stepper_stiction_N", c_double),
-        ("stepper_steps_s", c_double),
-    ]
-    c_name = "struct incise_calibration"
-
-
-class FrameStruct(ctypes.Structure):
-    """struct incise_camera_frame"""
-
-    _fields_ = [
-        ("t_ns", c_int64),
-        ("seq", c_uint64),
-        ("width", c_int),
-        ("height", c_int),
-        ("stride", c_int),
-        ("pixels", c_int),
-        ("data", c_void_p),
-        ("size", ctypes.c_size_t),
-    ]
-    c_name = "struct incise_camera_frame"
+Stream, RecordingInfo, CalibrationStruct, FrameStruct = structs("""
+    struct incise_stream {
+        char name[16], device[64];
+        bool timestamped;
+        double nominal_hz, delay_ms, delay_sd_ms;
+        uint64_t rows, lost, late;
+        double rate_hz, drift_ppm, drift_sd_ppm, jitter_ms, jitter_max_ms, offset_ms;
+        double offset_sd_ms;
+        char ended[200], note[300];
+    };
+    struct incise_recording_info {
+        bool complete;
+        int64_t start_ns, end_ns;
+        char started[32], rig[256];
+        uint64_t force, tracker, depth, force_lost, tracker_lost, force_clipped;
+        int bits;
+        double full_scale_V, offset_V, force_mV_N, zero_mV, depth_mm_px, surface_normal[3];
+        double surface_point_mm[3], tip_mm[3];
+        int cuts;
+        double depth_max_mm, force_max_N;
+        struct incise_stream streams[3];
+        int n_streams;
+        bool newtons;
+        int64_t start_utc_ns;
+        bool summary;
+    };
+    struct incise_calibration {
+        double force_mV_N, force_zero_mV, depth_mm_px, force_delay_ms, force_delay_sd_ms;
+        double tracker_delay_ms, tracker_delay_sd_ms, camera_delay_ms, camera_delay_sd_ms;
+        double tip_mm[3], surface_u_mm, stepper_N_step, stepper_backlash_mm;
+        double stepper_hysteresis_N, stepper_stiction_N, stepper_steps_s;
+    };
+    struct incise_camera_frame {
+        int64_t t_ns;
+        uint64_t seq;
+        int width, height, stride, pixels;
+        void *data;
+        size_t size;
+    };
+    """)
 
 
 ExportProgress = ctypes.CFUNCTYPE(c_int, c_void_p, c_double)
 
 
-class ExportOptions(ctypes.Structure):
-    """struct incise_export_options"""
-
-    _fields_ = [
-        ("rate_hz", c_double),
-        ("depth_bins", c_int),
-        ("velocity_bins", c_int),
-        ("depth_max_mm", c_double),
-        ("velocity_max_mm_s", c_double),
-        ("by_cut", c_bool),
-        ("min_count", c_int),
-        ("resample", c_bool),
-        ("calibration", ctypes.POINTER(CalibrationStruct)),
-        ("provenance", c_bool),
-        ("ros2", c_bool),
-        ("tai", c_bool),
-        ("uncertainty", c_int),
-        ("from_s", c_double),
-        ("to_s", c_double),
-        ("cut", c_int),
-        ("calibration_path", c_char_p),
-        ("progress", ExportProgress),
-        ("context", c_void_p),
-    ]
-    c_name = "struct incise_export_options"
+(ExportOptions,) = structs(
+    """
+    struct incise_export_options {
+        double rate_hz;
+        int depth_bins, velocity_bins;
+        double depth_max_mm, velocity_max_mm_s;
+        bool by_cut;
+        int min_count;
+        bool resample;
+        struct incise_calibration *calibration;
+        bool provenance, ros2, tai;
+        int uncertainty;
+        double from_s, to_s;
+        int cut;
+        const char *calibration_path;
+        ExportProgress progress;
+        void *context;
+    };
+    """,
+    ExportProgress=ExportProgress,
+)
 
 
-class ArrowSchema(ctypes.Structure):
-    """struct ArrowSchema"""
-
-    c_name = "struct ArrowSchema"
+class ArrowSchema(Struct, of="struct ArrowSchema"):
+    pass
 
 
-class ArrowArray(ctypes.Structure):
-    """struct ArrowArray"""
-
-    c_name = "struct ArrowArray"
+class ArrowArray(Struct, of="struct ArrowArray"):
+    pass
 
 
-class ArrowArrayStream(ctypes.Structure):
-    """struct ArrowArrayStream"""
-
-    c_name = "struct ArrowArrayStream"
+class ArrowArrayStream(Struct, of="struct ArrowArrayStream"):
+    pass
 
 
 ArrowSchema._fields_ = [
@@ -400,6 +454,17 @@ ArrowArrayStream._fields_ = [
 def text(value):
     """A text of the C library."""
     return value.decode("utf-8", "replace")
+
+
+def values(struct, names):
+    """Members of a struct as Python's values: texts, and tuples for arrays."""
+    for name in names:
+        value = getattr(struct, name)
+        if isinstance(value, bytes):
+            value = text(value)
+        elif isinstance(value, ctypes.Array):
+            value = tuple(value)
+        yield "" if value is None else value
 
 
 def call_interruptible(call, cancel):
@@ -453,5 +518,3 @@ def call_interruptible(call, cancel):
     if not good:
         raise value
     return value
-
-

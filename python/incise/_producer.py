@@ -111,11 +111,21 @@ class ColumnStream:
         batch.n_buffers = 1
         batch.buffers = ctypes.cast(self._none, ctypes.POINTER(ctypes.c_void_p))
         batch.n_children = len(self._arrays)
-        batch.children = ctypes.cast(
-            self._array_list, ctypes.POINTER(ctypes.POINTER(ArrowArray))
-        )
+        batch.children = ctypes.cast(self._array_list, ctypes.POINTER(ctypes.POINTER(ArrowArray)))
         batch.release = self._release_array
         return 0
+
+
+def column_names(table):
+    """The names of the columns of a DataFrame, table, structured array or {column: values}, or None."""
+    found = getattr(getattr(table, "dtype", None), "names", None)
+    for attribute in ("column_names", "columns"):
+        found = getattr(table, attribute, None) if found is None else found
+    if found is None and hasattr(table, "keys"):
+        found = table.keys()
+    if found is None or not any(isinstance(name, str) for name in found):
+        return None
+    return list(found)
 
 
 def open_stream(table):
@@ -127,13 +137,15 @@ def open_stream(table):
         capsule = table.__arrow_c_stream__()
         address = _capsule_pointer(capsule, b"arrow_array_stream")
         return ArrowArrayStream.from_address(address), capsule
-    if hasattr(table, "columns") and hasattr(table, "to_numpy"):  # a DataFrame of pandas
-        table = {str(name): table[name].to_numpy() for name in table.columns}
-    if hasattr(table, "keys"):
-        made = ColumnStream({name: table[name] for name in table.keys()})
-        return made.stream, made
-    raise Invalid(
-        errno.EINVAL,
-        f"a {type(table).__name__} is no table; give a path, a DataFrame, {{column: values}}, or "
-        "anything with __arrow_c_stream__",
+    names = column_names(table)
+    if names is None and not hasattr(table, "keys"):
+        raise Invalid(
+            errno.EINVAL,
+            f"a {type(table).__name__} is no table; give a path, a DataFrame, {{column: values}}, "
+            "anything with __arrow_c_stream__, or inputs and output: train(X, y)",
+        )
+    columns = {str(name): table[name] for name in names or ()}
+    made = ColumnStream(
+        {name: v.to_numpy() if hasattr(v, "to_numpy") else v for name, v in columns.items()}
     )
+    return made.stream, made

@@ -7,202 +7,94 @@ the history in calibration.conf.
 
 from __future__ import annotations
 
-import ctypes
 import errno
 import math
 from typing import Any, Dict, List, NamedTuple, Sequence, Tuple
 
 from . import _library
-from ._library import Failure, Invalid, c_bool, c_char, c_double, c_int, c_int64, c_void_p
-from ._library import function, text
+from ._library import Invalid, c_double, call, function, values
+
+(
+    ForcePairStruct,
+    ForceSetupStruct,
+    PartStruct,
+    BudgetStruct,
+    ForceStruct,
+    DepthFitStruct,
+    DepthLengthsStruct,
+    TipPoseStruct,
+    TipFitStruct,
+) = _library.structs(
+    """
+    struct incise_calibrate_force_pair {
+        double mass_g, force_N, reading_mV;
+        int series;
+        bool descending;
+    };
+    struct incise_calibrate_force_setup {
+        double gravity_m_s2, gravity_u_m_s2, air_kg_m3, air_u_kg_m3, weight_kg_m3;
+        double weight_u_kg_m3, scale_g, low_mV, high_mV, step_mV;
+        bool dithered;
+        double nominal_mV_N, tolerance;
+    };
+    struct incise_calibration_part {
+        const char *source;
+        char type;
+        double u;
+        const char *unit;
+        double sensitivity, contribution;
+    };
+    struct incise_calibration_budget {
+        int n;
+        struct incise_calibration_part part[6];
+    };
+    struct incise_calibrate_force {
+        double sensitivity_mV_N, sensitivity_u_mV_N, zero_mV, zero_u_mV, covariance;
+        double residual_sd_mV, scatter_sd_mV;
+        int freedom;
+        double misfit, linearity, hysteresis, repeatability, zero_return, resolution_N, low_N;
+        double high_N, clips_N;
+        int pairs, used, saturated, outliers, loads, series;
+        bool pass;
+        struct incise_calibration_budget budget;
+    };
+    struct incise_depth_fit {
+        double mm_px, u_mm_px, full_px, u_full_px, covariance;
+        int n, inliers, effective;
+        double sd_mm, largest_mm, low_px, high_px, bend_mm, bend_sd_mm;
+        struct incise_calibration_budget budget;
+    };
+    struct incise_depth_lengths {
+        double *depth_mm, *length_px;
+        int n;
+        double u_scale, u_depth_mm;
+    };
+    struct incise_tip_pose {
+        int64_t t_ns;
+        double position_mm[3], quaternion[4];
+    };
+    struct incise_tip_fit {
+        double tip_mm[3], covariance[9], pivot_mm[3], rms_mm, largest_mm, held_out_mm, cone_deg;
+        double least_deg, least[3], condition, moved_mm, moved_sd_mm;
+        int n, inliers, block, blocks;
+    };
+    """
+)
 
 
-class ForcePairStruct(ctypes.Structure):
-    """struct incise_calibrate_force_pair"""
-
-    _fields_ = [
-        ("mass_g", c_double),
-        ("force_N", c_double),
-        ("reading_mV", c_double),
-        ("series", c_int),
-        ("descending", c_bool),
-    ]
-    c_name = "struct incise_calibrate_force_pair"
-
-
-class ForceSetupStruct(ctypes.Structure):
-    """struct incise_calibrate_force_setup"""
-
-    _fields_ = [
-        ("gravity_m_s2", c_double),
-        ("gravity_u_m_s2", c_double),
-        ("air_kg_m3", c_double),
-        ("air_u_kg_m3", c_double),
-        ("weight_kg_m3", c_double),
-        ("weight_u_kg_m3", c_double),
-        ("scale_g", c_double),
-        ("low_mV", c_double),
-        ("high_mV", c_double),
-        ("step_mV", c_double),
-        ("dithered", c_bool),
-        ("nominal_mV_N", c_double),
-        ("tolerance", c_double),
-    ]
-    c_name = "struct incise_calibrate_force_setup"
-
-
-class PartStruct(ctypes.Structure):
-    """struct incise_calibration_part"""
-
-    _fields_ = [
-        ("source", ctypes.c_char_p),
-        ("type", c_char),
-        ("u", c_double),
-        ("unit", ctypes.c_char_p),
-        ("sensitivity", c_double),
-        ("contribution", c_double),
-    ]
-    c_name = "struct incise_calibration_part"
-
-
-class BudgetStruct(ctypes.Structure):
-    """struct incise_calibration_budget"""
-
-    _fields_ = [("n", c_int), ("part", PartStruct * 6)]
-    c_name = "struct incise_calibration_budget"
-
-
-class ForceStruct(ctypes.Structure):
-    """struct incise_calibrate_force"""
-
-    _fields_ = [
-        ("sensitivity_mV_N", c_double),
-        ("sensitivity_u_mV_N", c_double),
-        ("zero_mV", c_double),
-        ("zero_u_mV", c_double),
-        ("covariance", c_double),
-        ("residual_sd_mV", c_double),
-        ("scatter_sd_mV", c_double),
-        ("freedom", c_int),
-        ("misfit", c_double),
-        ("linearity", c_double),
-        ("hysteresis", c_double),
-        ("repeatability", c_double),
-        ("zero_return", c_double),
-        ("resolution_N", c_double),
-        ("low_N", c_double),
-        ("high_N", c_double),
-        ("clips_N", c_double),
-        ("pairs", c_int),
-        ("used", c_int),
-        ("saturated", c_int),
-        ("outliers", c_int),
-        ("loads", c_int),
-        ("series", c_int),
-        ("passed", c_bool),
-        ("budget", BudgetStruct),
-    ]
-    c_name = "struct incise_calibrate_force"
-    c_fields = {"passed": "pass"}  # a word of Python
-
-
-class DepthFitStruct(ctypes.Structure):
-    """struct incise_depth_fit"""
-
-    _fields_ = [
-        ("mm_px", c_double),
-        ("u_mm_px", c_double),
-        ("full_px", c_double),
-        ("u_full_px", c_double),
-        ("covariance", c_double),
-        ("n", c_int),
-        ("inliers", c_int),
-        ("effective", c_int),
-        ("sd_mm", c_double),
-        ("largest_mm", c_double),
-        ("low_px", c_double),
-        ("high_px", c_double),
-        ("bend_mm", c_double),
-        ("bend_sd_mm", c_double),
-        ("budget", BudgetStruct),
-    ]
-    c_name = "struct incise_depth_fit"
-
-
-class DepthLengthsStruct(ctypes.Structure):
-    """struct incise_depth_lengths"""
-
-    _fields_ = [
-        ("depth_mm", ctypes.POINTER(c_double)),
-        ("length_px", ctypes.POINTER(c_double)),
-        ("n", c_int),
-        ("u_scale", c_double),
-        ("u_depth_mm", c_double),
-    ]
-    c_name = "struct incise_depth_lengths"
-
-
-class TipPoseStruct(ctypes.Structure):
-    """struct incise_tip_pose"""
-
-    _fields_ = [("t_ns", c_int64), ("position_mm", c_double * 3), ("quaternion", c_double * 4)]
-    c_name = "struct incise_tip_pose"
-
-
-class TipFitStruct(ctypes.Structure):
-    """struct incise_tip_fit"""
-
-    _fields_ = [
-        ("tip_mm", c_double * 3),
-        ("covariance", c_double * 9),
-        ("pivot_mm", c_double * 3),
-        ("rms_mm", c_double),
-        ("largest_mm", c_double),
-        ("held_out_mm", c_double),
-        ("cone_deg", c_double),
-        ("least_deg", c_double),
-        ("least", c_double * 3),
-        ("condition", c_double),
-        ("moved_mm", c_double),
-        ("moved_sd_mm", c_double),
-        ("n", c_int),
-        ("inliers", c_int),
-        ("block", c_int),
-        ("blocks", c_int),
-    ]
-    c_name = "struct incise_tip_fit"
-
-
-_library.declare(
+_library.prototypes(
     "libincise-learn",
-    {
-        "incise_calibrate_force_init": (None, ctypes.POINTER(ForceSetupStruct)),
-        "incise_calibrate_gravity": (c_double, c_double, c_double),
-        "incise_calibrate_force": (
-            c_int,
-            ctypes.POINTER(ForcePairStruct),
-            c_int,
-            ctypes.POINTER(ForceSetupStruct),
-            ctypes.POINTER(ForceStruct),
-            c_void_p,
-            c_void_p,
-        ),
-        "incise_calibrate_depth_line": (
-            c_int,
-            ctypes.POINTER(DepthLengthsStruct),
-            c_void_p,
-            ctypes.POINTER(DepthFitStruct),
-            c_void_p,
-        ),
-        "incise_calibrate_tip": (
-            c_int,
-            ctypes.POINTER(TipPoseStruct),
-            c_int,
-            c_void_p,
-            ctypes.POINTER(TipFitStruct),
-            c_void_p,
-        ),
-    },
+    """
+    void incise_calibrate_force_init(struct incise_calibrate_force_setup *setup);
+    double incise_calibrate_gravity(double latitude_deg, double altitude_m);
+    int incise_calibrate_force(const struct incise_calibrate_force_pair *pairs, int n,
+        const struct incise_calibrate_force_setup *setup, struct incise_calibrate_force *result,
+        enum incise_calibrate_force_state *states, struct incise_error *err);
+    int incise_calibrate_depth_line(const struct incise_depth_lengths *pairs, bool *inlier,
+        struct incise_depth_fit *fit, struct incise_error *err);
+    int incise_calibrate_tip(const struct incise_tip_pose *poses, int n, bool *inlier,
+        struct incise_tip_fit *fit, struct incise_error *err);
+    """,
 )
 
 
@@ -217,10 +109,7 @@ class Part(NamedTuple):
 
 
 def _parts(budget: BudgetStruct) -> Tuple[Part, ...]:
-    return tuple(
-        Part(text(p.source), text(p.type), p.u, text(p.unit), p.sensitivity)
-        for p in budget.part[: budget.n]
-    )
+    return tuple(Part(*values(part, Part._fields)) for part in budget.part[: budget.n])
 
 
 class Force(NamedTuple):
@@ -287,7 +176,7 @@ def force(
     down = [bool(d) for d in descending] or [False] * len(masses)
     n = _same_length(mass_g=masses, reading_mV=readings, series=runs, descending=down)
     given = ForceSetupStruct()
-    function("incise_calibrate_force_init")(ctypes.byref(given))
+    function("incise_calibrate_force_init")(given)
     names = [name for name, _ in ForceSetupStruct._fields_]
     for name, value in setup.items():
         if name not in names:
@@ -299,13 +188,10 @@ def force(
             for mass, reading, run, is_down in zip(masses, readings, runs, down)
         )
     )
-    result, failure = ForceStruct(), Failure()
-    failure.check(
-        function("incise_calibrate_force")(
-            pairs, n, ctypes.byref(given), ctypes.byref(result), None, failure.ref
-        )
-    )
-    return Force(*(getattr(result, name) for name in Force._fields[:-1]), _parts(result.budget))
+    result = ForceStruct()
+    call("incise_calibrate_force", pairs, n, given, result, None)
+    names = [{"passed": "pass"}.get(name, name) for name in Force._fields[:-1]]
+    return Force(*values(result, names), _parts(result.budget))
 
 
 class Depth(NamedTuple):
@@ -334,13 +220,9 @@ def depth(
     n = _same_length(depth_mm=depths, length_px=lengths)
     kind = c_double * max(n, 1)
     pairs = DepthLengthsStruct(kind(*depths), kind(*lengths), n, u_scale, u_depth_mm)
-    fit, failure = DepthFitStruct(), Failure()
-    failure.check(
-        function("incise_calibrate_depth_line")(
-            ctypes.byref(pairs), None, ctypes.byref(fit), failure.ref
-        )
-    )
-    return Depth(*(getattr(fit, name) for name in Depth._fields[:-1]), _parts(fit.budget))
+    fit = DepthFitStruct()
+    call("incise_calibrate_depth_line", pairs, None, fit)
+    return Depth(*values(fit, Depth._fields[:-1]), _parts(fit.budget))
 
 
 class Tip(NamedTuple):
@@ -358,32 +240,22 @@ class Tip(NamedTuple):
 def tip(poses: Any) -> Tip:
     """Pivot calibration from poses: a table such as ``rec.tracker``, or {t_ns, x_mm, y_mm, z_mm, qw,
     qx, qy, qz}."""
-    from .plan import _columns
+    from ._plan import _columns
 
     columns: Dict[str, Any] = _columns(poses)
     missing = [name for name in ("qw", "qx", "qy", "qz") if name not in columns]
     if missing:
         raise Invalid(errno.EINVAL, f"poses have no column {', '.join(missing)}")
     names = ("x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz")
-    values = {name: _numbers(name, columns[name]) for name in names}
+    rows = {name: _numbers(name, columns[name]) for name in names}
     times = [int(t) for t in columns["t_ns"]]
-    n = _same_length(t_ns=[float(t) for t in times], **values)
+    n = _same_length(t_ns=[float(t) for t in times], **rows)
     made = (TipPoseStruct * max(n, 1))()
     for i in range(n):
         made[i].t_ns = times[i]
-        made[i].position_mm[:] = [values[name][i] for name in names[:3]]
-        made[i].quaternion[:] = [values[name][i] for name in names[3:]]
-    fit, failure = TipFitStruct(), Failure()
-    failure.check(
-        function("incise_calibrate_tip")(made, n, None, ctypes.byref(fit), failure.ref)
-    )
-    u = [math.sqrt(max(fit.covariance[4 * i], 0)) for i in range(3)]
-    return Tip(
-        (fit.tip_mm[0], fit.tip_mm[1], fit.tip_mm[2]),
-        (u[0], u[1], u[2]),
-        (fit.pivot_mm[0], fit.pivot_mm[1], fit.pivot_mm[2]),
-        fit.rms_mm,
-        fit.cone_deg,
-        fit.n,
-        fit.inliers,
-    )
+        made[i].position_mm[:] = [rows[name][i] for name in names[:3]]
+        made[i].quaternion[:] = [rows[name][i] for name in names[3:]]
+    fit = TipFitStruct()
+    call("incise_calibrate_tip", made, n, None, fit)
+    fit.u_mm = tuple(math.sqrt(max(fit.covariance[4 * i], 0)) for i in range(3))
+    return Tip(*values(fit, Tip._fields))

@@ -14,9 +14,8 @@ import warnings
 from typing import Any, Tuple, Union
 
 from ._host import FADES, Host
-from ._library import Invalid, NotFound
-from .plan import Tick, Vector
-from .recording import PathLike
+from ._library import Invalid, NotFound, PathLike
+from ._plan import Tick, Vector
 
 _attached: Tuple[Attachment, ...] = ()
 _callback_before: Any = None  # the program's own, which runs first

@@ -18,8 +18,13 @@ python_tests() {
 	[[ "$output" == *OK* ]]
 }
 
+# The examples of the README, as a program.
+readme_code() {
+	sed -n '/^```python$/,/^```$/p' "$root/python/README.md" | sed '/^```/d'
+}
+
 # bats test_tags=check
-@test "python: structs are those of the headers" {
+@test "python: structs and functions are those of the headers" {
 	run -0 /usr/bin/python3 abi.py "${CC:-cc}"
 	[[ "$output" == *" structs, "*" fields" ]]
 }
@@ -29,7 +34,7 @@ python_tests() {
 }
 
 @test "python: models, scenes and calibrations, with Debian's packages" {
-	python_tests /usr/bin/python3 -m unittest -v test_model test_plan test_host test_names
+	python_tests /usr/bin/python3 -m unittest -v test_model test_plan test_host test_names test_typed
 }
 
 @test "python: without any package" {
@@ -59,6 +64,21 @@ python_tests() {
 	python_tests "$peers" -m unittest -v test_model.Estimator
 }
 
+@test "python: what researchers type works, or raises one clear line" {
+	[ -x "$peers" ] || skip "pip could not install tests/python/requirements.txt"
+	python_tests "$peers" -m unittest -v test_typed
+}
+
+@test "python: examples and notebooks pass mypy --strict" {
+	[ -x "$peers" ] || skip "pip could not install tests/python/requirements.txt"
+	cd "$BATS_TEST_TMPDIR"
+	readme_code >readme.py
+	for program in readme.py "$root"/examples/*.py "$root"/doc/notebooks/*.py; do
+		MYPYPATH="$root/python" run -0 "$peers" -m mypy --strict --follow-imports=silent \
+			--ignore-missing-imports "$program"
+	done
+}
+
 # Cells are comments: the same file is a program. make notebooks runs it as a notebook.
 @test "python: notebooks run" {
 	[ -x "$peers" ] || skip "pip could not install tests/python/requirements.txt"
@@ -74,7 +94,7 @@ python_tests() {
 	command -v incise
 	cd "$BATS_TEST_TMPDIR"
 	incise capture -o liver.rec --rig sim:seed=1,clock=simulated
-	sed -n '/^```python$/,/^```$/p' "$root/python/README.md" | sed '/^```/d' >readme.py
+	readme_code >readme.py
 	[ "$(wc -l <readme.py)" -gt 15 ]
 	[ -x "$peers" ] || skip "pip could not install tests/python/requirements.txt"
 	run -0 "$peers" readme.py

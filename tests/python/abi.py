@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Whether the structs of python/incise are those of the headers.
+"""Whether the structs and functions of python/incise are those of the headers.
 
     python3 tests/python/abi.py [CC]
 
 Writes a C program that holds size and place of each field against what ctypes laid out, and
-compiles and runs it. A struct whose fields are fewer in Python is found by its size.
+compiles and runs it. A struct whose fields are fewer in Python is found by its size. It declares each
+function once more as Python does, which the compiler refuses where a header declares it otherwise.
 """
 
 import ctypes
@@ -15,11 +16,14 @@ import sys
 import tempfile
 
 import incise
+from incise import _library
 
-MODULES = "_corpus _host _library arrow calibrate capture model plan recording verify wall".split()
+MODULES = (
+    "_arrow _capture _corpus _host _library _model _plan _recording _verify _wall calibrate"
+).split()
 HEADERS = (
-    "arrow camera capture calibrate_depth calibrate_force calibrate_tip calibration corpus fixed host model plan prove recording "
-    "stability tracker train uncertainty verify wall"
+    "arrow camera capture calibrate_depth calibrate_force calibrate_tip calibration corpus dataset "
+    "clock fixed host model origin plan prove recording rig scene stability tracker train uncertainty verify wall"
 ).split()
 
 
@@ -27,7 +31,6 @@ def structs():
     """All structs with a name in C, once each."""
     found = {}
     for module in MODULES:
-        # Not `from incise import verify`, which is a function.
         for value in vars(importlib.import_module(f"incise.{module}")).values():
             if (
                 isinstance(value, type)
@@ -39,8 +42,11 @@ def structs():
 
 
 def program():
+    found = structs()  # loads the modules with their prototypes
     lines = ["#include <stddef.h>", "#include <stdio.h>"]
     lines += [f"#include <incise/{header}.h>" for header in HEADERS]
+    lines += [f"enum {{ known_{name} = sizeof(&{name}) }};" for name in _library._signatures]
+    lines += _library.declared
     lines += [
         "#define HOLDS(what, c, python) do { if ((size_t)(c) != (size_t)(python)) { "
         'printf("%s: %zu in C, %zu in Python\\n", what, (size_t)(c), (size_t)(python)); bad = 1; } '
@@ -48,19 +54,18 @@ def program():
         "int main(void)\n{\n\tint bad = 0;",
     ]
     count = 0
-    for name, struct in structs().items():
+    for name, struct in found.items():
         lines.append(f'\tHOLDS("{name}", sizeof({name}), {ctypes.sizeof(struct)});')
         for field, *_ in struct._fields_:
-            c_field = getattr(struct, "c_fields", {}).get(field, field)
             place = getattr(struct, field)
             lines.append(
-                f'\tHOLDS("{name} {c_field}", offsetof({name}, {c_field}), {place.offset});'
+                f'\tHOLDS("{name} {field}", offsetof({name}, {field}), {place.offset});'
             )
             lines.append(
-                f'\tHOLDS("{name} {c_field}, size", sizeof((({name} *)0)->{c_field}), {place.size});'
+                f'\tHOLDS("{name} {field}, size", sizeof((({name} *)0)->{field}), {place.size});'
             )
             count += 1
-    lines.append(f'\tif (!bad) puts("{len(structs())} structs, {count} fields");')
+    lines.append(f'\tif (!bad) puts("{len(found)} structs, {count} fields");')
     lines.append("\treturn bad;\n}")
     return "\n".join(lines) + "\n"
 

@@ -49,7 +49,7 @@ class Foreign(Case):
             self.assertEqual(again.schema.types, read.schema.types)
             self.same({c: again[c].to_numpy() for c in again.column_names}, table.numpy(), name)
             self.assertTrue(again.schema.equals(read.schema, check_metadata=True), name)
-        none = self.rec.pairs(from_s=0.001, to_s=0.002)
+        none = self.rec.pairs().between(0.001, 0.002)
         self.says(Exception, "no cut", none.parquet, self.path("none.parquet"))
         self.assertNotIn("none.parquet", " ".join(os.listdir(self.folder)))
 
@@ -141,7 +141,7 @@ class Foreign(Case):
         table = incise.open(path, damaged=True).force
         with self.assertRaises(Exception) as caught:
             pyarrow.table(table)
-        self.assertIn("table force, row 70000: ", str(caught.exception))
+        self.assertIn("stream force, block 70: ", str(caught.exception))
         with self.assertRaises(incise.Invalid):
             pyarrow.table(incise.open(path).force)
 

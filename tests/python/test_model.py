@@ -240,7 +240,7 @@ class Models(Case):
         if has("numpy"):
             forms.append(table.numpy())
         if has("numpy", "pandas"):
-            forms.append(table.pandas())
+            forms.append(table.to_pandas())
         for form in forms:
             self.assertEqual(incise.train(form, **OPTIONS, **QUICK)((5, 20)), wanted, type(form))
 
@@ -271,7 +271,7 @@ class Models(Case):
             self.says(incise.Invalid, said, incise.train, self.csv, **options)
 
     def same_files(self, model, wanted):
-        model.save(self.path("list.fis"))
+        model.save(self.path("list.fis"), overwrite=True)
         for end in ("", ".sd"):
             with open(self.path("list.fis") + end) as a, open(wanted + end) as b:
                 self.assertEqual(a.read(), b.read())
@@ -435,7 +435,7 @@ class Models(Case):
             "data = {'a': [i * 37 % 101 for i in range(n)], 'b': [i * 53 % 97 for i in range(n)],\n"
             "        'c': [i * 71 % 89 for i in range(n)],\n"
             "        'y': [math.sin(i) for i in range(n)]}\n"
-            "training = sys.modules['incise.model']._Training\n"
+            "training = sys.modules['incise._model']._Training\n"
             "run = training.run\n"
             "def tell_and_run(*arguments):\n"
             "    print('ready', flush=True)\n"
@@ -528,6 +528,8 @@ class Estimator(Case):
                 "check_estimators_dtypes",
                 "check_supervised_y_2d",
                 "check_regressors_no_decision_function",
+                "check_all_zero_sample_weights_error",
+                "check_sample_weight_equivalence_on_dense_data",
             },
         )
 

@@ -3,10 +3,12 @@
 
 import math
 import os
+import sys
 import threading
 import unittest
 
 import incise
+from incise import _plan
 from fixtures import Case, has, run
 
 
@@ -35,7 +37,7 @@ class Plans(Case):
         poses = [position for _, position in stroke(125)]
         for k in range(1000):
             ticks.append(plan.step(1 + k * 1e-3, poses[k // 8] if k % 8 == 0 else None))
-        contact = [tick for tick in ticks if tick.flags & incise.plan.FLAGS["contact"]]
+        contact = [tick for tick in ticks if tick.flags & incise.FLAGS["contact"]]
         self.assertGreater(len(contact), 100)
         self.assertGreater(max(tick.command_N[2] for tick in contact), 0.2)
         self.assertEqual(ticks[-1].tool, "blade")
@@ -87,7 +89,7 @@ class Plans(Case):
         os.environ["INCISE_LIBDIR"] = self.path("opt/lib")
         try:
             self.assertEqual(
-                os.path.realpath(incise.plan.find_scene("own")),
+                os.path.realpath(_plan.find_scene("own")),
                 os.path.realpath(os.path.join(folder, "own.scene")),
             )
         finally:
@@ -150,6 +152,36 @@ class Plans(Case):
         ):
             self.says(incise.Invalid, said, plan.run, bad)
         self.says(incise.Invalid, "no column hour", plan.run, rec.tracker, arrival="hour")
+
+
+class Haptics(Case):
+    def test_a_run_has_the_ticks_of_the_command(self):
+        log = self.path("ticks.csv")
+        rig = "sim:clock=simulated"
+        run("incise", "haptic", "neck", "--rig", rig, "--duration", "2s", "-o", log)
+        session = self.path("a.session")
+        loop = incise.Haptic("neck", rig, duration_s=2, procedure=False, session=session)
+        ticks = loop.wait()
+        self.assertIs(loop.wait(), ticks)
+        wanted = incise.read_log(log)
+        self.assertEqual(list(ticks), list(wanted))
+        for name, values in wanted.items():
+            self.assertEqual(list(ticks[name]), list(values), name)
+        self.assertEqual(loop.report["ticks"], 2000)
+        self.assertTrue(os.path.exists(session))
+
+    def test_it_ends_behind_the_block(self):
+        with incise.Haptic("neck", "sim:", realtime=False) as loop:
+            self.assertIn("runs", repr(loop))
+        self.assertIn("has ended", repr(loop))
+        self.assertIsNotNone(loop._process.returncode)
+        loop.stop()
+        self.assertIsNone(loop.wait())
+
+    def test_it_ends_with_python(self):
+        start = "loop = incise.Haptic('neck', 'sim:', realtime=False)"
+        pid = int(run(sys.executable, "-c", f"import incise; {start}; print(loop._process.pid)"))
+        self.assertRaises(ProcessLookupError, os.kill, pid, 0)
 
 
 class Calibrations(Case):

@@ -54,10 +54,31 @@ class Recordings(Case):
         self.assertEqual(info.streams[1].lost, 0)
         self.assertEqual(info.surface_normal, (0, 0, 1))
 
+    def test_parts_are_rows_of_the_whole(self):
+        """Of each stream the rows whose times are in the part, and of a cut those from its first pair
+        to its last; next to a filter in Python."""
+        start_ns = self.rec.info.start_ns
+        cut = rows(self.rec.pairs().cut(3))["t_s"]
+        for name in ("force", "tracker", "depth", "events"):
+            table = getattr(self.rec, name)
+            whole = rows(table)
+            for part, from_s, to_s in (
+                (table.between(10, 11.5), 10, 11.5),
+                (table.between(0, 0.5), 0, 0.5),
+                (table.between(42.5), 42.5, math.inf),
+                (table.cut(3), cut[0], cut[-1] + 1e-9),
+                (getattr(self.rec.cut(3), name), cut[0], cut[-1] + 1e-9),
+            ):
+                inside = [from_s <= round(t - start_ns) * 1e-9 < to_s for t in whole["t_ns"]]
+                wanted = {c: [v for v, i in zip(values, inside) if i] for c, values in whole.items()}
+                self.assertEqual(repr(rows(part)), repr(wanted), (name, from_s))
+                self.assertEqual(len(part), sum(inside))
+        self.assertEqual(rows(self.rec.pairs().between(10, 20).cut(5)), rows(self.rec.pairs().cut(5).between(10, 20)))
+
     def test_parquet_needs_pyarrow(self):
         with unittest.mock.patch.dict(sys.modules, {"pyarrow": None}):
             path = self.path("force.parquet")
-            self.says(ImportError, "pip install pyarrow", self.rec.force.parquet, path)
+            self.says(incise.NotFound, "pip install pyarrow", self.rec.force.parquet, path)
         self.assertEqual(os.listdir(self.folder), [])
 
     def test_streams_are_the_blocks(self):
@@ -407,7 +428,7 @@ class Recordings(Case):
 
     @unittest.skipUnless(has("numpy", "pandas"), "pandas is not installed")
     def test_pandas(self):
-        frame = self.rec.pairs(12, 10, by_cut=True).pandas()
+        frame = self.rec.pairs(12, 10, by_cut=True).to_pandas()
         self.assertEqual(frame.columns[0], "cut")
         self.assertEqual(frame.attrs["units"]["force_N"], "N")
         self.assertEqual(frame.cut.nunique(), 14)

@@ -161,7 +161,7 @@ static struct incise_model *train(const struct row *row, const struct data *data
 							    SPEED_mm_s},
 							   {"force_N", 0, 3}};
 	static const char *const names[] = {"depth_mm", "velocity_mm_s", "force_N"};
-	struct incise_pairs pairs = {data->row[0], PAIRS, 2};
+	struct incise_pairs pairs = {.rows = data->row[0], .n = PAIRS, .n_inputs = 2};
 	struct incise_train_options options;
 	int mfs[2] = {row->mfs[0], row->mfs[1]};
 	struct incise_error err = {0};
@@ -236,10 +236,12 @@ static void add_baselines(struct training *t)
 {
 	struct row *mean = add_baseline(t, "mean"), *linear = add_baseline(t, "linear"),
 		   *knn = add_baseline(t, "knn");
-	const struct incise_pairs unseen = {t->unseen[0], UNSEEN, 2};
+	const struct incise_pairs unseen = {
+		.rows = t->unseen[0], .n = UNSEEN, .n_inputs = 2};
 
 	for (int s = 0; s < t->seeds; s++) {
-		const struct incise_pairs pairs = {t->data[s].row[0], PAIRS, 2};
+		const struct incise_pairs pairs = {
+			.rows = t->data[s].row[0], .n = PAIRS, .n_inputs = 2};
 		struct incise_baselines found;
 		struct incise_error err = {0};
 

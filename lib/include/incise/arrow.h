@@ -96,7 +96,7 @@ struct incise_recording;
  * A stream that was opened before fork(2) fails in the child with EINVAL.
  *
  * @param what    as above
- * @param options calibration of any stream, and all of "table"; progress is called for "table"
+ * @param options calibration, from_s and to_s of any stream, and all of "table"; progress is called for "table"
  *                only, from a thread of the stream; copied. NULL: the defaults
  * @param stream  result; the caller calls its release. Its get_next() returns EINVAL (an
  *                impossible row), EIO, ENODATA (no cut), EINTR (stopped by progress), ENOMEM

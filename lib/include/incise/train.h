@@ -25,6 +25,11 @@ struct incise_pairs {
 	const double *rows;
 	size_t n;
 	int n_inputs;
+	/**
+	 * Of each training pair, above 0: one of weight 2 counts as two. NULL: 1. Reported errors
+	 * and the noise of the standard deviation do not have them.
+	 */
+	const double *weights;
 };
 
 /** A phase of a training. */
@@ -154,7 +159,8 @@ INCISE_API void incise_train_options_init(struct incise_train_options *options);
  * training pairs
  * @param check   or NULL
  * @param report  or NULL
- * @return 0; -EINVAL (no pairs, a value that is not finite, wrong n_inputs, a constant input),
+ * @return 0; -EINVAL (no pairs, a value that is not finite, wrong n_inputs, a constant input, a weight
+ *         that is not above 0, weights with classic),
  *         -ENODATA (fewer pairs than consequent parameters), -ENOTSUP (the rules are not a
  *         full grid, the AND method is min, or another kind of membership function), -ERANGE (a
  *         training pair is a whole range or more outside the model's ranges), -EDOM

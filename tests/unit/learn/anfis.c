@@ -38,7 +38,7 @@ static double squared_error(const struct incise_model *model,
  */
 TEST(test_gradient)
 {
-	struct incise_pairs pairs = {rows, PAIRS, 2};
+	struct incise_pairs pairs = {.rows = rows, .n = PAIRS, .n_inputs = 2};
 
 	fill();
 	for (int type = 0; type < 2; type++) {
@@ -107,7 +107,7 @@ static int count_epoch(void *user, const struct incise_train_step *step)
 /* The epoch of the least training error is returned, not the last. */
 TEST(test_best_epoch_is_kept)
 {
-	struct incise_pairs pairs = {rows, PAIRS, 2};
+	struct incise_pairs pairs = {.rows = rows, .n = PAIRS, .n_inputs = 2};
 	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 1, 1);
 	int epochs = 0;
 	struct incise_watch watch = {.progress = count_epoch, .user = &epochs};

@@ -48,8 +48,12 @@ static void make_cuts(enum truth kind, uint64_t seed)
 	}
 }
 
-static const struct incise_pairs train = {rows[0], CUTS *PER_CUT, 2},
-				 unseen = {rows[CUTS * PER_CUT], UNSEEN_CUTS *PER_CUT, 2};
+static const struct incise_pairs train = {.rows = rows[0],
+					  .n = CUTS * PER_CUT,
+					  .n_inputs = 2},
+				 unseen = {.rows = rows[CUTS * PER_CUT],
+					   .n = UNSEEN_CUTS * PER_CUT,
+					   .n_inputs = 2};
 
 static struct incise_model *learn(const int *mfs, struct incise_uncertainty **uncertainty,
 				  struct incise_train_report *report)
@@ -183,7 +187,8 @@ TEST(test_shares)
 {
 	static const struct incise_variable in[] = {{"x", 0, 1}, {"y", 0, 1}};
 	static double scaled[ROWS][3];
-	struct incise_pairs pairs = {scaled[0], CUTS * PER_CUT, 2};
+	struct incise_pairs pairs = {
+		.rows = scaled[0], .n = CUTS * PER_CUT, .n_inputs = 2};
 	struct incise_average *average;
 	struct incise_average_shares shares;
 	struct incise_folds folds;

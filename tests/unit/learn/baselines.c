@@ -27,7 +27,7 @@ static double stairs(double x, double y)
 
 TEST(test_plane)
 {
-	struct incise_pairs pairs = {rows, 400, 2};
+	struct incise_pairs pairs = {.rows = rows, .n = 400, .n_inputs = 2};
 	struct incise_baselines b;
 	double sum = 0, mean = 0;
 
@@ -45,7 +45,7 @@ TEST(test_plane)
 /* On stairs the neighbours know and the line does not. */
 TEST(test_stairs)
 {
-	struct incise_pairs pairs = {rows, 400, 2};
+	struct incise_pairs pairs = {.rows = rows, .n = 400, .n_inputs = 2};
 	struct incise_baselines b;
 
 	fill(stairs);
@@ -61,7 +61,7 @@ TEST(test_stairs)
  */
 TEST(test_no_peeking)
 {
-	struct incise_pairs pairs = {rows, 400, 2};
+	struct incise_pairs pairs = {.rows = rows, .n = 400, .n_inputs = 2};
 	struct incise_baselines b;
 	int groups[400];
 	uint64_t seed = 3;
@@ -85,8 +85,9 @@ TEST(test_no_peeking)
 
 TEST(test_refusals)
 {
-	struct incise_pairs pairs = {rows, 400, 2}, none = {rows, 0, 2},
-			    other = {rows, 10, 3};
+	struct incise_pairs pairs = {.rows = rows, .n = 400, .n_inputs = 2},
+			    none = {.rows = rows, .n = 0, .n_inputs = 2},
+			    other = {.rows = rows, .n = 10, .n_inputs = 3};
 	struct incise_baselines b;
 
 	assert_int_equal(incise_baselines(&none, NULL, &pairs, NULL, NULL, &b, NULL),

@@ -10,7 +10,7 @@
 
 static double rows[PAIRS * 2];
 static int groups[PAIRS];
-static const struct incise_pairs pairs = {rows, PAIRS, 1};
+static const struct incise_pairs pairs = {.rows = rows, .n = PAIRS, .n_inputs = 1};
 
 static void fill(int per_group)
 {

@@ -12,7 +12,7 @@ static double rows[400 * 3];
 static void choose(double bends, double noise, size_t n, int *n_mfs, int want)
 {
 	static const struct incise_variable in[] = {{"a", 0, 1}, {"b", 0, 1}};
-	struct incise_pairs pairs = {rows, n, 2};
+	struct incise_pairs pairs = {.rows = rows, .n = n, .n_inputs = 2};
 	struct incise_train_options options;
 	struct incise_error err = {0};
 	uint64_t seed = 4;
@@ -61,7 +61,7 @@ TEST(test_few_pairs)
 TEST(test_start)
 {
 	static const char *const names[] = {"a", "b", "y"};
-	struct incise_pairs pairs = {rows, 400, 2};
+	struct incise_pairs pairs = {.rows = rows, .n = 400, .n_inputs = 2};
 	struct incise_train_options options;
 	struct incise_model *model;
 	int n_mfs[2], chosen[2] = {0}, given[2] = {3, 2};

@@ -17,7 +17,7 @@ TEST(test_output)
 
 	for (int s = 0; s < 5; s++) {
 		double rows[20], row[2], mean = 0, square = 0;
-		struct incise_pairs pairs = {rows, 10, 1};
+		struct incise_pairs pairs = {.rows = rows, .n = 10, .n_inputs = 1};
 		struct incise_scaling scaling;
 
 		for (int i = 0; i < 10; i++) {
@@ -82,8 +82,9 @@ TEST(test_refusals)
 	static const struct incise_variable in[] = {{"depth_mm", 0, 1},
 						    {"velocity_mm_s", 0, 1}};
 	double rows[30];
-	struct incise_pairs pairs = {rows, 10, 2}, few = {rows, 4, 2},
-			    none = {rows, 0, 2};
+	struct incise_pairs pairs = {.rows = rows, .n = 10, .n_inputs = 2},
+			    few = {.rows = rows, .n = 4, .n_inputs = 2},
+			    none = {.rows = rows, .n = 0, .n_inputs = 2};
 
 	for (int i = 0; i < 30; i++)
 		rows[i] = i;
@@ -105,7 +106,7 @@ TEST(test_sample)
 {
 	static double rows[2000];
 	static int groups[1000];
-	struct incise_pairs pairs = {rows, 1000, 1};
+	struct incise_pairs pairs = {.rows = rows, .n = 1000, .n_inputs = 1};
 	struct incise_scaling scaling = {1, {0, 0}, {1, 1}};
 
 	for (int i = 0; i < 1000; i++) {
@@ -144,7 +145,7 @@ TEST(test_r2)
 
 	for (int s = 0; s < 3; s++) {
 		double rows[] = {0, 1 * sizes[s], 0, 2 * sizes[s], 0, 3 * sizes[s]};
-		struct incise_pairs pairs = {rows, 3, 1};
+		struct incise_pairs pairs = {.rows = rows, .n = 3, .n_inputs = 1};
 
 		/* The variance is 2/3. */
 		assert_true(fabs(incise_pairs_r2(&pairs, sizes[s]) + 0.5) < 1e-14);

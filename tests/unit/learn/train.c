@@ -92,7 +92,8 @@ static void train_mackey_glass(int first, int epochs, struct curve *curve,
 {
 	static double rows[1000 * 5];
 	const int mfs[] = {2, 2, 2, 2};
-	struct incise_pairs train = {rows, 500, 4}, check = {rows + 500 * 5, 500, 4};
+	struct incise_pairs train = {.rows = rows, .n = 500, .n_inputs = 4},
+			    check = {.rows = rows + 500 * 5, .n = 500, .n_inputs = 4};
 	struct incise_train_options options;
 	struct incise_model *model;
 	double min[4], max[4];
@@ -194,7 +195,7 @@ TEST(test_jang_example_2)
 	const int mfs[] = {2, 2, 2};
 	const double min[] = {1, 1, 1}, max[] = {6, 6, 6};
 	struct incise_model *model = grid(3, min, max, mfs, INCISE_MF_GBELL);
-	struct incise_pairs pairs = {rows, cube(rows, 1, 6), 3};
+	struct incise_pairs pairs = {.rows = rows, .n = cube(rows, 1, 6), .n_inputs = 3};
 
 	cube(check, 1.5, 5);
 	incise_train_options_init(&options);
@@ -219,7 +220,8 @@ TEST(test_default_holds_on_unseen_cut)
 	int groups[200];
 	const int mfs[] = {5, 4};
 	double min[2], max[2];
-	struct incise_pairs train = {rows, 200, 2}, check = {rows + 200 * 3, 100, 2};
+	struct incise_pairs train = {.rows = rows, .n = 200, .n_inputs = 2},
+			    check = {.rows = rows + 200 * 3, .n = 100, .n_inputs = 2};
 	struct incise_baselines baselines;
 	struct incise_model *model;
 	uint32_t seed = 7;
@@ -261,7 +263,7 @@ TEST(test_deterministic_and_scale_free)
 
 	for (int s = 0; s < 4; s++) {
 		double rows[100 * 3];
-		struct incise_pairs pairs = {rows, 100, 2};
+		struct incise_pairs pairs = {.rows = rows, .n = 100, .n_inputs = 2};
 		struct incise_model *model = grid(2, min, max, mfs, INCISE_MF_GAUSS);
 
 		for (int i = 0; i < 100; i++) {
@@ -283,6 +285,96 @@ TEST(test_deterministic_and_scale_free)
 	assert_true(fabs(rmse[3] / rmse[0] - 1) < 1e-6);
 }
 
+/* Pairs of y = x0 + x1² and, every other, of that and 1. */
+#define WEIGHED 240
+static void weighed_rows(double *rows)
+{
+	for (int i = 0; i < WEIGHED; i++) {
+		double *row = rows + 3 * i;
+
+		row[0] = i * 37 % WEIGHED / (double)WEIGHED;
+		row[1] = i * 101 % WEIGHED / (double)WEIGHED;
+		row[2] = row[0] + row[1] * row[1] + i % 2;
+	}
+}
+
+static struct incise_model *train_weighed(const struct incise_pairs *pairs, double ridge)
+{
+	const int mfs[] = {2, 2};
+	const double min[] = {0, 0}, max[] = {1, 1};
+	struct incise_model *model = grid(2, min, max, mfs, INCISE_MF_GAUSS);
+	struct incise_train_options options;
+
+	incise_train_options_init(&options);
+	options.epochs = options.starts = 1;
+	options.ridge = ridge;
+	assert_int_equal(incise_train(model, pairs, NULL, &options, NULL, NULL), 0);
+	return model;
+}
+
+/* A pair of weight 2 is two; to what a ridge of 1e-10 leaves, in other units of the output. */
+TEST(test_a_weight_counts_pairs)
+{
+	double rows[WEIGHED * 3], twice[WEIGHED * 3 * 3], weights[WEIGHED];
+	struct incise_model *weighed, *repeated;
+	size_t n = 0;
+
+	weighed_rows(rows);
+	for (int i = 0; i < WEIGHED; i++) {
+		weights[i] = 1 + i % 3;
+		for (int k = 0; k < weights[i]; k++)
+			memcpy(twice + 3 * n++, rows + 3 * i, 3 * sizeof(double));
+	}
+	weighed = train_weighed(&(struct incise_pairs){rows, WEIGHED, 2, weights}, 1e-10);
+	repeated = train_weighed(
+		&(struct incise_pairs){.rows = twice, .n = n, .n_inputs = 2}, 1e-10);
+	for (int i = 0; i < WEIGHED; i++)
+		assert_true(fabs(incise_model_eval(weighed, rows + 3 * i, NULL) -
+				 incise_model_eval(repeated, rows + 3 * i, NULL)) < 1e-6);
+	incise_model_free(weighed);
+	incise_model_free(repeated);
+}
+
+/* Of two outputs at the same places the heavy one is learnt, by the average and by one ridge. */
+TEST(test_light_pairs_hardly_count)
+{
+	double rows[WEIGHED * 3], weights[WEIGHED];
+	struct incise_error err;
+	struct incise_pairs pairs = {rows, WEIGHED, 2, weights};
+
+	weighed_rows(rows);
+	for (int odd = 0; odd < 2; odd++)
+		for (int k = 0; k < 2; k++) {
+			struct incise_model *model;
+
+			for (int i = 0; i < WEIGHED; i++)
+				weights[i] = i % 2 == odd ? 1 : 1e-6;
+			model = train_weighed(&pairs, k ? 1e-6 : NAN);
+			for (int i = 0; i < WEIGHED; i++)
+				assert_true(fabs(incise_model_eval(model, rows + 3 * i,
+								   NULL) -
+						 (rows[3 * i + 2] - i % 2 + odd)) < 0.1);
+			incise_model_free(model);
+		}
+	for (int k = 0; k < 3; k++) {
+		const double bad[] = {0, NAN, -1};
+		struct incise_train_options options;
+		const int mfs[] = {2, 2};
+		const double min[] = {0, 0}, max[] = {1, 1};
+		struct incise_model *model = grid(2, min, max, mfs, INCISE_MF_GAUSS);
+
+		incise_train_options_init(&options);
+		weights[6] = bad[k];
+		assert_error(incise_train(model, &pairs, NULL, &options, NULL, &err),
+			     EINVAL, &err, "pair 7");
+		options.classic = true;
+		weights[6] = 1;
+		assert_error(incise_train(model, &pairs, NULL, &options, NULL, &err),
+			     EINVAL, &err, "classic");
+		incise_model_free(model);
+	}
+}
+
 TEST(test_refusals)
 {
 	double rows[60 * 3];
@@ -294,19 +386,27 @@ TEST(test_refusals)
 	for (int i = 0; i < 180; i++)
 		rows[i] = i * 37 % 180 / 180.0;
 	incise_train_options_init(&options);
-	assert_error(incise_train(model, &(struct incise_pairs){rows, 59, 2}, NULL,
-				  &options, NULL, &err),
-		     ENODATA, &err, "59");
-	assert_int_equal(incise_train(model, &(struct incise_pairs){rows, 0, 2}, NULL,
-				      &options, NULL, &err),
-			 -EINVAL);
-	assert_int_equal(incise_train(model, &(struct incise_pairs){rows, 30, 5}, NULL,
-				      &options, NULL, &err),
-			 -EINVAL);
+	assert_error(
+		incise_train(model,
+			     &(struct incise_pairs){.rows = rows, .n = 59, .n_inputs = 2},
+			     NULL, &options, NULL, &err),
+		ENODATA, &err, "59");
+	assert_int_equal(
+		incise_train(model,
+			     &(struct incise_pairs){.rows = rows, .n = 0, .n_inputs = 2},
+			     NULL, &options, NULL, &err),
+		-EINVAL);
+	assert_int_equal(
+		incise_train(model,
+			     &(struct incise_pairs){.rows = rows, .n = 30, .n_inputs = 5},
+			     NULL, &options, NULL, &err),
+		-EINVAL);
 	rows[17] = NAN;
-	assert_error(incise_train(model, &(struct incise_pairs){rows, 60, 2}, NULL,
-				  &options, NULL, &err),
-		     EINVAL, &err, "pair 6 ");
+	assert_error(
+		incise_train(model,
+			     &(struct incise_pairs){.rows = rows, .n = 60, .n_inputs = 2},
+			     NULL, &options, NULL, &err),
+		EINVAL, &err, "pair 6 ");
 	/* A refused training leaves the model as it was. */
 	for (int i = 0; i < 2; i++)
 		assert_memory_equal(incise_model_mf(model, i, 1)->p,
@@ -327,7 +427,7 @@ TEST(test_kinds_that_cannot_be_trained)
 		{INCISE_MF_TRAP, "trapmf"},
 	};
 	double rows[40 * 2];
-	struct incise_pairs pairs = {rows, 40, 1};
+	struct incise_pairs pairs = {.rows = rows, .n = 40, .n_inputs = 1};
 
 	for (int i = 0; i < 40; i++)
 		rows[2 * i] = rows[2 * i + 1] = i;
@@ -356,7 +456,7 @@ TEST(test_min_cannot_be_trained)
 		"MF1='a':'gaussmf',[1 0]\n[Output1]\nNumMFs=1\nMF1='c':'constant',[0]\n"
 		"[Rules]\n1, 1 (1) : 1\n";
 	static const double rows[] = {0, 0, 0.5, 1, 1, 2};
-	struct incise_pairs pairs = {rows, 3, 1};
+	struct incise_pairs pairs = {.rows = rows, .n = 3, .n_inputs = 1};
 	char path[] = "/tmp/incise-train-XXXXXX";
 	struct incise_model *model;
 	int fd = mkstemp(path);
@@ -449,7 +549,8 @@ TEST(test_extreme_data)
 	for (int what = 0; what < EXTREMES; what++)
 		for (int classic = 0; classic < 2; classic++) {
 			double rows[120 * 3], min[2], max[2], size;
-			struct incise_pairs pairs = {rows, 120, 2};
+			struct incise_pairs pairs = {
+				.rows = rows, .n = 120, .n_inputs = 2};
 			struct incise_uncertainty *uncertainty = NULL;
 			struct incise_error err = {0};
 			struct incise_model *model, *before;
@@ -518,14 +619,18 @@ TEST(test_too_little_data)
 		struct incise_model *model = grid(2, min, max, three, INCISE_MF_GAUSS);
 
 		options.classic = classic;
-		assert_error(incise_train(model, &(struct incise_pairs){rows, 60, 2},
+		assert_error(incise_train(model,
+					  &(struct incise_pairs){
+						  .rows = rows, .n = 60, .n_inputs = 2},
 					  NULL, &options, NULL, &err),
 			     EINVAL, &err, "0.4");
 		incise_model_free(model);
 		/* Three pairs fit a plane exactly, and say nothing. */
 		model = grid(2, min, max, one, INCISE_MF_GAUSS);
-		assert_error(incise_train(model, &(struct incise_pairs){rows, 3, 2}, NULL,
-					  &options, NULL, &err),
+		assert_error(incise_train(model,
+					  &(struct incise_pairs){
+						  .rows = rows, .n = 3, .n_inputs = 2},
+					  NULL, &options, NULL, &err),
 			     ENODATA, &err, "3");
 		incise_model_free(model);
 	}
@@ -537,7 +642,8 @@ TEST(test_report)
 	double rows[200 * 3], check_rows[100 * 3], mean = 0, sum = 0;
 	const int mfs[] = {4, 3};
 	const double min[] = {0, 0}, max[] = {1, 1};
-	struct incise_pairs train = {rows, 200, 2}, check = {check_rows, 100, 2};
+	struct incise_pairs train = {.rows = rows, .n = 200, .n_inputs = 2},
+			    check = {.rows = check_rows, .n = 100, .n_inputs = 2};
 	struct incise_model *model = grid(2, min, max, mfs, INCISE_MF_GAUSS);
 	static struct curve curve;
 	int unfired = 0;
@@ -592,7 +698,7 @@ TEST(test_training_can_be_stopped)
 	double rows[200 * 3];
 	const int mfs[] = {4, 3};
 	const double min[] = {0, 0}, max[] = {1, 1};
-	struct incise_pairs train = {rows, 200, 2};
+	struct incise_pairs train = {.rows = rows, .n = 200, .n_inputs = 2};
 	struct incise_model *model = grid(2, min, max, mfs, INCISE_MF_GAUSS);
 	static const char *const names[] = {"a", "b", "y"};
 
@@ -668,7 +774,7 @@ TEST(test_new_groups_are_covered)
 {
 	static const struct incise_variable in = {"x", 0, 1}, out = {"y", -1, 1};
 	const int n_mfs = 3, half = GROUPS * PER_GROUP;
-	struct incise_pairs train = {rows, half, 1};
+	struct incise_pairs train = {.rows = rows, .n = half, .n_inputs = 1};
 	struct incise_uncertainty *uncertainty = NULL;
 	struct incise_model *model =
 		incise_model_new_grid(1, &in, &n_mfs, INCISE_MF_GAUSS, &out, NULL);
@@ -713,7 +819,7 @@ TEST(test_sd_grows_where_data_are_missing)
 {
 	static const struct incise_variable in = {"x", 0, 1}, out = {"y", -1, 1};
 	const int n_mfs = 4;
-	struct incise_pairs train = {rows, 200, 1};
+	struct incise_pairs train = {.rows = rows, .n = 200, .n_inputs = 1};
 	struct incise_uncertainty *uncertainty = NULL;
 	struct incise_model *model =
 		incise_model_new_grid(1, &in, &n_mfs, INCISE_MF_GAUSS, &out, NULL);

@@ -15,7 +15,7 @@ static void tune(double noise, double shift, uint64_t seed, struct incise_tuning
 		 struct incise_train_options *options)
 {
 	static const struct incise_variable in = {"x", 0, 1};
-	struct incise_pairs pairs = {rows, PAIRS, 1};
+	struct incise_pairs pairs = {.rows = rows, .n = PAIRS, .n_inputs = 1};
 	const int n = 5;
 	struct incise_model *model =
 		incise_model_new_grid(1, &in, &n, INCISE_MF_GAUSS, &in, NULL);

@@ -72,7 +72,7 @@ static bool on_epoch(void *user, int epoch, const struct incise_basis *basis,
 TEST(test_finds_planted_premises)
 {
 	for (int type = 0; type < 2; type++) {
-		struct incise_pairs pairs = {rows, PAIRS, 2};
+		struct incise_pairs pairs = {.rows = rows, .n = PAIRS, .n_inputs = 2};
 		struct trace trace = {0};
 		struct incise_basis basis, planted;
 		struct incise_varpro varpro = {.pairs = &pairs,
@@ -105,7 +105,7 @@ TEST(test_finds_planted_premises)
  */
 TEST(test_converges_fast_near_the_minimum)
 {
-	struct incise_pairs pairs = {rows, PAIRS, 2};
+	struct incise_pairs pairs = {.rows = rows, .n = PAIRS, .n_inputs = 2};
 	struct trace trace = {0};
 	struct incise_ridge tiny = {1e-12, 1, 27, 9};
 	struct incise_basis basis, planted;
@@ -145,7 +145,7 @@ static bool stop_at_3(void *user, int epoch, const struct incise_basis *basis,
 
 TEST(test_ends_when_told)
 {
-	struct incise_pairs pairs = {rows, PAIRS, 2};
+	struct incise_pairs pairs = {.rows = rows, .n = PAIRS, .n_inputs = 2};
 	struct incise_varpro varpro = {
 		.pairs = &pairs, .ridge = &ridge, .epochs = 60, .each = stop_at_3};
 	struct incise_basis basis, planted;

@@ -10,57 +10,37 @@ import os
 from typing import NamedTuple, Optional, Tuple
 
 from . import _library
-from ._library import Handle, Invalid, function, text
+from ._library import Handle, Invalid, call, function, values
 
 _UNKNOWN = 2**63 - 1
 
 
-class WallPointStruct(ctypes.Structure):
-    """struct incise_wall_point"""
-
-    _fields_ = [
-        ("t_ns", ctypes.c_int64),
-        ("tai_ns", ctypes.c_int64),
-        ("uncertainty_ns", ctypes.c_double),
-        ("rate_ppb", ctypes.c_double),
-        ("rate_uncertainty_ppb", ctypes.c_double),
-        ("utc_offset_s", ctypes.c_int),
-        ("held", ctypes.c_bool),
-        ("source", ctypes.c_char * 24),
-        ("reference", ctypes.c_char * 24),
-        ("leap", ctypes.c_char * 24),
-        ("restart", ctypes.c_char * 24),
-    ]
-    c_name = "struct incise_wall_point"
+(WallPointStruct,) = _library.structs("""
+    struct incise_wall_point {
+        int64_t t_ns, tai_ns;
+        double uncertainty_ns, rate_ppb, rate_uncertainty_ppb;
+        int utc_offset_s;
+        bool held;
+        char source[24], reference[24], leap[24], restart[24];
+    };
+    """)
 
 
-_library.declare(
+_library.prototypes(
     "libincise-record",
-    {
-        "incise_recording_wall": (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p),
-        "incise_wall_free": (None, ctypes.c_void_p),
-        "incise_wall_points": (
-            ctypes.c_size_t,
-            ctypes.c_void_p,
-            ctypes.POINTER(ctypes.POINTER(WallPointStruct)),
-        ),
-        "incise_wall_tai": (
-            ctypes.c_int,
-            ctypes.c_void_p,
-            ctypes.c_int64,
-            ctypes.POINTER(ctypes.c_int64),
-            ctypes.POINTER(ctypes.c_int64),
-        ),
-        "incise_wall_monotonic": (
-            ctypes.c_int,
-            ctypes.c_void_p,
-            ctypes.c_int64,
-            ctypes.POINTER(ctypes.c_int64),
-            ctypes.POINTER(ctypes.c_int64),
-        ),
-        "incise_wall_utc_offset_s": (ctypes.c_int, ctypes.c_void_p, ctypes.c_int64),
-        "incise_wall_utc_text": (None, ctypes.c_int64, ctypes.c_int, ctypes.c_char_p),
-    },
+    """
+    struct incise_wall *incise_recording_wall(struct incise_recording *recording,
+        struct incise_error *err);
+    void incise_wall_free(struct incise_wall *wall);
+    size_t incise_wall_points(const struct incise_wall *wall,
+        const struct incise_wall_point **points);
+    int incise_wall_tai(const struct incise_wall *wall, int64_t t_ns, int64_t *tai_ns,
+        int64_t *uncertainty_ns);
+    int incise_wall_monotonic(const struct incise_wall *wall, int64_t tai_ns, int64_t *t_ns,
+        int64_t *uncertainty_ns);
+    int incise_wall_utc_offset_s(const struct incise_wall *wall, int64_t t_ns);
+    void incise_wall_utc_text(int64_t tai_ns, int utc_offset_s, char text[INCISE_WALL_TEXT]);
+    """,
 )
 
 
@@ -98,15 +78,7 @@ class Wall:
         """All readings, in order."""
         points = ctypes.POINTER(WallPointStruct)()
         n = function("incise_wall_points")(self._handle, ctypes.byref(points))
-        return tuple(
-            WallPoint(
-                *(
-                    text(value) if isinstance(value, bytes) else value
-                    for value in (getattr(points[i], name) for name in WallPoint._fields)
-                )
-            )
-            for i in range(n)
-        )
+        return tuple(WallPoint(*values(point, WallPoint._fields)) for point in points[:n])
 
     def _convert(self, name: str, what: str, time_ns: int) -> Tuple[int, float]:
         result, bound = ctypes.c_int64(), ctypes.c_int64()
@@ -144,9 +116,11 @@ class Wall:
         return f"<incise.Wall by {first.source}, time of {first.reference}>"
 
 
-def read(recording: int, failure: _library.Failure) -> Optional[Wall]:
+def read(recording: int) -> Optional[Wall]:
     """The wall time of an open recording, or None without one."""
-    pointer = function("incise_recording_wall")(recording, failure.ref)
-    if not pointer and failure.struct.code == errno.ENODATA:
+    try:
+        return Wall._of(call("incise_recording_wall", recording))
+    except Invalid as failure:
+        if failure.errno != errno.ENODATA:
+            raise
         return None
-    return Wall._of(failure.require(pointer))

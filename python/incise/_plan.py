@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import errno
 import os
@@ -10,9 +11,10 @@ import threading
 from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple, Union
 
 from . import _library
-from ._library import Failure, Invalid, NotFound, c_bool, c_char, c_double, c_int, c_int64, c_void_p
-from ._library import function, text
-from .recording import PathLike
+from ._columns import Columns
+from ._library import Invalid, NotFound, PathLike, c_bool, c_double, c_int, call, function, package
+from ._library import text, values
+from ._model import CompiledModel, Model, model_file
 
 AXES_MAX, POSES_MAX = 3, 32
 PHASES = ("free", "cutting", "insertion")
@@ -38,77 +40,40 @@ FLAGS = {
 }
 
 
-class SampleStruct(ctypes.Structure):
-    """struct incise_tracker_sample"""
-
-    _fields_ = [
-        ("t_ns", c_int64),
-        ("seq", ctypes.c_uint64),
-        ("position_mm", c_double * 3),
-        ("quaternion", c_double * 4),
-        ("status", c_char),
-        ("station", ctypes.c_uint8),
-        ("button", c_bool),
-        ("restarted", c_bool),
-        ("after_ns", ctypes.c_uint32),
-    ]
-    c_name = "struct incise_tracker_sample"
-
-
-class TrackerStruct(ctypes.Structure):
-    """struct incise_tracker_info"""
-
-    _fields_ = [
-        ("name", c_char * 64),
-        ("rate_hz", c_double),
-        ("latency_ns", c_int64),
-        ("stations", c_int),
-        ("external_sync", c_bool),
-        ("grain_ns", c_int64),
-        ("scalpel_station", ctypes.c_uint8),
-        ("tube_station", ctypes.c_uint8),
-        ("network", c_bool),
-        ("note", c_char * 300),
-        ("lost_unsure", c_bool),
-    ]
-    c_name = "struct incise_tracker_info"
-
-
-class TickStruct(ctypes.Structure):
-    """struct incise_tick"""
-
-    _fields_ = [
-        ("t_ns", c_int64),
-        ("position_mm", c_double * 3),
-        ("quaternion", c_double * 4),
-        ("tool_mm", c_double * 3),
-        ("proxy_mm", c_double * 3),
-        ("normal", c_double * 3),
-        ("depth_mm", c_double),
-        ("velocity_mm_s", c_double),
-        ("command_N", c_double * 3),
-        ("actuated_N", c_double * AXES_MAX),
-        ("rendered_N", c_double * AXES_MAX),
-        ("unfelt_N", c_double),
-        ("flags", ctypes.c_uint),
-        ("phase", c_int),
-        ("tool", c_int),
-    ]
-    c_name = "struct incise_tick"
-
-
-class DeviceStruct(ctypes.Structure):
-    """struct incise_haptic_device"""
-
-    _fields_ = [
-        ("mass_kg", c_double),
-        ("damping_N_s_mm", c_double),
-        ("coulomb_N", c_double),
-        ("encoder_mm", c_double),
-        ("period_s", c_double),
-        ("delay_ticks", c_int),
-    ]
-    c_name = "struct incise_haptic_device"
+SampleStruct, TrackerStruct, TickStruct, DeviceStruct = _library.structs("""
+    struct incise_tracker_sample {
+        int64_t t_ns;
+        uint64_t seq;
+        double position_mm[3], quaternion[4];
+        char status;
+        uint8_t station;
+        bool button, restarted;
+        uint32_t after_ns;
+    };
+    struct incise_tracker_info {
+        char name[64];
+        double rate_hz;
+        int64_t latency_ns;
+        int stations;
+        bool external_sync;
+        int64_t grain_ns;
+        uint8_t scalpel_station, tube_station;
+        bool network;
+        char note[300];
+        bool lost_unsure;
+    };
+    struct incise_tick {
+        int64_t t_ns;
+        double position_mm[3], quaternion[4], tool_mm[3], proxy_mm[3], normal[3], depth_mm;
+        double velocity_mm_s, command_N[3], actuated_N[3], rendered_N[3], unfelt_N;
+        uint32_t flags;
+        int phase, tool;
+    };
+    struct incise_haptic_device {
+        double mass_kg, damping_N_s_mm, coulomb_N, encoder_mm, period_s;
+        int delay_ticks;
+    };
+    """)
 
 
 class _Worst(ctypes.Structure):
@@ -127,88 +92,61 @@ class _Worst(ctypes.Structure):
     ]
 
 
-class _Weakest(ctypes.Structure):
-    """struct incise_plan_weakest"""
-
-    _fields_ = [
-        ("margin", c_double),
-        ("along", c_double * 3),
-        ("hz", c_double),
-        ("lean_N", c_double),
-        ("depth_mm", c_double),
-        ("place_mm", c_double * 3),
-        ("tool", c_int),
-        ("held", c_int),
-        ("tilted", c_bool),
-        ("states", c_int),
-        ("paid", c_int),
-    ]
-
-
-class StabilityStruct(ctypes.Structure):
-    """struct incise_plan_stability"""
-
-    _fields_ = [
-        ("device", DeviceStruct),
-        ("own_delay", c_bool),
-        ("stiffness_N_mm", c_double),
-        ("damping_N_s_mm", c_double),
-        ("late_ticks", c_int),
-        ("n_axes", c_int),
-        ("axis_late_ticks", c_int * AXES_MAX),
-        ("speed_slope_N_s_mm", c_double),
-        ("slope_N_mm", c_double),
-        ("unloading_N_mm", c_double),
-        ("support_mm", c_double),
-        ("beyond_N_mm", c_double),
-        ("runs", c_int),
-        ("ticks", c_int64),
-        ("worst", _Worst),
-        ("weakest", _Weakest),
-        ("noise_mm", c_double),
-        ("noise_N", c_double),
-        ("certified", c_bool),
-        ("acceleration_slope_N_s2_mm", c_double),
-    ]
-    c_name = "struct incise_plan_stability"
+_Weakest, StabilityStruct = _library.structs(
+    """
+    struct incise_plan_weakest {
+        double margin, along[3], hz, lean_N, depth_mm, place_mm[3];
+        int tool, held;
+        bool tilted;
+        int states, paid;
+    };
+    struct incise_plan_stability {
+        struct incise_haptic_device device;
+        bool own_delay;
+        double stiffness_N_mm, damping_N_s_mm;
+        int late_ticks, n_axes, axis_late_ticks[3];
+        double speed_slope_N_s_mm, slope_N_mm, unloading_N_mm, support_mm, beyond_N_mm;
+        int runs;
+        int64_t ticks;
+        _Worst worst;
+        struct incise_plan_weakest weakest;
+        double noise_mm, noise_N;
+        bool certified;
+        double acceleration_slope_N_s2_mm;
+    };
+    """,
+    _Worst=_Worst,
+)
 
 
-_library.declare(
+_library.prototypes(
     "libincise",
-    {
-        "incise_scene_load": (c_void_p, ctypes.c_char_p, ctypes.c_char_p, c_void_p),
-        "incise_scene_free": (None, c_void_p),
-        "incise_scene_rate_hz": (c_double, c_void_p),
-        "incise_scene_set_arithmetic": (c_int, c_void_p, ctypes.c_char_p, c_void_p),
-        "incise_scene_set_full": (None, c_void_p, c_bool),
-        "incise_plan_new_fed": (c_void_p, c_void_p, ctypes.POINTER(TrackerStruct), c_void_p),
-        "incise_plan_free": (None, c_void_p),
-        "incise_plan_stage": (ctypes.c_char_p, c_void_p, c_int),
-        "incise_plan_left_out": (
-            ctypes.c_char_p,
-            c_void_p,
-            c_int,
-            ctypes.POINTER(ctypes.c_char_p),
-        ),
-        "incise_plan_memory": (ctypes.c_size_t, c_void_p),
-        "incise_plan_bound": (c_double, c_void_p, c_double),
-        "incise_plan_stability": (None, c_void_p, ctypes.POINTER(StabilityStruct)),
-        "incise_plan_set_tool": (c_int, c_void_p, c_int),
-        "incise_plan_set_tip": (c_int, c_void_p, ctypes.POINTER(c_double)),
-        "incise_plan_feed": (c_int, c_void_p, ctypes.POINTER(SampleStruct), c_int),
-        "incise_plan_tick": (c_int, c_void_p, c_int64, ctypes.POINTER(TickStruct)),
-        "incise_plan_cause": (c_int, c_void_p, ctypes.c_char_p, ctypes.c_size_t),
-        "incise_plan_run": (
-            c_int64,
-            c_void_p,
-            c_void_p,
-            ctypes.c_size_t,
-            c_int64,
-            c_int64,
-            c_void_p,
-            ctypes.c_size_t,
-        ),
-    },
+    """
+    struct incise_scene *incise_scene_load(const char *path, const char *model,
+        struct incise_error *err);
+    void incise_scene_free(struct incise_scene *scene);
+    double incise_scene_rate_hz(const struct incise_scene *scene);
+    int incise_scene_set_arithmetic(struct incise_scene *scene, const char *name,
+        struct incise_error *err);
+    void incise_scene_set_full(struct incise_scene *scene, bool full);
+    struct incise_plan *incise_plan_new_fed(const struct incise_scene *scene,
+        const struct incise_tracker_info *tracker, struct incise_error *err);
+    void incise_plan_free(struct incise_plan *plan);
+    const char *incise_plan_stage(const struct incise_plan *plan, int index);
+    const char *incise_plan_left_out(const struct incise_plan *plan, int index, const char **why);
+    size_t incise_plan_memory(const struct incise_plan *plan);
+    double incise_plan_bound(const struct incise_plan *plan, double reach_mm);
+    void incise_plan_stability(const struct incise_plan *plan,
+        struct incise_plan_stability *stability);
+    int incise_plan_set_tool(struct incise_plan *plan, enum incise_tool tool);
+    int incise_plan_set_tip(struct incise_plan *plan, const double tip_mm[3]);
+    int incise_plan_feed(struct incise_plan *plan, const struct incise_tracker_sample *samples,
+        int n);
+    int incise_plan_tick(struct incise_plan *plan, int64_t t_ns, struct incise_tick *tick);
+    int incise_plan_cause(const struct incise_plan *plan, char *text, size_t size);
+    int64_t incise_plan_run(struct incise_plan *plan, const struct incise_tracker_sample *poses,
+        uint64_t n, int64_t start_ns, int64_t period_ns, struct incise_tick *ticks, uint64_t n_ticks);
+    """,
 )
 
 Vector = Tuple[float, float, float]
@@ -226,7 +164,7 @@ class Tick(NamedTuple):
     depth_mm: float
     velocity_mm_s: float
     command_N: Vector  #: force, in the tracker's frame
-    flags: int  #: bits of incise.plan.FLAGS
+    flags: int  #: bits of incise.FLAGS
     phase: str
     tool: str
 
@@ -285,6 +223,19 @@ def find_scene(scene: PathLike) -> str:
     )
 
 
+def load_scene(
+    scene: PathLike, model: Union[PathLike, Model, CompiledModel, None], arithmetic: Optional[str]
+) -> Tuple[str, Any]:
+    """The path of a scene, and the scene with its model and its arithmetic."""
+    path = find_scene(scene)
+    with contextlib.nullcontext() if model is None else model_file(model) as file:
+        made = call("incise_scene_load", _library.path_bytes(path), file)
+    loaded = _library.Handle(made, "incise_scene_free")
+    if arithmetic is not None:
+        call("incise_scene_set_arithmetic", loaded, arithmetic.encode())
+    return path, loaded
+
+
 def _fill_pose(sample: SampleStruct, t_ns: int, pose: Any) -> None:
     """A pose is (position, quaternion), or a position alone: the scalpel upright."""
     try:
@@ -323,7 +274,8 @@ def _columns(poses: Any) -> Dict[str, Any]:
 class Plan:
     """A scene, compiled to its stages, and fed with poses.
 
-    scene: a .scene file, or the name of a shipped one. model: a .fis or .fx in place of the scene's.
+    scene: a .scene file, or the name of a shipped one. model: in place of the scene's, a .fis or .fx, or
+    a model that was trained or compiled here.
     tracker_hz, latency_ms: of the tracker that the poses are from; the prediction and the stability
     depend on them. A scene that its device cannot hold is refused with the largest safe gain.
     """
@@ -331,7 +283,7 @@ class Plan:
     def __init__(
         self,
         scene: PathLike,
-        model: Optional[PathLike] = None,
+        model: Union[PathLike, Model, CompiledModel, None] = None,
         *,
         arithmetic: Optional[str] = None,
         full: bool = False,
@@ -340,34 +292,13 @@ class Plan:
         tracker_hz: float = 120,
         latency_ms: float = 4.2,
     ):
-        failure = Failure()
-        self.path = find_scene(scene)
-        self._scene = _library.Handle(
-            failure.require(
-                function("incise_scene_load")(
-                    _library.path_bytes(self.path),
-                    None if model is None else _library.path_bytes(model),
-                    failure.ref,
-                )
-            ),
-            "incise_scene_free",
-        )
-        if arithmetic is not None:
-            failure.check(
-                function("incise_scene_set_arithmetic")(
-                    self._scene, arithmetic.encode(), failure.ref
-                )
-            )
+        self.path, self._scene = load_scene(scene, model, arithmetic)
         function("incise_scene_set_full")(self._scene, full)
         self.rate_hz: float = function("incise_scene_rate_hz")(self._scene)
         self._period_ns = round(1e9 / self.rate_hz)
-        tracker = TrackerStruct(
-            b"poses", tracker_hz, round(latency_ms * 1e6), 1, False, 0, 1, 0
-        )
+        tracker = TrackerStruct(b"poses", tracker_hz, round(latency_ms * 1e6), 1, False, 0, 1, 0)
         self._plan = _library.Handle(
-            failure.require(
-                function("incise_plan_new_fed")(self._scene, ctypes.byref(tracker), failure.ref)
-            ),
+            call("incise_plan_new_fed", self._scene, tracker),
             "incise_plan_free",
         )
         self.set_tool(tool)
@@ -414,18 +345,9 @@ class Plan:
     def stability(self) -> Stability:
         """Stiffness of the plan, and its margin on its device."""
         s = StabilityStruct()
-        function("incise_plan_stability")(self._plan, ctypes.byref(s))
-        return Stability(
-            s.stiffness_N_mm,
-            s.damping_N_s_mm,
-            s.weakest.margin,
-            s.slope_N_mm,
-            s.unloading_N_mm,
-            s.support_mm,
-            s.runs,
-            s.worst.settle_s,
-            s.certified,
-        )
+        function("incise_plan_stability")(self._plan, s)
+        s.margin, s.settle_s = s.weakest.margin, s.worst.settle_s
+        return Stability(*values(s, Stability._fields))
 
     def set_tool(self, tool: str) -> None:
         """Say what the hand holds: auto, blade, handle or tube. It changes out of the tissue."""
@@ -442,7 +364,8 @@ class Plan:
         """Mark it as in use: the C library runs without Python's lock."""
         if not self._use.acquire(blocking=False):
             raise Invalid(
-                errno.EBUSY, "another thread uses this Plan at this moment; give each thread its own"
+                errno.EBUSY,
+                "another thread uses this Plan at this moment; give each thread its own",
             )
 
     def step(self, t: float, pose: Any) -> Tick:
@@ -466,12 +389,12 @@ class Plan:
         self._last_ns = t_ns
         if pose is not None:
             _fill_pose(self._sample, t_ns, pose)
-            function("incise_plan_feed")(self._plan, ctypes.byref(self._sample), 1)
+            function("incise_plan_feed")(self._plan, self._sample, 1)
         tick = self._tick
-        rc = function("incise_plan_tick")(self._plan, t_ns, ctypes.byref(tick))
+        rc = function("incise_plan_tick")(self._plan, t_ns, tick)
         if rc < 0:
             self._fail(rc)
-        return Tick(
+        return Tick(  # without values(), which takes longer than the tick
             tick.t_ns,
             tuple(tick.position_mm),
             tuple(tick.quaternion),
@@ -486,7 +409,7 @@ class Plan:
             TOOLS[tick.tool],
         )
 
-    def run(self, poses: Any, *, arrival: Optional[str] = None) -> Dict[str, Any]:
+    def run(self, poses: Any, *, arrival: Optional[str] = None) -> Columns:
         """Run the whole stroke in one C call; needs numpy.
 
         poses: a table such as ``rec.tracker``, a DataFrame, or {t_ns, x_mm, y_mm, z_mm[, qw, qx, qy,
@@ -495,8 +418,7 @@ class Plan:
         at rate_hz from the first pose to the last. Returns {column: array}: t_ns, position_mm,
         depth_mm, velocity_mm_s, command_N, flags, phase, tool, …, a row for each tick.
         """
-        import numpy
-
+        numpy = package("numpy", "Plan.run()")
         columns = _columns(poses)
         kind = numpy.dtype(SampleStruct)
         if arrival is None:
@@ -529,15 +451,15 @@ class Plan:
         try:
             done = function("incise_plan_run")(
                 self._plan,
-                samples.ctypes.data,
+                (SampleStruct * len(samples)).from_buffer(samples),
                 len(samples),
                 start,
                 self._period_ns,
-                ticks.ctypes.data,
+                (TickStruct * n).from_buffer(ticks),
                 n,
             )
         finally:
             self._use.release()
         if done < 0:
             raise Invalid(errno.EINVAL, f"poses: {arrival} has to rise from row to row")
-        return {name: ticks[name] for name in ticks.dtype.names}
+        return Columns({name: ticks[name] for name in ticks.dtype.names}, f"ticks of {self.path}")

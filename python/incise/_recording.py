@@ -5,71 +5,44 @@ from __future__ import annotations
 
 import ctypes
 import errno
+import math
 import os
 import threading
-from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Tuple, Union
+from typing import Any, Dict, NamedTuple, Optional, Tuple
 
 from . import _library
-from ._library import (
-    ArrowArrayStream,
-    CalibrationStruct,
-    ExportOptions,
-    Failure,
-    FrameStruct,
-    Invalid,
-    NotFound,
-    RecordingInfo,
-    function,
-    text,
-)
-from .arrow import Table
-from .wall import Wall
-from .wall import read as read_wall
+from ._arrow import Table
+from ._library import ArrowArrayStream, CalibrationStruct, Error, ExportOptions, FrameStruct
+from ._library import Invalid, PathLike, RecordingInfo, call, function, package, values
+from ._show import html_table
+from ._wall import Wall
+from ._wall import read as read_wall
 
-PathLike = Union[str, "os.PathLike[str]"]
-
-_library.declare(
+_library.prototypes(
     "libincise-record",
-    {
-        "incise_recording_open": (ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p),
-        "incise_recording_close": (None, ctypes.c_void_p),
-        "incise_recording_info": (
-            ctypes.c_int,
-            ctypes.c_void_p,
-            ctypes.POINTER(RecordingInfo),
-            ctypes.c_void_p,
-        ),
-        "incise_recording_stream": (
-            ctypes.c_int,
-            ctypes.c_void_p,
-            ctypes.c_char_p,
-            ctypes.POINTER(ExportOptions),
-            ctypes.POINTER(ArrowArrayStream),
-            ctypes.c_void_p,
-        ),
-        "incise_export_options_init": (None, ctypes.POINTER(ExportOptions)),
-        "incise_frame_reader_new": (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p),
-        "incise_frame_reader_free": (None, ctypes.c_void_p),
-        "incise_frame_reader_at": (
-            ctypes.c_int,
-            ctypes.c_void_p,
-            ctypes.c_int64,
-            ctypes.POINTER(FrameStruct),
-            ctypes.c_void_p,
-        ),
-    },
+    """
+    struct incise_recording *incise_recording_open(const char *path, struct incise_error *err);
+    void incise_recording_close(struct incise_recording *recording);
+    int incise_recording_info(struct incise_recording *recording,
+        struct incise_recording_info *info, struct incise_error *err);
+    int incise_recording_stream(struct incise_recording *recording, const char *what,
+        const struct incise_export_options *options, struct ArrowArrayStream *stream,
+        struct incise_error *err);
+    void incise_export_options_init(struct incise_export_options *options);
+    struct incise_frame_reader *incise_frame_reader_new(struct incise_recording *recording,
+        struct incise_error *err);
+    void incise_frame_reader_free(struct incise_frame_reader *reader);
+    int incise_frame_reader_at(struct incise_frame_reader *reader, int64_t t_ns,
+        struct incise_camera_frame *frame, struct incise_error *err);
+    """,
 )
-_library.declare(
+_library.prototypes(
     "libincise",
-    {
-        "incise_calibration_nominal": (None, ctypes.POINTER(CalibrationStruct)),
-        "incise_calibration_load": (
-            ctypes.c_int,
-            ctypes.c_char_p,
-            ctypes.POINTER(CalibrationStruct),
-            ctypes.c_void_p,
-        ),
-    },
+    """
+    void incise_calibration_nominal(struct incise_calibration *calibration);
+    int incise_calibration_load(const char *path, struct incise_calibration *calibration,
+        struct incise_error *err);
+    """,
 )
 
 
@@ -126,16 +99,6 @@ class Info(NamedTuple):
     streams: Tuple[Stream, ...]
 
 
-def _values(struct: ctypes.Structure, names: Tuple[str, ...]) -> Iterator[Any]:
-    for name in names:
-        value = getattr(struct, name)
-        if isinstance(value, bytes):
-            value = text(value)
-        elif isinstance(value, ctypes.Array) and not isinstance(value, bytes):
-            value = tuple(value)
-        yield value
-
-
 class Frame(NamedTuple):
     """A frame of the camera."""
 
@@ -146,20 +109,13 @@ class Frame(NamedTuple):
 
 def _pixels(frame: FrameStruct) -> Any:
     """The frame as an array of its own."""
-    import numpy
-
+    numpy = package("numpy", "a frame")
     data = numpy.frombuffer(ctypes.string_at(frame.data, frame.size), numpy.uint8)
     if frame.pixels == 3:  # MJPEG
         import io
 
-        try:
-            from PIL import Image
-        except ImportError:
-            raise NotFound(
-                errno.ENOENT,
-                "frames are JPEG, which Pillow decodes; install python3-pil, or pip install pillow",
-            ) from None
-        return numpy.asarray(Image.open(io.BytesIO(data.tobytes())).convert("RGB"))
+        image = package("PIL.Image", "a frame in JPEG")
+        return numpy.asarray(image.open(io.BytesIO(data.tobytes())).convert("RGB"))
     rows = data.reshape(frame.height, frame.stride)
     if frame.pixels == 0:
         return rows[:, : 3 * frame.width].reshape(frame.height, frame.width, 3).copy()
@@ -176,24 +132,36 @@ def _pixels(frame: FrameStruct) -> Any:
 def load_calibration(path: Optional[PathLike]) -> CalibrationStruct:
     """Read a calibration.conf; None: the nominal values of Song et al. (2006)."""
     calibration = CalibrationStruct()
-    function("incise_calibration_nominal")(ctypes.byref(calibration))
+    function("incise_calibration_nominal")(calibration)
     if path is not None:
-        failure = Failure()
-        failure.check(
-            function("incise_calibration_load")(
-                _library.path_bytes(path), ctypes.byref(calibration), failure.ref
-            )
-        )
+        call("incise_calibration_load", _library.path_bytes(path), calibration)
     return calibration
 
 
 def _uncertainty(word: str) -> int:
     words = ("none", "total", "parts")
     if word not in words:
-        raise Invalid(
-            errno.EINVAL, f"uncertainty: expected none, total or parts, found {word!r}"
-        )
+        raise Invalid(errno.EINVAL, f"uncertainty: expected none, total or parts, found {word!r}")
     return words.index(word)
+
+
+def _cut_number(number: int) -> int:
+    if not isinstance(number, int) or number < 1:
+        raise Invalid(errno.EINVAL, f"cut {number!r}: cuts have numbers from 1")
+    return number
+
+
+def _times(from_s: float, to_s: Optional[float]) -> Tuple[float, float]:
+    """A part as the library takes it, where 0 stands for the end."""
+    try:
+        if 0 <= from_s < (math.inf if to_s is None else to_s):
+            return from_s, 0 if to_s is None or to_s == math.inf else to_s
+    except TypeError:
+        pass
+    raise Invalid(
+        errno.EINVAL,
+        f"between({from_s!r}, {to_s!r}): expected seconds, the first before the second",
+    )
 
 
 class Recording:
@@ -217,18 +185,31 @@ class Recording:
         self._checked = False
         self._frames: Optional[int] = None
         self._start_ns: Optional[int] = None
+        self._limits: Dict[str, Any] = {}  # the part that tables are of
         self._calibration = load_calibration(calibration) if calibration is not None else None
         self._calibration_path = (
             _library.path_bytes(calibration) if calibration is not None else None
         )
         self.path = os.fspath(path)
-        failure = Failure()
-        self._pointer = failure.require(
-            function("incise_recording_open")(_library.path_bytes(path), failure.ref)
-        )
+        self._pointer = call("incise_recording_open", _library.path_bytes(path))
 
     def __repr__(self) -> str:
-        return f"<incise.Recording {self.path}{'' if self._pointer else ', closed'}>"
+        try:
+            info = self.info
+        except Error as failure:
+            return f"<incise.Recording {failure}>"
+        seconds = (info.end_ns - info.start_ns) * 1e-9
+        return (
+            f"<incise.Recording {self.path}: {info.cuts} cuts in {seconds:.3f} s, rows: "
+            f"{info.force} force, {info.tracker} tracker, {info.depth} depth>"
+        )
+
+    def _repr_html_(self) -> str:
+        header = ("stream", "device", "rows", "lost", "rate / Hz", "jitter / ms")
+        rows = (
+            (s.name, s.device, s.rows, s.lost, s.rate_hz, s.jitter_ms) for s in self.info.streams
+        )
+        return html_table(repr(self)[1:-1], header, rows)
 
     def __reduce__(self) -> Any:
         raise TypeError("a Recording cannot be copied or pickled; open it again")
@@ -265,61 +246,102 @@ class Recording:
     @property
     def info(self) -> Info:
         """Rows, losses, calibration, and streams with their times; of a complete recording from its summary."""
-        failure, struct = Failure(), RecordingInfo()
+        struct = RecordingInfo()
         with self._lock:
-            failure.check(
-                function("incise_recording_info")(
-                    self._open(), ctypes.byref(struct), failure.ref
-                )
-            )
+            call("incise_recording_info", self._open(), struct)
         streams = tuple(
-            Stream(*_values(struct.streams[i], Stream._fields)) for i in range(struct.n_streams)
+            Stream(*values(struct.streams[i], Stream._fields)) for i in range(struct.n_streams)
         )
-        return Info(*_values(struct, Info._fields[:-1]), streams)
+        return Info(*values(struct, Info._fields[:-1]), streams)
 
     @property
     def wall(self) -> Optional[Wall]:
         """TAI and UTC of its times, with bounds; None without wall time, as of a simulated clock."""
-        failure = Failure()
         with self._lock:
-            return read_wall(self._open(), failure)
+            return read_wall(self._open())
 
     def frame(self, t: float) -> Frame:
         """The frame nearest to t, in seconds since the first force sample (as the column t_s); needs
         numpy, and Pillow for a camera that sends JPEG. Going forward is quick."""
-        if self._start_ns is None:
-            self._start_ns = self.info.start_ns
-        start_ns = self._start_ns
-        failure, frame = Failure(), FrameStruct()
+        start_ns = self._start()
+        frame = FrameStruct()
         with self._lock:
             recording = self._open()
             if self._frames is None:
-                self._frames = failure.require(
-                    function("incise_frame_reader_new")(recording, failure.ref)
-                )
-            failure.check(
-                function("incise_frame_reader_at")(
-                    self._frames, start_ns + round(t * 1e9), ctypes.byref(frame), failure.ref
-                )
-            )
+                self._frames = call("incise_frame_reader_new", recording)
+            call("incise_frame_reader_at", self._frames, start_ns + round(t * 1e9), frame)
             return Frame(frame.t_ns, frame.seq, _pixels(frame))
 
+    def _start(self) -> int:
+        """The first force sample; of a closed recording, too."""
+        if self._start_ns is None:
+            with Recording(self.path) as again:
+                self._start_ns = again.info.start_ns
+        return self._start_ns
+
     # --- tables --------------------------------------------------------------------------
+
+    def _part(self, **limits: Any) -> "Recording":
+        part = Recording(self.path, damaged=self._damaged)
+        part._calibration, part._calibration_path = self._calibration, self._calibration_path
+        part._limits = limits
+        return part
+
+    def between(self, from_s: float = 0, to_s: Optional[float] = None) -> "Recording":
+        """The recording with tables from from_s to before to_s, seconds from its first force sample;
+        its info stays that of the whole."""
+        _times(from_s, to_s)
+        return self._part(between=(from_s, to_s))
+
+    def cut(self, number: int) -> "Recording":
+        """The recording with the tables of one cut, from 1; its info stays that of the whole."""
+        return self._part(cut=_cut_number(number))
+
+    def _span(self, number: int) -> Tuple[float, float]:
+        """Where a cut begins and ends, in seconds."""
+        times = [batch.column("t_s") for batch in self.pairs().cut(number).batches()]
+        return times[0][0], times[-1][-1] + 1e-9
+
+    def plot(self, rate_hz: float = 100) -> Any:
+        """Plot force and depth over time, resampled; returns the matplotlib axes."""
+        return self.resample(rate_hz=rate_hz).plot("force_N", "depth_mm")
 
     def _check(self) -> None:
         """Compare the rows with the ledger, once, unless damaged rows were asked for."""
         if self._checked or self._damaged:
             return
-        from .verify import check_rows
+        from ._verify import check_rows
 
         check_rows(self.path)
         self._checked = True
 
     def _table(self, what: str, about: str, **options: Any) -> Table:
+        """A table of the part that the recording is limited to."""
         with self._lock:
             self._open()
+        table = self._whole(what, f"{about} of {self.path}", options)
+        return table._part(**self._limits) if self._limits else table
+
+    def _whole(self, what: str, about: str, options: Dict[str, Any]) -> Table:
+        def part(
+            between: Optional[Tuple[float, Optional[float]]] = None, cut: Optional[int] = None
+        ) -> Table:
+            limits, label = dict(options), about
+            if cut is not None:
+                label += f", cut {cut}"
+                limits["cut"] = _cut_number(cut)
+                # Only rows of cuts have the number of one.
+                if what != "table" or options.get("resample"):
+                    limits["from_s"], limits["to_s"] = self._span(limits.pop("cut"))
+            if between is not None:
+                limits["from_s"], limits["to_s"] = _times(*between)
+                label += (
+                    f", {between[0]} s to {'its end' if between[1] is None else f'{between[1]} s'}"
+                )
+            return self._whole(what, label, limits)
+
         struct = ExportOptions()
-        function("incise_export_options_init")(ctypes.byref(struct))
+        function("incise_export_options_init")(struct)
         for name, value in options.items():
             try:
                 setattr(struct, name, value)
@@ -332,22 +354,13 @@ class Recording:
 
         def open_stream(stream: ArrowArrayStream) -> None:
             self._check()
-            failure = Failure()
-            recording = failure.require(function("incise_recording_open")(path, failure.ref))
+            recording = call("incise_recording_open", path)
             try:
-                failure.check(
-                    function("incise_recording_stream")(
-                        recording,
-                        what.encode(),
-                        ctypes.byref(struct),
-                        ctypes.byref(stream),
-                        failure.ref,
-                    )
-                )
+                call("incise_recording_stream", recording, what.encode(), struct, stream)
             finally:
                 function("incise_recording_close")(recording)
 
-        return Table._of(open_stream, f"{about} of {self.path}")
+        return Table._of(open_stream, about, part, self._start)
 
     @property
     def force(self) -> Table:
@@ -387,9 +400,6 @@ class Recording:
         velocity_max_mm_s: float = 0,
         tai: bool = False,
         uncertainty: str = "none",
-        from_s: float = 0,
-        to_s: float = 0,
-        cut: int = 0,
     ) -> Table:
         """Force with depth and velocity inside the cuts, as `incise export` gives them.
 
@@ -400,8 +410,6 @@ class Recording:
         With tai, rows without bins end with tai_ns and tai_u_ns, the bound of its error.
         With uncertainty "total" or "parts" there are columns of standard uncertainties, see
         incise-export(1); which are of force_N, table.fields says in uncertainty_variables.
-        With from_s, to_s (seconds from the first sample; 0: to the end) or a cut's number, from 1, only that part
-        is read.
         """
         return self._table(
             "table",
@@ -415,9 +423,6 @@ class Recording:
             velocity_max_mm_s=velocity_max_mm_s,
             tai=tai,
             uncertainty=_uncertainty(uncertainty),
-            from_s=from_s,
-            to_s=to_s,
-            cut=cut,
         )
 
     def resample(
@@ -425,14 +430,11 @@ class Recording:
         rate_hz: float = 0,
         tai: bool = False,
         uncertainty: str = "none",
-        from_s: float = 0,
-        to_s: float = 0,
     ) -> Table:
         """All of the recording on one grid of rate_hz, or at each force sample: force, pose, depth,
         velocity and camera, with standard uncertainties; with tai also tai_ns and tai_u_ns.
 
         Without uncertainty "total" or "parts", those are of noise and time alone.
-        With from_s and to_s, seconds from the first sample, only that part is read.
         """
         return self._table(
             "table",
@@ -441,8 +443,6 @@ class Recording:
             resample=True,
             tai=tai,
             uncertainty=_uncertainty(uncertainty),
-            from_s=from_s,
-            to_s=to_s,
         )
 
 
@@ -454,4 +454,6 @@ def open(  # the name that every reader of files has
     calibration: a calibration.conf in place of the recording's own. damaged: do not compare rows
     with the ledger, which otherwise happens once before the first table is read.
     """
+    if _library.path_bytes(path).endswith((b".fis", b".fx")):
+        raise Invalid(errno.EINVAL, f"{path}: is a model; incise.load() reads it")
     return Recording(path, calibration, damaged)

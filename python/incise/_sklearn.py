@@ -5,22 +5,14 @@ from __future__ import annotations
 
 from typing import Any, Optional, Sequence, Union
 
-try:
-    import numpy
-    from sklearn.base import BaseEstimator, RegressorMixin
-    from sklearn.utils.validation import check_is_fitted
-except ImportError as failure:  # pragma: no cover - depends on what is installed
-    import errno
+from ._library import package
 
-    from ._library import NotFound
+numpy = package("numpy", "ForceRegressor")
+package("sklearn", "ForceRegressor")
+from sklearn.base import BaseEstimator, RegressorMixin  # noqa: E402
+from sklearn.utils.validation import check_is_fitted  # noqa: E402
 
-    raise NotFound(
-        errno.ENOENT,
-        f"ForceRegressor needs scikit-learn ({failure}); install python3-sklearn, or pip install "
-        "scikit-learn",
-    ) from None
-
-from .model import INPUTS_MAX, train
+from ._model import INPUTS_MAX, train
 
 try:  # scikit-learn 1.6 and later
     from sklearn.utils.validation import validate_data as _validate
@@ -63,25 +55,25 @@ class ForceRegressor(RegressorMixin, BaseEstimator):
         self.starts = starts
         self.seed = seed
 
-    def fit(self, X: Any, y: Any, groups: Any = None) -> "ForceRegressor":
-        """Learn; groups: the cut of each row, which cross-validation keeps together."""
-        X, y = _validate(
-            self, X, y, dtype=numpy.float64, y_numeric=True, ensure_min_samples=2
-        )
+    def fit(self, X: Any, y: Any, groups: Any = None, sample_weight: Any = None) -> "ForceRegressor":
+        """Learn; groups: the cut of each row, which cross-validation keeps together;
+        sample_weight: a row of weight 2 counts as two.
+
+        The model's names are those of the columns of a DataFrame and of a Series y."""
+        target = getattr(y, "name", None)
+        X, y = _validate(self, X, y, dtype=numpy.float64, y_numeric=True, ensure_min_samples=2)
         if X.shape[1] > INPUTS_MAX:
             raise ValueError(
                 f"X has {X.shape[1]} features; a model has at most {INPUTS_MAX} inputs"
             )
-        names = [f"x{i}" for i in range(X.shape[1])]
-        columns = {name: X[:, i] for i, name in enumerate(names)}
-        columns["y"] = numpy.asarray(y, dtype=numpy.float64)
-        if groups is not None:
-            columns["group"] = numpy.asarray(groups)
+        names = getattr(self, "feature_names_in_", [f"x{i}" for i in range(X.shape[1])])
         self.model_ = train(
-            columns,
-            inputs=names,
-            target="y",
-            group=None if groups is None else "group",
+            X,
+            y,
+            inputs=[str(name) for name in names],
+            target=target if isinstance(target, str) else "y",
+            group=groups,
+            sample_weight=sample_weight,
             seed=self.seed,
             mf=self.mf,
             mf_type=self.mf_type,

@@ -3,18 +3,33 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import errno
 import math
 import os
+import pathlib
 import tempfile
 import warnings
-from typing import Any, Dict, Iterable, List, NamedTuple, Optional, Sequence, Tuple, Union
+from typing import Any, Callable, Dict, Iterator, List, NamedTuple, Optional, Sequence
+from typing import TYPE_CHECKING, Tuple, Union, overload
 
 from . import _library
-from ._library import ArrowArrayStream, Failure, Invalid, c_bool, c_char, c_double, c_int, c_void_p
-from ._library import function, text
-from .recording import PathLike, Recording
+from ._library import Invalid, PathLike, c_double, c_int, c_void_p, call, function, package
+from ._library import text, values
+from ._producer import column_names, open_stream
+from ._recording import Recording
+from ._show import html_table, plot_model
+
+if TYPE_CHECKING:
+    from typing import Literal
+
+    from numpy.typing import NDArray
+
+    Point = Union[Tuple[float, ...], List[float], Dict[str, float]]
+    Array = NDArray[Any]
+    Yes = Literal[True]
+    No = Literal[False]
 
 INPUTS_MAX, RULES_MAX, NAME_MAX = 8, 256, 64
 _doubles = ctypes.POINTER(c_double)
@@ -22,273 +37,208 @@ _doubles = ctypes.POINTER(c_double)
 FIXED_ONE = 1 << 16  # 1.0 in a compiled model
 
 
-class VariableStruct(ctypes.Structure):
-    """struct incise_variable"""
-
-    _fields_ = [("name", c_char * NAME_MAX), ("min", c_double), ("max", c_double)]
-    c_name = "struct incise_variable"
-
-
-class ModelInfoStruct(ctypes.Structure):
-    """struct incise_model_info"""
-
-    _fields_ = [
-        ("name", c_char * NAME_MAX),
-        ("n_inputs", c_int),
-        ("n_rules", c_int),
-        ("and_method", c_int),
-        ("input", VariableStruct * INPUTS_MAX),
-        ("output", VariableStruct),
-        ("n_mfs", c_int * INPUTS_MAX),
-    ]
-    c_name = "struct incise_model_info"
-
-
-class PairsStruct(ctypes.Structure):
-    """struct incise_pairs"""
-
-    _fields_ = [("rows", _doubles), ("n", ctypes.c_size_t), ("n_inputs", c_int)]
-    c_name = "struct incise_pairs"
-
-
-class SideStruct(ctypes.Structure):
-    """struct incise_train_side"""
-
-    _fields_ = [("pairs", PairsStruct), ("groups", ctypes.POINTER(c_int)), ("n_groups", c_int)]
-    c_name = "struct incise_train_side"
+VariableStruct, ModelInfoStruct, PairsStruct, SideStruct, StepStruct = _library.structs("""
+    struct incise_variable {
+        char name[64];
+        double min, max;
+    };
+    struct incise_model_info {
+        char name[64];
+        int n_inputs, n_rules, and_method;
+        struct incise_variable input[8], output;
+        int n_mfs[8];
+    };
+    struct incise_pairs {
+        double *rows;
+        uint64_t n;
+        int n_inputs;
+        const double *weights;
+    };
+    struct incise_train_side {
+        struct incise_pairs pairs;
+        int *groups, n_groups;
+    };
+    struct incise_train_step {
+        int phase, epoch;
+        double train_rmse, check_rmse;
+        int source, sources, resumed;
+        uint64_t rows, total;
+    };
+    """)
 
 
-_Progress = ctypes.CFUNCTYPE(c_int, c_void_p, c_void_p)
+_Progress = ctypes.CFUNCTYPE(c_int, c_void_p, ctypes.POINTER(StepStruct))
 
 
-class TrainOptionsStruct(ctypes.Structure):
-    """struct incise_train_options"""
+TrainOptionsStruct, TrainReportStruct = _library.structs(
+    """
+    struct incise_train_options {
+        int epochs;
+        double step, ridge;
+        bool classic;
+        int *groups;
+        uint64_t seed;
+        _Progress progress;
+        void *user;
+        int starts;
+        size_t tuned;
+        void **uncertainty;
+        struct incise_variable *ranges;
+    };
+    struct incise_train_report {
+        int epochs, best_epoch;
+        double ridge, train_rmse, check_rmse, condition;
+        int parameters, rules_unfired;
+        double train_r2, check_r2, crossval_rmse;
+        int start;
+        size_t pairs_tuned;
+        bool unfired[256];
+        int averaged;
+        double plane_weight, mean_weight, cut_weight;
+    };
+    """,
+    _Progress=_Progress,
+)
 
-    _fields_ = [
-        ("epochs", c_int),
-        ("step", c_double),
-        ("ridge", c_double),
-        ("classic", c_bool),
-        ("groups", ctypes.POINTER(c_int)),
-        ("seed", ctypes.c_uint64),
-        ("progress", _Progress),
-        ("user", c_void_p),
-        ("starts", c_int),
-        ("tuned", ctypes.c_size_t),
-        ("uncertainty", ctypes.POINTER(c_void_p)),
-        ("ranges", ctypes.POINTER(VariableStruct)),
-    ]
-    c_name = "struct incise_train_options"
+
+PHASES = ("survey", "search", "add", "solve")
+
+
+class TrainStep(NamedTuple):
+    """A step of a training, for the progress of :func:`incise.train`."""
+
+    phase: str  #: survey, search, add or solve
+    epoch: int  #: of the final training, that has ended; 0: none
+    train_rms_error: float  #: after that epoch
+    check_rms_error: float
+    rows: int  #: read of the sources
+    total: int  #: to be read; 0: not known
 
 
 class Stop:
-    """The progress of a training, by which another thread ends it."""
+    """The progress of a training, by which another thread or the caller's function ends it."""
 
-    def __init__(self, options: TrainOptionsStruct):
+    def __init__(
+        self, options: TrainOptionsStruct, progress: Optional[Callable[[TrainStep], object]] = None
+    ):
         self.set = False
-        options.progress = _Progress(lambda _user, _step: self.set)
+        self.failure: Optional[BaseException] = None  # of the caller's function
+        self.progress = progress
+        options.progress = _Progress(self._step)
+
+    def _step(self, _user: Any, step: Any) -> bool:
+        if self.progress and not self.set:
+            s = step.contents
+            try:
+                self.progress(
+                    TrainStep(PHASES[s.phase], s.epoch, s.train_rmse, s.check_rmse, s.rows, s.total)
+                )
+            except BaseException as failure:  # raised again in the caller
+                self.failure, self.set = failure, True
+        return self.set
 
     def cancel(self) -> None:
         self.set = True
 
-
-class TrainReportStruct(ctypes.Structure):
-    """struct incise_train_report"""
-
-    _fields_ = [
-        ("epochs", c_int),
-        ("best_epoch", c_int),
-        ("ridge", c_double),
-        ("train_rmse", c_double),
-        ("check_rmse", c_double),
-        ("condition", c_double),
-        ("parameters", c_int),
-        ("rules_unfired", c_int),
-        ("train_r2", c_double),
-        ("check_r2", c_double),
-        ("crossval_rmse", c_double),
-        ("start", c_int),
-        ("pairs_tuned", ctypes.c_size_t),
-        ("unfired", c_bool * RULES_MAX),
-        ("averaged", c_int),
-        ("plane_weight", c_double),
-        ("mean_weight", c_double),
-        ("cut_weight", c_double),
-    ]
-    c_name = "struct incise_train_report"
+    def run(self, learn: Callable[[], Model]) -> Model:
+        """Learn in a thread, which Ctrl-C ends."""
+        try:
+            return _library.call_interruptible(learn, self.cancel)
+        except _library.Error:
+            if self.failure:
+                raise self.failure from None
+            raise
 
 
-class BaselinesStruct(ctypes.Structure):
-    """struct incise_baselines"""
-
-    _fields_ = [("mean", c_double), ("linear", c_double), ("knn", c_double), ("k", c_int)]
-    c_name = "struct incise_baselines"
-
-
-class FixedOptionsStruct(ctypes.Structure):
-    """struct incise_fixed_options"""
-
-    _fields_ = [("budget", c_double), ("arithmetic", c_int), ("cells", c_int)]
-    c_name = "struct incise_fixed_options"
-
-
-class FixedInputStruct(ctypes.Structure):
-    """struct incise_fixed_input"""
-
-    _fields_ = [
-        ("name", ctypes.c_char_p),
-        ("min", ctypes.c_int32),
-        ("max", ctypes.c_int32),
-        ("n_mfs", ctypes.c_int32),
-        ("cell_shift", ctypes.c_int32),
-        ("cells", ctypes.c_int32),
-        ("values", ctypes.POINTER(ctypes.c_int32)),
-    ]
-    c_name = "struct incise_fixed_input"
-
-
-class FixedStruct(ctypes.Structure):
-    """struct incise_fixed"""
-
-    _fields_ = [
-        ("arithmetic", c_int),
-        ("n_inputs", ctypes.c_int32),
-        ("n_rules", ctypes.c_int32),
-        ("shift_a", ctypes.c_int32),
-        ("shift_b", ctypes.c_int32),
-        ("bound", ctypes.c_uint64),
-        ("input", FixedInputStruct * 4),
-        ("name", ctypes.c_char_p),
-        ("output", ctypes.c_char_p),
-        ("data", c_void_p),
-        ("blob", c_void_p),
-        ("size", ctypes.c_uint32),
-    ]
-    c_name = "struct incise_fixed"
+BaselinesStruct, FixedOptionsStruct, FixedInputStruct, FixedStruct = _library.structs("""
+    struct incise_baselines {
+        double mean, linear, knn;
+        int k;
+    };
+    struct incise_fixed_options {
+        double budget;
+        int arithmetic, cells;
+    };
+    struct incise_fixed_input {
+        const char *name;
+        int min, max, n_mfs, cell_shift, cells, *values;
+    };
+    struct incise_fixed {
+        int arithmetic, n_inputs, n_rules, shift_a, shift_b;
+        uint64_t bound;
+        struct incise_fixed_input input[4];
+        const char *name, *output;
+        void *data, *blob;
+        uint32_t size;
+    };
+    """)
 
 
 _path = ctypes.c_char_p
-_library.declare(
+_library.prototypes(
     "libincise",
-    {
-        "incise_model_load": (c_void_p, _path, c_void_p),
-        "incise_model_save_notes": (c_int, c_void_p, _path, ctypes.c_char_p, c_void_p),
-        "incise_model_free": (None, c_void_p),
-        "incise_model_info": (ctypes.POINTER(ModelInfoStruct), c_void_p),
-        "incise_model_set_clamp": (None, c_void_p, c_bool),
-        "incise_inputs_check": (
-            c_int, c_void_p, c_int, c_void_p, ctypes.c_size_t, c_void_p, c_void_p
-        ),
-        "incise_model_eval_many": (None, c_void_p, c_void_p, ctypes.c_size_t, c_void_p, c_void_p),
-        "incise_uncertainty_load": (c_void_p, _path, c_void_p, c_void_p),
-        "incise_uncertainty_save": (c_int, c_void_p, _path, c_void_p),
-        "incise_uncertainty_free": (None, c_void_p),
-        "incise_uncertainty_noise": (c_double, c_void_p),
-        "incise_uncertainty_sd_many": (
-            None,
-            c_void_p,
-            c_void_p,
-            c_void_p,
-            ctypes.c_size_t,
-            c_void_p,
-        ),
-        "incise_uncertainty_parts_many": (
-            None,
-            c_void_p,
-            c_void_p,
-            c_void_p,
-            ctypes.c_size_t,
-            c_void_p,
-        ),
-        "incise_fixed_compile": (
-            ctypes.POINTER(FixedStruct),
-            c_void_p,
-            ctypes.POINTER(FixedOptionsStruct),
-            c_void_p,
-        ),
-        "incise_fixed_load": (ctypes.POINTER(FixedStruct), _path, c_void_p),
-        "incise_fixed_save": (c_int, ctypes.POINTER(FixedStruct), _path, c_void_p),
-        "incise_fixed_free": (None, ctypes.POINTER(FixedStruct)),
-        "incise_fixed_bound": (c_double, ctypes.POINTER(FixedStruct)),
-        "incise_fixed_arithmetic_name": (ctypes.c_char_p, c_int),
-        "incise_fixed_options_init": (None, ctypes.POINTER(FixedOptionsStruct)),
-        "incise_fixed_eval_double": (c_double, ctypes.POINTER(FixedStruct), c_void_p),
-        "incise_fixed_eval_batch": (
-            None,
-            ctypes.POINTER(FixedStruct),
-            c_void_p,
-            c_void_p,
-            ctypes.c_size_t,
-        ),
-    },
+    """
+    struct incise_model *incise_model_load(const char *path, struct incise_error *err);
+    int incise_model_save_notes(const struct incise_model *model, const char *path,
+        const char *notes, struct incise_error *err);
+    void incise_model_free(struct incise_model *model);
+    const struct incise_model_info *incise_model_info(const struct incise_model *model);
+    void incise_model_set_clamp(struct incise_model *model, bool clamp);
+    int incise_inputs_check(const struct incise_variable *inputs, int n_inputs, const double *x,
+        uint64_t n, uint64_t *outside, struct incise_error *err);
+    void incise_model_eval_many(const struct incise_model *model, const double *x, size_t n,
+        double *y, double *gradient);
+    struct incise_uncertainty *incise_uncertainty_load(const char *path,
+        const struct incise_model *model, struct incise_error *err);
+    int incise_uncertainty_save(const struct incise_uncertainty *uncertainty, const char *path,
+        struct incise_error *err);
+    void incise_uncertainty_free(struct incise_uncertainty *uncertainty);
+    double incise_uncertainty_noise(const struct incise_uncertainty *uncertainty);
+    void incise_uncertainty_sd_many(const struct incise_uncertainty *uncertainty,
+        const struct incise_model *model, const double *x, size_t n, double *sd);
+    void incise_uncertainty_parts_many(const struct incise_uncertainty *uncertainty,
+        const struct incise_model *model, const double *x, size_t n,
+        struct incise_uncertainty_parts *parts);
+    struct incise_fixed *incise_fixed_compile(const struct incise_model *model,
+        const struct incise_fixed_options *options, struct incise_error *err);
+    struct incise_fixed *incise_fixed_load(const char *path, struct incise_error *err);
+    int incise_fixed_save(const struct incise_fixed *fx, const char *path,
+        struct incise_error *err);
+    void incise_fixed_free(struct incise_fixed *fx);
+    double incise_fixed_bound(const struct incise_fixed *fx);
+    const char *incise_fixed_arithmetic_name(enum incise_fixed_arithmetic arithmetic);
+    void incise_fixed_options_init(struct incise_fixed_options *options);
+    double incise_fixed_eval_double(const struct incise_fixed *fx, const double *x);
+    void incise_fixed_eval_batch(const struct incise_fixed *fx, const int32_t *x, int32_t *y,
+        uint64_t n);
+    """,
 )
 _names = ctypes.POINTER(ctypes.c_char_p)
-_library.declare(
+_library.prototypes(
     "libincise-learn",
-    {
-        "incise_dataset_read_where": (
-            c_void_p,
-            _path,
-            _names,
-            c_int,
-            ctypes.c_char_p,
-            ctypes.c_char_p,
-            ctypes.POINTER(ctypes.c_size_t),
-            c_void_p,
-        ),
-        "incise_dataset_from_arrow": (
-            c_void_p,
-            ctypes.POINTER(ArrowArrayStream),
-            _names,
-            c_int,
-            ctypes.c_char_p,
-            ctypes.c_char_p,
-            ctypes.POINTER(ctypes.c_size_t),
-            c_void_p,
-        ),
-        "incise_dataset_has": (c_bool, _path, ctypes.c_char_p, c_void_p),
-        "incise_dataset_free": (None, c_void_p),
-        "incise_dataset_rows": (ctypes.c_size_t, c_void_p),
-        "incise_train_options_init": (None, ctypes.POINTER(TrainOptionsStruct)),
-        "incise_train_split": (
-            c_int,
-            c_void_p,
-            c_double,
-            ctypes.c_uint64,
-            ctypes.POINTER(SideStruct),
-            ctypes.POINTER(SideStruct),
-            c_void_p,
-        ),
-        "incise_train_side_free": (None, ctypes.POINTER(SideStruct)),
-        "incise_train_start": (
-            c_void_p,
-            ctypes.POINTER(PairsStruct),
-            _names,
-            c_int,
-            ctypes.POINTER(c_int),
-            ctypes.POINTER(TrainOptionsStruct),
-            c_void_p,
-        ),
-        "incise_train": (
-            c_int,
-            c_void_p,
-            ctypes.POINTER(PairsStruct),
-            ctypes.POINTER(PairsStruct),
-            ctypes.POINTER(TrainOptionsStruct),
-            ctypes.POINTER(TrainReportStruct),
-            c_void_p,
-        ),
-        "incise_baselines": (
-            c_int,
-            ctypes.POINTER(PairsStruct),
-            ctypes.POINTER(c_int),
-            ctypes.POINTER(PairsStruct),
-            _Progress,
-            c_void_p,
-            ctypes.POINTER(BaselinesStruct),
-            c_void_p,
-        ),
-    },
+    """
+    struct incise_dataset *incise_dataset_read_where(const char *path, const char *const *columns,
+        int n, const char *group, const char *where, size_t *left_out, struct incise_error *err);
+    struct incise_dataset *incise_dataset_from_arrow(struct ArrowArrayStream *stream,
+        const char *const *columns, int n, const char *group, const char *where, size_t *left_out,
+        struct incise_error *err);
+    bool incise_dataset_has(const char *path, const char *column, bool *stated);
+    void incise_dataset_free(struct incise_dataset *data);
+    size_t incise_dataset_rows(const struct incise_dataset *data);
+    void incise_train_options_init(struct incise_train_options *options);
+    int incise_train_split(const struct incise_dataset *data, double share, uint64_t seed,
+        struct incise_train_side *fit, struct incise_train_side *check, struct incise_error *err);
+    void incise_train_side_free(struct incise_train_side *side);
+    struct incise_model *incise_train_start(const struct incise_pairs *pairs,
+        const char *const *names, enum incise_mf_type type, int *n_mfs,
+        const struct incise_train_options *options, struct incise_error *err);
+    int incise_train(struct incise_model *model, const struct incise_pairs *train,
+        const struct incise_pairs *check, const struct incise_train_options *options,
+        struct incise_train_report *report, struct incise_error *err);
+    int incise_baselines(const struct incise_pairs *train, const int *groups,
+        const struct incise_pairs *on, incise_train_progress progress, void *user,
+        struct incise_baselines *result, struct incise_error *err);
+    """,
 )
 
 
@@ -327,16 +277,14 @@ class Points:
         self._check(inputs)
 
     def _check(self, inputs: Any) -> None:
-        failure, outside = Failure(), ctypes.c_size_t()
-        failure.check(
-            function("incise_inputs_check")(
-                (VariableStruct * len(inputs))(*inputs),
-                len(inputs),
-                self.address,
-                self.n,
-                ctypes.byref(outside),
-                failure.ref,
-            )
+        outside = ctypes.c_size_t()
+        call(
+            "incise_inputs_check",
+            (VariableStruct * len(inputs))(*inputs),
+            len(inputs),
+            self.address,
+            self.n,
+            ctypes.byref(outside),
         )
         if outside.value:
             ranges = ", ".join(f"{text(v.name)} {v.min:.4g} to {v.max:.4g}" for v in inputs)
@@ -349,14 +297,10 @@ class Points:
     @staticmethod
     def _by_name(x: Any, names: List[str]) -> Optional[List[Any]]:
         """The columns of a table, {column: values} or structured array; None: it is none."""
-        found = getattr(getattr(x, "dtype", None), "names", None)
-        for attribute in ("column_names", "columns"):
-            found = getattr(x, attribute, None) if found is None else found
-        if found is None and hasattr(x, "keys"):
-            found = x.keys()
-        if found is None or not any(isinstance(name, str) for name in found):
+        found = column_names(x)
+        if found is None:
             return None
-        missing = [name for name in names if name not in list(found)]
+        missing = [name for name in names if name not in found]
         if missing:
             raise Invalid(
                 errno.EINVAL,
@@ -449,9 +393,8 @@ class CompiledModel:
     """The model of a .fx file: in fixed point, with a certified bound of its error."""
 
     def __init__(self, path: PathLike):
-        failure = Failure()
         name = _library.path_bytes(path)
-        self._own(failure.require(function("incise_fixed_load")(name, failure.ref)))
+        self._own(call("incise_fixed_load", name))
 
     def _own(self, pointer: Any) -> None:
         self._pointer = _library.Handle(pointer, "incise_fixed_free")
@@ -471,11 +414,6 @@ class CompiledModel:
     def __reduce__(self) -> Any:
         return _compiled_of_bytes, (ctypes.string_at(self._struct.blob, self._struct.size),)
 
-    @classmethod
-    def load(cls, path: PathLike) -> "CompiledModel":
-        """Read a .fx file: the same as CompiledModel(path)."""
-        return cls(path)
-
     @property
     def bound(self) -> float:
         """Certified largest error, in the output's unit."""
@@ -491,6 +429,11 @@ class CompiledModel:
         """direct, table or force."""
         return text(function("incise_fixed_arithmetic_name")(self._struct.arithmetic))
 
+    @overload
+    def __call__(self, x: Point) -> float: ...
+    @overload
+    def __call__(self, x: Any) -> Array: ...
+
     def __call__(self, x: Any) -> Any:
         """The output at one point, or at each point of an array (…, inputs)."""
         points = Points(x, self._inputs)
@@ -502,12 +445,16 @@ class CompiledModel:
             out[k] = one(self._pointer, points.address + k * step)
         return points.finish(block)
 
-    def save(self, path: PathLike) -> None:
-        """Write the .fx file, whole or not at all."""
-        failure = Failure()
-        failure.check(
-            function("incise_fixed_save")(self._pointer, _library.path_bytes(path), failure.ref)
+    def __repr__(self) -> str:
+        names = ", ".join(text(v.name) for v in self._inputs)
+        return (
+            f"<incise.CompiledModel {text(self._struct.output)} of {names}: {self.arithmetic}, "
+            f"{self.size} bytes, error at most {self.bound:.3g}>"
         )
+
+    def save(self, path: PathLike, *, overwrite: bool = False) -> None:
+        """Write the .fx file, whole or not at all."""
+        call("incise_fixed_save", self._pointer, _library.new_path(path, ".fx", overwrite))
 
 
 class TrainReport(NamedTuple):
@@ -540,22 +487,15 @@ class Model:
     """
 
     def __init__(self, path: PathLike):
-        failure = Failure()
         name = _library.path_bytes(path)
-        self._own(failure.require(function("incise_model_load")(name, failure.ref)))
+        self._own(call("incise_model_load", name))
         if os.path.exists(name + b".sd"):
-            self._set_uncertainty(
-                failure.require(
-                    function("incise_uncertainty_load")(
-                        name + b".sd", self._pointer, failure.ref
-                    )
-                )
-            )
+            self._set_uncertainty(call("incise_uncertainty_load", name + b".sd", self._pointer))
 
     def _own(self, pointer: int) -> None:
         self._pointer = _library.Handle(pointer, "incise_model_free")
         self._set_uncertainty(None)
-        self.report: Optional[TrainReport] = None  #: of the training, if it was trained here
+        self._report: Optional[TrainReport] = None
         self._notes = b""  # of a training from many sources: version, options and sources
 
     @classmethod
@@ -565,11 +505,6 @@ class Model:
         model._own(pointer)
         return model
 
-    @classmethod
-    def load(cls, path: PathLike) -> "Model":
-        """The same as Model(path)."""
-        return cls(path)
-
     def _set_uncertainty(self, pointer: Optional[int]) -> None:
         self._uncertainty = pointer and _library.Handle(pointer, "incise_uncertainty_free")
 
@@ -578,10 +513,9 @@ class Model:
         with tempfile.TemporaryDirectory() as folder:
             path = os.path.join(folder, "model.fis")
             self.save(path)
-            texts = tuple(
-                _bytes_of(name) if os.path.exists(name) else None for name in (path, path + ".sd")
-            )
-        return _model_of_bytes, (*texts, self.report, self._notes)
+            files = (pathlib.Path(path), pathlib.Path(path + ".sd"))
+            texts = [file.read_bytes() if file.exists() else None for file in files]
+        return _model_of_bytes, (*texts, self._report, self._notes)
 
     def __repr__(self) -> str:
         inputs = ", ".join(variable.name for variable in self.inputs)
@@ -597,9 +531,7 @@ class Model:
     def inputs(self) -> Tuple[Variable, ...]:
         """Inputs, with their ranges."""
         info = self._info()
-        return tuple(
-            Variable(text(v.name), v.min, v.max) for v in info.input[: info.n_inputs]
-        )
+        return tuple(Variable(text(v.name), v.min, v.max) for v in info.input[: info.n_inputs])
 
     @property
     def output(self) -> Variable:
@@ -613,11 +545,31 @@ class Model:
         return self._info().n_rules
 
     @property
+    def report(self) -> TrainReport:
+        """Report of the training that made it."""
+        if self._report is None:
+            raise Invalid(errno.EINVAL, "the model is of a file; a report comes of incise.train()")
+        return self._report
+
+    @property
     def noise(self) -> float:
         """Standard deviation of new cuts where data are dense; NaN without a .sd file."""
         if not self._uncertainty:
             return math.nan
         return function("incise_uncertainty_noise")(self._uncertainty)
+
+    @overload
+    def __call__(self, x: Point, *, sd: No = ..., parts: No = ...) -> float: ...
+    @overload
+    def __call__(self, x: Point, *, sd: Yes, parts: No = ...) -> Tuple[float, float]: ...
+    @overload
+    def __call__(self, x: Any, *, sd: No = ..., parts: No = ...) -> Array: ...
+    @overload
+    def __call__(self, x: Any, *, sd: Yes, parts: No = ...) -> Tuple[Array, Array]: ...
+    @overload
+    def __call__(self, x: Any, *, sd: Yes, parts: Yes) -> Tuple[Any, Any, Any]: ...
+    @overload
+    def __call__(self, x: Any, *, sd: bool, parts: bool = ...) -> Any: ...
 
     def __call__(self, x: Any, *, sd: bool = False, parts: bool = False) -> Any:
         """The output; with sd=True (output, standard deviation).
@@ -629,9 +581,7 @@ class Model:
             raise Invalid(errno.EINVAL, "parts are those of the standard deviation; give sd=True")
         points = Points(x, self._inputs())
         block, address = points.results()
-        function("incise_model_eval_many")(
-            self._pointer, points.address, points.n, address, None
-        )
+        function("incise_model_eval_many")(self._pointer, points.address, points.n, address, None)
         if not sd:
             return points.finish(block)
         if not self._uncertainty:
@@ -672,66 +622,70 @@ class Model:
         del values
         return points.finish(block, n_inputs)
 
-    def save(self, path: PathLike) -> None:
+    def save(self, path: PathLike, *, overwrite: bool = False) -> None:
         """Write the .fis file, and its standard deviation as PATH.sd; each whole or not at all.
 
         A model trained from a list of sources notes version, options and sources, as the tool does.
         """
-        failure = Failure()
-        name = _library.path_bytes(path)
-        failure.check(
-            function("incise_model_save_notes")(self._pointer, name, self._notes, failure.ref)
-        )
+        name = _library.new_path(path, ".fis", overwrite)
+        _library.new_path(name + b".sd", ".sd", overwrite)
+        call("incise_model_save_notes", self._pointer, name, self._notes)
         if self._uncertainty:
-            failure.check(
-                function("incise_uncertainty_save")(
-                    self._uncertainty, name + b".sd", failure.ref
-                )
-            )
+            call("incise_uncertainty_save", self._uncertainty, name + b".sd")
+        elif os.path.exists(name + b".sd"):
+            os.remove(name + b".sd")  # of the model that was overwritten
+
+    def plot(self, data: Any = None, *, ax: Any = None) -> Any:
+        """Plot the output over the first input, at three values of the second, with the 95 % interval
+        of new cuts; below the residuals of data, a table. Returns the matplotlib axes."""
+        return plot_model(self, data, ax)
+
+    def _repr_html_(self) -> str:
+        rows = [(v.name, v.min, v.max) for v in (*self.inputs, self.output)]
+        return html_table(repr(self)[1:-1], ("variable", "from", "to"), rows)
 
     def compile(self, *, budget_mN: float = 0.1) -> CompiledModel:
         """Compile to fixed point; the certified error is at most budget_mN (0: any)."""
         options = FixedOptionsStruct()
-        function("incise_fixed_options_init")(ctypes.byref(options))
+        function("incise_fixed_options_init")(options)
         options.budget = budget_mN * 1e-3
-        failure = Failure()
-        return CompiledModel._of(
-            failure.require(
-                function("incise_fixed_compile")(
-                    self._pointer, ctypes.byref(options), failure.ref
-                )
-            )
-        )
-
-
-def _bytes_of(path: str) -> bytes:
-    with open(path, "rb") as file:
-        return file.read()
-
-
-def _write_bytes(path: str, content: bytes) -> None:
-    with open(path, "wb") as file:
-        file.write(content)
+        return CompiledModel._of(call("incise_fixed_compile", self._pointer, options))
 
 
 def _model_of_bytes(
     fis: bytes, sd: Optional[bytes], report: Optional[TrainReport], notes: bytes = b""
 ) -> Model:
     with tempfile.TemporaryDirectory() as folder:
-        path = os.path.join(folder, "model.fis")
-        _write_bytes(path, fis)
+        path = pathlib.Path(folder, "model.fis")
+        path.write_bytes(fis)
         if sd is not None:
-            _write_bytes(path + ".sd", sd)
-        model = Model.load(path)
-    model.report, model._notes = report, notes
+            path.with_suffix(".fis.sd").write_bytes(sd)
+        model = Model(path)
+    model._report, model._notes = report, notes
     return model
 
 
 def _compiled_of_bytes(blob: bytes) -> CompiledModel:
     with tempfile.TemporaryDirectory() as folder:
-        path = os.path.join(folder, "model.fx")
-        _write_bytes(path, blob)
-        return CompiledModel.load(path)
+        path = pathlib.Path(folder, "model.fx")
+        path.write_bytes(blob)
+        return CompiledModel(path)
+
+
+@contextlib.contextmanager
+def model_file(model: Union[PathLike, Model, CompiledModel]) -> Iterator[bytes]:
+    """The path of a model's file; of a model in memory a file for the time being."""
+    if is_path(model):
+        yield _library.path_bytes(model)
+        return
+    if not isinstance(model, (Model, CompiledModel)):
+        raise Invalid(
+            errno.EINVAL, f"model: expected a path or a model, found a {type(model).__name__}"
+        )
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "model.fis" if isinstance(model, Model) else "model.fx")
+        model.save(path)
+        yield _library.path_bytes(path)
 
 
 def name_array(names: Sequence[str]) -> Any:
@@ -752,8 +706,7 @@ def has_cuts(data: Any) -> bool:
     if isinstance(data, Recording) or is_recording(data):
         return True
     if not is_path(data):
-        names = getattr(data, "column_names", getattr(data, "columns", data))
-        return isinstance(names, Iterable) and "cut" in list(names)
+        return "cut" in (column_names(data) or ())
     path = _library.path_bytes(data)
     return os.path.isfile(path) and function("incise_dataset_has")(path, b"cut", None)
 
@@ -762,57 +715,42 @@ def _read_dataset(
     data: Any, columns: Sequence[str], group: Optional[str], where: Optional[str]
 ) -> Tuple[int, int]:
     """A dataset of a path or a table, and how many rows were left out."""
-    failure, left_out = Failure(), ctypes.c_size_t()
+    left_out = ctypes.c_size_t()
     rest = (
         name_array(columns),
         len(columns),
         group.encode() if group else None,
         where.encode() if where else None,
         ctypes.byref(left_out),
-        failure.ref,
     )
     if isinstance(data, Recording):
         data = data.pairs(depth_bins=12, velocity_bins=10, by_cut=True)
     if is_recording(data):
         return _read_dataset(Recording(os.fsdecode(data)), columns, group, where)
     if is_path(data):
-        dataset = function("incise_dataset_read_where")(_library.path_bytes(data), *rest)
+        dataset = call("incise_dataset_read_where", _library.path_bytes(data), *rest)
     else:
-        from ._producer import open_stream
-
         stream, keep = open_stream(data)
-        dataset = function("incise_dataset_from_arrow")(ctypes.byref(stream), *rest)
+        dataset = call("incise_dataset_from_arrow", stream, *rest)
         del keep
-    return failure.require(dataset), left_out.value
+    return dataset, left_out.value
 
 
 def start(
     pairs: PairsStruct, names: Sequence[str], mf_type: int, mf: Any, options: TrainOptionsStruct
 ) -> int:
     """The model that a training starts from."""
-    failure = Failure()
-    return failure.require(
-        function("incise_train_start")(
-            ctypes.byref(pairs), name_array(names), mf_type, mf, ctypes.byref(options), failure.ref
-        )
-    )
+    return call("incise_train_start", pairs, name_array(names), mf_type, mf, options)
 
 
 def baselines(fit: SideStruct, check: SideStruct, progress: Any) -> BaselinesStruct:
     """Errors of simpler predictors on the pairs kept back."""
-    failure, result = Failure(), BaselinesStruct()
-    failure.check(
-        function("incise_baselines")(
-            ctypes.byref(fit.pairs),
-            fit.groups,
-            ctypes.byref(check.pairs),
-            progress,
-            None,
-            ctypes.byref(result),
-            failure.ref,
-        )
-    )
+    result = BaselinesStruct()
+    call("incise_baselines", fit.pairs, fit.groups, check.pairs, progress, None, result)
     return result
+
+
+_BASELINES = ("mean", "linear", "knn")
 
 
 def report_of(
@@ -822,22 +760,9 @@ def report_of(
     left_out: int,
     others: Optional[BaselinesStruct],
 ) -> TrainReport:
-    return TrainReport(
-        pairs,
-        check_pairs,
-        left_out,
-        report.epochs,
-        report.ridge,
-        report.train_rmse,
-        report.check_rmse,
-        report.crossval_rmse,
-        report.condition,
-        report.parameters,
-        report.rules_unfired,
-        report.train_r2,
-        report.check_r2,
-        {"mean": others.mean, "linear": others.linear, "knn": others.knn} if others else {},
-    )
+    names = [name.replace("rms_error", "rmse") for name in TrainReport._fields[3:-1]]
+    errors = {} if others is None else {name: getattr(others, name) for name in _BASELINES}
+    return TrainReport(pairs, check_pairs, left_out, *values(report, names), errors)
 
 
 class _Training:
@@ -846,39 +771,26 @@ class _Training:
     def __init__(self, dataset: int, share: float, options: TrainOptionsStruct):
         self.dataset, self.options = dataset, options
         self.fit, self.check = SideStruct(), SideStruct()
-        self.stop = Stop(options)
-        self.failure = Failure()
         self.has_check = share != 0
-        self.failure.check(
-            function("incise_train_split")(
-                dataset,
-                share,
-                options.seed,
-                ctypes.byref(self.fit),
-                ctypes.byref(self.check),
-                self.failure.ref,
-            )
-        )
+        call("incise_train_split", dataset, share, options.seed, self.fit, self.check)
         options.groups = self.fit.groups
 
     def close(self) -> None:
-        function("incise_train_side_free")(ctypes.byref(self.fit))
+        function("incise_train_side_free")(self.fit)
         if self.has_check:
-            function("incise_train_side_free")(ctypes.byref(self.check))
+            function("incise_train_side_free")(self.check)
         function("incise_dataset_free")(self.dataset)
 
     def run(self, model: Model) -> TrainReportStruct:
         report, uncertainty = TrainReportStruct(), c_void_p()
         self.options.uncertainty = ctypes.pointer(uncertainty)
-        self.failure.check(
-            function("incise_train")(
-                model._pointer,
-                ctypes.byref(self.fit.pairs),
-                ctypes.byref(self.check.pairs) if self.has_check else None,
-                ctypes.byref(self.options),
-                ctypes.byref(report),
-                self.failure.ref,
-            )
+        call(
+            "incise_train",
+            model._pointer,
+            self.fit.pairs,
+            self.check.pairs if self.has_check else None,
+            self.options,
+            report,
         )
         model._set_uncertainty(uncertainty.value)
         return report
@@ -896,17 +808,72 @@ def _mf_counts(mf: Union[str, Sequence[int], None], n_inputs: int) -> Any:
         mf = (0,) * n_inputs
     elif len(mf) != n_inputs or not all(1 <= int(n) <= 32 for n in mf):
         raise Invalid(
-            errno.EINVAL, f"mf={tuple(mf)!r}: give a count from 1 to 32 for each of {n_inputs} inputs"
+            errno.EINVAL,
+            f"mf={tuple(mf)!r}: give a count from 1 to 32 for each of {n_inputs} inputs",
         )
     return (c_int * INPUTS_MAX)(*(int(n) for n in mf))
 
 
+_INPUTS, _TARGET = ("depth_mm", "velocity_mm_s"), "force_N"
+
+
+def _table_of(
+    x: Any, y: Any, inputs: Optional[Sequence[str]], target: Optional[str], group: Any
+) -> Tuple[Dict[str, Any], Sequence[str], str, Optional[str]]:
+    """{column: array} of inputs, output and group, and their names."""
+    numpy = package("numpy", "train(X, y)")
+    names = column_names(x)
+    if group is None and names and "cut" in names:
+        group = "cut"
+    column = group if isinstance(group, str) else None
+    if names and inputs is None:
+        inputs = [str(name) for name in names if name != column]
+    try:
+        if not names:
+            x = numpy.asarray(x, numpy.float64)
+            inputs = inputs or (_INPUTS if x.shape[1:] == (2,) else None)
+            if inputs is None or x.ndim != 2 or x.shape[1] != len(inputs):
+                raise ValueError(f"X has the shape {x.shape}; name its columns by inputs=(…)")
+            x = {name: x[:, i] for i, name in enumerate(inputs)}
+        name = getattr(y, "name", None)
+        target = target or (name if isinstance(name, str) else _TARGET)
+        table = {name: numpy.asarray(x[name], numpy.float64) for name in inputs}
+        table[target] = numpy.asarray(y, numpy.float64).reshape(-1)
+        if group is not None and column != "none":
+            table["group"] = numpy.asarray(x[column] if column else group)
+            group = "group"
+    except KeyError as missing:
+        raise Invalid(errno.EINVAL, f"train(X, y): X has no column {missing}") from None
+    except (TypeError, ValueError, IndexError) as failure:
+        raise Invalid(errno.EINVAL, f"train(X, y): {failure}") from None
+    return table, inputs, target, group
+
+
+def _weighed(table: Dict[str, Any], weights: Sequence[float]) -> Tuple[Dict[str, Any], Any]:
+    """The rows that count, and their weights."""
+    numpy = package("numpy", "sample_weight")
+    rows = len(next(iter(table.values())))
+    found = numpy.asarray(weights, numpy.float64)
+    if found.shape not in ((), (rows,)):
+        raise Invalid(
+            errno.EINVAL, f"sample_weight: expected one for each row, found {found.size} for {rows}"
+        )
+    found = numpy.broadcast_to(found, rows)
+    if not (numpy.isfinite(found).all() and (found >= 0).all()):
+        raise Invalid(errno.EINVAL, "sample_weight: expected finite numbers, 0 or more")
+    if not found.any():
+        raise Invalid(errno.EINVAL, "sample_weight: all are zero; no row counts")
+    return {name: values[found > 0] for name, values in table.items()}, found[found > 0]
+
+
 def train(
     data: Any,
+    y: Any = None,
     *,
-    inputs: Sequence[str] = ("depth_mm", "velocity_mm_s"),
-    target: str = "force_N",
-    group: Optional[str] = None,
+    inputs: Optional[Sequence[str]] = None,
+    target: Optional[str] = None,
+    group: Union[str, Sequence[Any], None] = None,
+    sample_weight: Optional[Sequence[float]] = None,
     check: float = 0,
     seed: int = 1,
     mf: Union[str, Sequence[int], None] = None,
@@ -916,10 +883,14 @@ def train(
     starts: int = 3,
     classic: bool = False,
     all_rows: bool = False,
+    progress: Optional[Callable[[TrainStep], object]] = None,
 ) -> Model:
     """Learn a model as `incise train` does: same data, options and seed give the same model.
 
-    data: a list of sources, or one table, whose pairs are then all in memory.
+    data: a list of sources, or one table, whose pairs are then all in memory; or with y the inputs X:
+    an array, a DataFrame or {column: values}, of which all columns but the group's are inputs.
+    inputs, target: names of the columns; by default depth_mm, velocity_mm_s and force_N, or with y
+    those of X and of y. Models have them: a loop takes a model of depth_mm and velocity_mm_s.
 
     A list [source, …] is read twice in bounded memory, and files in it give the very file that the
     tool writes of them. A source is a CSV file, a recording (every force sample of its cuts), a table
@@ -940,23 +911,37 @@ def train(
     above. The tool searches the premises of more than 20000 pairs on a random sample of them, and
     holds out other single rows where check is given without group; so does a list, [source] too.
 
-    group: column that names the cut; cross-validation and check keep whole cuts together. In a list
+    group: column that names the cut, or with y the cut of each row; cross-validation and check keep whole cuts together. In a list
     also "recording" or "rig"; cuts of different sources are different ones. Without it data are
     grouped by "cut" where all have it; "none" takes each row by itself.
+    sample_weight: of each row of X, 0 or more: one of weight 2 counts as two; without check.
     check: share that is kept back, 0 to 1; its error is in ``model.report``.
     mf: membership functions of each input (default 5, 4; else 3 each), or "auto".
     classic: the method of MATLAB's anfis; not for a list.
     all_rows: also take rows whose column ``advancing`` is 0.
-    Ctrl-C ends the training.
+    progress: called with a :class:`incise.TrainStep` after each epoch and some 10 ms of computing,
+    in another thread; an exception of it ends the training, as Ctrl-C does.
     """
     if mf_type not in _mf_types:
         raise Invalid(errno.EINVAL, f"mf_type={mf_type!r}: gaussmf or gbellmf")
     if not 0 <= check < 1:
         raise Invalid(errno.EINVAL, f"check={check!r}: a share from 0 to below 1")
-    names = [*inputs, target]
+    weights = None
+    if y is not None:
+        data, inputs, target, group = _table_of(data, y, inputs, target, group)
+        if sample_weight is not None:
+            data, weights = _weighed(data, sample_weight)
+    if sample_weight is not None and (y is None or check):
+        raise Invalid(errno.EINVAL, "sample_weight: only of rows of X and y, and without check")
+    inputs = inputs or _INPUTS
+    names = [*inputs, target or _TARGET]
+    if group is not None and not isinstance(group, str):
+        raise Invalid(
+            errno.EINVAL, "group: expected the name of a column; of rows only with X and y"
+        )
     counts = _mf_counts(mf, len(inputs))
     options = TrainOptionsStruct()
-    function("incise_train_options_init")(ctypes.byref(options))
+    function("incise_train_options_init")(options)
     options.epochs, options.seed, options.starts = epochs, seed, starts
     options.classic = classic
     if ridge is not None:
@@ -965,7 +950,7 @@ def train(
         from ._corpus import train_sources
 
         return train_sources(
-            data, names, options, group, check, all_rows, _mf_types[mf_type], counts
+            data, names, options, group, check, all_rows, _mf_types[mf_type], counts, progress
         )
     if group is None and has_cuts(data):
         group = "cut"
@@ -975,28 +960,36 @@ def train(
         lambda: _read_dataset(data, names, group, None if all_rows else "advancing"),
         lambda: None,
     )
+    stop = Stop(options, progress)
     training = _Training(dataset, check, options)
+    if weights is not None:
+        training.fit.pairs.weights = (c_double * len(weights))(*weights)
 
     def learn() -> Model:
         model = Model._of(start(training.fit.pairs, names, _mf_types[mf_type], counts, options))
         report = training.run(model)
-        model.report = report_of(
+        model._report = report_of(
             report,
             training.fit.pairs.n,
             training.check.pairs.n,
             left_out,
-            baselines(training.fit, training.check, options.progress) if training.has_check else None,
+            (
+                baselines(training.fit, training.check, options.progress)
+                if training.has_check
+                else None
+            ),
         )
         return model
 
     try:
-        return _library.call_interruptible(learn, training.stop.cancel)
+        return stop.run(learn)
     finally:
         training.close()
 
 
 def load(path: PathLike) -> Union[Model, CompiledModel]:
     """Read a model, .fis or .fx."""
-    if os.fspath(path).endswith(".fx"):
-        return CompiledModel.load(path)
-    return Model.load(path)
+    name = _library.path_bytes(path)
+    if is_recording(name) or os.path.isdir(name):
+        raise Invalid(errno.EINVAL, f"{path}: is a recording; incise.open() reads it")
+    return CompiledModel(path) if name.endswith(b".fx") else Model(path)

@@ -4,8 +4,8 @@
 A :class:`Table` names rows; each reading of it starts anew, so it may be read as often as one likes:
 
     pyarrow.table(rec.force)            polars.DataFrame(rec.force)
-    rec.force.numpy()["force_N"]        rec.force.pandas()
-    rec.force.parquet("force.parquet")
+    rec.force["force_N"]                rec.force.to_pandas()
+    rec.force.between(10, 20).plot()    rec.force.parquet("force.parquet")
 """
 
 from __future__ import annotations
@@ -13,11 +13,18 @@ from __future__ import annotations
 import ctypes
 import errno
 import itertools
+import operator
 import os
-from typing import Any, Callable, Dict, Iterator, List, NamedTuple, Optional, Union
+from typing import Any, Callable, Dict, Iterator, List, NamedTuple, Optional, TYPE_CHECKING, Tuple
+from typing import Union, overload
 
 from . import _library
-from ._library import ArrowArray, ArrowArrayStream, ArrowSchema, Invalid, function, make_error
+from ._columns import Columns, Tabular
+from ._library import ArrowArray, ArrowArrayStream, ArrowSchema, Error, Invalid, PathLike, function
+from ._library import make_error, package
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 _ctypes_of = {
     "l": ctypes.c_int64,
@@ -81,7 +88,7 @@ class _Reader:
     def __init__(self, open_stream: Callable[[ArrowArrayStream], None]):
         self.stream = ArrowArrayStream()
         open_stream(self.stream)
-        self.ref = ctypes.byref(self.stream)
+        self.ref = self.stream
 
     def _check(self, code: int) -> None:
         if code:
@@ -91,15 +98,15 @@ class _Reader:
     def schema(self):
         """The fields and the table's metadata."""
         schema = ArrowSchema()
-        self._check(self.stream.get_schema(self.ref, ctypes.byref(schema)))
+        self._check(self.stream.get_schema(self.ref, schema))
         try:
             return _fields(schema), _metadata(schema.metadata)
         finally:
-            schema.release(ctypes.byref(schema))
+            schema.release(schema)
 
     def next(self) -> Optional[ArrowArray]:
         array = ArrowArray()
-        self._check(self.stream.get_next(self.ref, ctypes.byref(array)))
+        self._check(self.stream.get_next(self.ref, array))
         return array if array.release else None
 
     def close(self) -> None:
@@ -187,9 +194,10 @@ class Batch:
             return None
         return memoryview(self._buffer(i, 0, ctypes.c_uint8, (len(self) + 7) // 8)).cast("B")
 
-    def _numpy_column(self, field: Field):
-        import numpy
-
+    def array(self, name: str) -> Any:
+        """A column as an array; of numbers without a copy, unless a value is missing: NaN."""
+        numpy = package("numpy", "an array")
+        field = self.fields[self._index(name)]
         if field.format == "u":
             return numpy.array(self.texts(field.name), dtype=object)
         view = self.column(field.name)
@@ -204,13 +212,18 @@ class Batch:
         return values
 
     def numpy(self) -> Dict[str, Any]:
-        """The columns as arrays; those of numbers without a copy, unless a value is missing: NaN."""
-        return {field.name: self._numpy_column(field) for field in self.fields}
+        """All columns as arrays, see array()."""
+        return {field.name: self.array(field.name) for field in self.fields}
 
 
 # --- capsules ----------------------------------------------------------------------------
 
-_library.declare("libincise-record", {"incise_arrow_capsule_free": (None, ctypes.c_void_p)})
+_library.prototypes(
+    "libincise-record",
+    """
+    void incise_arrow_capsule_free(void *capsule);
+    """,
+)
 
 _new = ctypes.pythonapi.PyCapsule_New
 _new.restype = ctypes.py_object
@@ -242,28 +255,43 @@ def _capsule(open_stream: Callable[[ArrowArrayStream], None]) -> Any:
 # --- tables -------------------------------------------------------------------------------
 
 
-class Table:
-    """Rows that can be read again and again, each time in batches and with bounded memory."""
+class Table(Tabular):
+    """Rows that can be read again and again, each time in batches and with bounded memory.
+
+    table["force_N"] is a column as an array, table[10:20] are rows, {column: array}, and
+    table[["t_ns", "force_N"]] columns; len(table) counts the rows by reading them.
+    """
 
     def __init__(self) -> None:
         raise TypeError("a Table comes of a recording: incise.open(path).pairs() and the like")
 
     @classmethod
-    def _of(cls, open_stream: Callable[[ArrowArrayStream], None], about: str) -> "Table":
+    def _of(
+        cls,
+        open_stream: Callable[[ArrowArrayStream], None],
+        about: str,
+        part: Callable[..., "Table"],
+        start_ns: Callable[[], int],
+    ) -> "Table":
+        """part: makes the same table of a part of the recording."""
         table = cls.__new__(cls)
-        table._open = open_stream
-        table._about = about
-        table._schema = None
+        table._open, table._about, table._part = open_stream, about, part
+        table._start_ns = start_ns
+        table._schema = table._rows = None
         return table
 
     def __repr__(self) -> str:
-        return f"<incise.Table {self._about}>"
+        rows = "" if self._rows is None else f"{self._rows} rows of "
+        try:
+            return f"<incise.Table {self._about}: {rows}{', '.join(self.columns)}>"
+        except Error as failure:
+            return f"<incise.Table {self._about}: {failure}>"
 
     def __arrow_c_stream__(self, requested_schema: Any = None) -> Any:
         """A capsule of a new ArrowArrayStream (the Arrow PyCapsule interface)."""
         return _capsule(self._open)
 
-    def _read_schema(self):
+    def _read_schema(self) -> Tuple[List[Field], Dict[str, str]]:
         if self._schema is None:
             self._schema = _Reader(self._open).schema()
         return self._schema
@@ -274,14 +302,73 @@ class Table:
         return self._read_schema()[0]
 
     @property
-    def columns(self) -> List[str]:
+    def columns(self) -> List[str]:  # type: ignore[override]
         """The names of the columns."""
         return [field.name for field in self.fields]
 
     @property
-    def metadata(self) -> Dict[str, str]:
+    def metadata(self) -> Dict[str, str]:  # type: ignore[override]
         """Where the rows come from: sources, date, options, calibration."""
         return dict(self._read_schema()[1])
+
+    def units(self) -> Dict[str, str]:
+        """The unit of each column."""
+        return {field.name: field.unit for field in self.fields}
+
+    def between(self, from_s: float = 0, to_s: Optional[float] = None) -> "Table":
+        """The rows from from_s to before to_s, seconds from the first force sample; None: to the end."""
+        return self._part(between=(from_s, to_s))
+
+    def cut(self, number: int) -> "Table":
+        """The rows of a cut, from 1."""
+        return self._part(cut=number)
+
+    def __len__(self) -> int:
+        if self._rows is None:
+            self._rows = sum(len(batch) for batch in self.batches())
+        return self._rows
+
+    def __bool__(self) -> bool:
+        return True  # a table; none of its rows is read for this
+
+    def __iter__(self) -> Iterator[str]:
+        """The names of the columns, as of {column: array}."""
+        return iter(self.columns)
+
+    @overload
+    def __getitem__(self, key: str) -> "NDArray[Any]": ...
+
+    @overload
+    def __getitem__(self, key: Union[slice, List[str]]) -> Columns: ...
+
+    @overload
+    def __getitem__(self, key: int) -> Dict[str, Any]: ...
+
+    def __getitem__(self, key: Any) -> Any:
+        if isinstance(key, str):
+            return self._collect([key])[key]
+        if isinstance(key, (list, tuple)):
+            return Columns(self._collect(list(key)), self._about, self)
+        if isinstance(key, slice):
+            bounds = (key.start, key.stop, key.step)
+            if any(n is not None and n < 0 for n in bounds):
+                bounds = key.indices(len(self))
+            start, stop, step = bounds
+            if step is not None and step < 0:
+                raise Invalid(errno.EINVAL, "rows are read forwards; give a step above 0")
+            rows = self._collect(self.columns, start or 0, stop)
+            return Columns({name: a[::step] for name, a in rows.items()}, self._about, self)
+        try:
+            at = operator.index(key)
+        except TypeError:
+            raise TypeError(
+                f"{key!r}: a table takes a column's name, a list of names, rows [10:20] or a row"
+            ) from None
+        at += len(self) if at < 0 else 0
+        row = self._collect(self.columns, at, at + 1)
+        if at < 0 or not len(row[self.columns[0]]):
+            raise IndexError(f"row {key}: there are {len(self)} rows")
+        return {name: values[0] for name, values in row.items()}
 
     def batches(self) -> Iterator[Batch]:
         """The rows, some ten thousand at a time; needs no other package."""
@@ -293,47 +380,50 @@ class Table:
             array = reader.next()
         reader.close()
 
+    def _collect(
+        self, names: List[str], start: int = 0, stop: Optional[int] = None
+    ) -> Dict[str, Any]:
+        """Columns as arrays, of the rows from start to before stop."""
+        numpy = package("numpy", "an array")
+        kinds = {**_numpy_of, "b": "?", "u": "O"}
+        forms = {field.name: kinds[field.format] for field in self.fields}
+        for name in names:
+            if name not in forms:
+                raise KeyError(f"no column {name!r}; the columns are: {', '.join(forms)}")
+        parts: Dict[str, List[Any]] = {name: [numpy.empty(0, forms[name])] for name in names}
+        at = 0
+        for batch in self.batches():
+            if stop is not None and at >= stop:
+                break
+            rows = slice(max(start - at, 0), None if stop is None else stop - at)
+            for name in names:
+                parts[name].append(batch.array(name)[rows])
+            at += len(batch)
+        return {name: numpy.concatenate(parts.pop(name)) for name in names}
+
     def numpy(self) -> Dict[str, Any]:
         """All rows as arrays, {column: array}. A missing value is NaN."""
-        import numpy
+        return self._collect(self.columns)
 
-        parts: Dict[str, List[Any]] = {name: [] for name in self.columns}
-        for batch in self.batches():
-            for name, values in batch.numpy().items():
-                parts[name].append(values)
-        kinds = {**_numpy_of, "b": "?", "u": "O"}
-        return {
-            field.name: numpy.concatenate(parts.pop(field.name))
-            if parts[field.name]
-            else numpy.empty(0, kinds[field.format])
-            for field in self.fields
-        }
+    def _head(self) -> Tuple[Dict[str, Any], str]:
+        rows = "first rows" if self._rows is None else f"first of {self._rows} rows"
+        return self[:8], f"{self._about}, {rows}"
 
-    def pandas(self) -> Any:
-        """All rows as a DataFrame; units and provenance are in its ``attrs``."""
-        import pandas
-
-        frame = pandas.DataFrame(self.numpy(), columns=self.columns)
-        frame.attrs["units"] = {field.name: field.unit for field in self.fields}
-        frame.attrs["provenance"] = self.metadata
-        return frame
-
-    def parquet(self, path: Union[str, os.PathLike]) -> None:
+    def parquet(self, path: PathLike, *, overwrite: bool = False) -> None:
         """Write all rows to a Parquet file, with units and provenance, in bounded memory; needs pyarrow.
 
         The file appears when it is complete."""
-        try:
-            import pyarrow.parquet
-        except ImportError:
-            raise ImportError("Parquet needs pyarrow; pip install pyarrow") from None
-        part = os.fspath(path) + ".part"
+        name = os.fsdecode(_library.new_path(path, ".parquet", overwrite))
+        pyarrow = package("pyarrow", "Parquet")
+        parquet = package("pyarrow.parquet", "Parquet")
+        part = name + ".part"
         try:
             reader = pyarrow.RecordBatchReader.from_stream(self)
             batches = iter(reader)
-            with pyarrow.parquet.ParquetWriter(part, reader.schema) as writer:
+            with parquet.ParquetWriter(part, reader.schema) as writer:
                 for group in iter(lambda: list(itertools.islice(batches, 64)), []):
                     writer.write_table(pyarrow.Table.from_batches(group))
-            os.replace(part, path)
+            os.replace(part, name)
         finally:
             if os.path.exists(part):
                 os.remove(part)
