@@ -11,11 +11,12 @@ name ends in _ns. Everything is in the C library; this package calls it by ctype
 import importlib.util
 from typing import TYPE_CHECKING, Any, List
 
-from . import calibrate
+from . import calibrate, mujoco
 from ._arrow import Batch, Field, Table
 from ._capture import capture
 from ._columns import Columns
 from ._haptic import Haptic, read_log
+from ._host import Host, Wrench
 from ._library import VERSION as __version__
 from ._library import Error, Exists, Invalid, NotFound
 from ._model import CompiledModel, Model, TrainReport, TrainStep, Variable, load, train
@@ -38,6 +39,7 @@ __all__ = [
     "Finding",
     "Frame",
     "Haptic",
+    "Host",
     "Info",
     "Invalid",
     "Model",
@@ -54,9 +56,11 @@ __all__ = [
     "Variable",
     "Wall",
     "WallPoint",
+    "Wrench",
     "calibrate",
     "capture",
     "load",
+    "mujoco",
     "open",
     "read_log",
     "train",

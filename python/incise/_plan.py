@@ -211,6 +211,19 @@ def find_scene(scene: PathLike) -> str:
     )
 
 
+def load_scene(
+    scene: PathLike, model: Union[PathLike, Model, CompiledModel, None], arithmetic: Optional[str]
+) -> Tuple[str, Any]:
+    """The path of a scene, and the scene with its model and its arithmetic."""
+    path = find_scene(scene)
+    with contextlib.nullcontext() if model is None else model_file(model) as file:
+        made = call("incise_scene_load", _library.path_bytes(path), file)
+    loaded = _library.Handle(made, "incise_scene_free")
+    if arithmetic is not None:
+        call("incise_scene_set_arithmetic", loaded, arithmetic.encode())
+    return path, loaded
+
+
 def _fill_pose(sample: SampleStruct, t_ns: int, pose: Any) -> None:
     """A pose is (position, quaternion), or a position alone: the scalpel upright."""
     try:
@@ -267,14 +280,7 @@ class Plan:
         tracker_hz: float = 120,
         latency_ms: float = 4.2,
     ):
-        self.path = find_scene(scene)
-        with contextlib.nullcontext() if model is None else model_file(model) as file:
-            path = _library.path_bytes(self.path)
-            self._scene = _library.Handle(
-                call("incise_scene_load", path, file), "incise_scene_free"
-            )
-        if arithmetic is not None:
-            call("incise_scene_set_arithmetic", self._scene, arithmetic.encode())
+        self.path, self._scene = load_scene(scene, model, arithmetic)
         function("incise_scene_set_full")(self._scene, full)
         self.rate_hz: float = function("incise_scene_rate_hz")(self._scene)
         self._period_ns = round(1e9 / self.rate_hz)

@@ -19,11 +19,11 @@ import incise
 from incise import _library
 
 MODULES = (
-    "_arrow _capture _corpus _library _model _plan _recording _verify _wall calibrate"
+    "_arrow _capture _corpus _host _library _model _plan _recording _verify _wall calibrate"
 ).split()
 HEADERS = (
     "arrow camera capture calibrate_depth calibrate_force calibrate_tip calibration corpus dataset "
-    "fixed model origin plan prove recording rig scene stability tracker train uncertainty verify wall"
+    "clock fixed host model origin plan prove recording rig scene stability tracker train uncertainty verify wall"
 ).split()
 
 
