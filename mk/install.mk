@@ -10,8 +10,9 @@ unit_scripts := udev/stepper-setup
 documents := README.md CHANGELOG.md $(O)/doc/options.md \
 	$(filter-out doc/reference.md,$(wildcard doc/*.md doc/*.svg doc/*.png))
 # Sources of examples, not what was built of them.
-example_files := $(addprefix examples/,README.md Makefile own_loop.c slow_host.c tracker_lines.c)
-example_scripts := examples/capture_to_figure.sh examples/learn.py
+example_files := $(addprefix examples/,README.md Makefile own_loop.c slow_host.c tracker_lines.c mujoco/incise_plugin.c \
+	mujoco/scara.xml sofa/neck.py)
+example_scripts := $(addprefix examples/,capture_to_figure.sh learn.py mujoco/robot_cuts_neck.py)
 udev_rules := $(wildcard udev/*.rules)
 sysusers := $(wildcard udev/*.sysusers)
 tmpfiles := $(wildcard udev/*.tmpfiles)
@@ -86,8 +87,8 @@ install: all ## install below $(DESTDIR)$(prefix)
 	$(INSTALL) -m 644 $(examples) "$(DESTDIR)$(datadir)/incise"
 	$(INSTALL) -m 755 $(unit_scripts) "$(DESTDIR)$(datadir)/incise"
 	$(INSTALL) -m 644 $(documents) "$(DESTDIR)$(docdir)"
-	$(INSTALL) -m 644 $(example_files) "$(DESTDIR)$(docdir)/examples"
-	$(INSTALL) -m 755 $(example_scripts) "$(DESTDIR)$(docdir)/examples"
+	for file in $(example_files); do $(INSTALL) -m 644 $$file "$(DESTDIR)$(docdir)/$$file" || exit 1; done
+	for file in $(example_scripts); do $(INSTALL) -m 755 $$file "$(DESTDIR)$(docdir)/$$file" || exit 1; done
 	$(INSTALL) -m 644 tools/incise.bash "$(DESTDIR)$(completiondir)/incise"
 	$(INSTALL) -m 644 $(python_files) "$(DESTDIR)$(pythondir)/incise"
 	$(if $(python_installed),printf '# Written by make install.\nLIBDIR = "%s"\nDATADIR = "%s"\n' \

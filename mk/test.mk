@@ -132,9 +132,9 @@ can-drive: ## the CAN drive of the tests, $(O)/tests/can/drive; see tests/can/RE
 mcap-reader: ## other readers for the tests of MCAP, $(O)/tests/mcap/check and ros2
 	@tests/venv tests/mcap $(O)/tests/mcap 'tests read MCAP with our own reader alone' check:--package ros2
 
-# What reads Arrow streams in place, for the tests of incise for Python.
-python-peers: ## pyarrow, polars, DuckDB, pandas 3 and scikit-learn for the tests of python/
-	@tests/venv tests/python $(O)/tests/python 'tests with pyarrow, polars, DuckDB, pandas 3 and scikit-learn are skipped'
+# What reads Arrow streams in place, and MuJoCo, for the tests of incise for Python.
+python-peers: ## pyarrow, polars, DuckDB, pandas 3, scikit-learn and MuJoCo for the tests of python/
+	@tests/venv tests/python $(O)/tests/python 'tests with pyarrow, polars, DuckDB, pandas 3, scikit-learn and MuJoCo are skipped'
 
 # Programs of others that send and receive streams over a network.
 receiver := $(wildcard /usr/share/doc/openigtlink-examples/examples/Receiver/ReceiveClient.cxx)
@@ -201,7 +201,7 @@ check-python: all $(O)/tests/sql ## tests of incise for Python on libraries unde
 	cd tests/python && INCISE_BUILD=$(abspath $(O)) INCISE_LIBDIR=$(abspath $(O))/check/lib \
 		LD_PRELOAD=$$($(CC) -print-file-name=libasan.so) ASAN_OPTIONS=detect_leaks=0 \
 		PYTHONPATH=../../python PYTHONDONTWRITEBYTECODE=1 \
-		/usr/bin/python3 -m unittest test_recording test_model test_plan test_names
+		/usr/bin/python3 -m unittest test_recording test_model test_plan test_host test_names
 
 # Threads that share memory without a lock, under ThreadSanitizer; what is not of the page
 # comes from the library as it is.

@@ -8,7 +8,8 @@ Lengths are millimetres, forces newtons, times seconds, or nanoseconds of CLOCK_
 name ends in _ns. Everything is in the C library; this package calls it by ctypes.
 """
 
-from . import calibrate
+from . import calibrate, mujoco
+from ._host import Host, Wrench
 from ._library import VERSION as __version__
 from ._library import Error, Invalid, NotFound
 from .arrow import Batch, Field, Table
@@ -26,6 +27,7 @@ __all__ = [
     "Field",
     "Finding",
     "Frame",
+    "Host",
     "Info",
     "Invalid",
     "Model",
@@ -41,9 +43,11 @@ __all__ = [
     "Variable",
     "Wall",
     "WallPoint",
+    "Wrench",
     "calibrate",
     "capture",
     "load",
+    "mujoco",
     "open",
     "train",
     "verify",

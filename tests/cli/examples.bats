@@ -29,10 +29,10 @@ build_examples() {
 }
 
 @test "the examples that are installed are those of the source, and no more" {
-	(cd "$root" && git ls-files examples 2>/dev/null || find examples -type f) | sed 's|.*/||' | sort >there
-	[ "$(wc -l <there)" -ge 5 ]
-	printf '%s\n' * | grep -vx there | sort | diff there -
-	for name in $(cat there); do
+	(cd "$root" && git ls-files examples 2>/dev/null || find examples -type f) | sed 's|^examples/||' | sort >../there
+	[ "$(wc -l <../there)" -ge 5 ]
+	find . -type f | sed 's|^./||' | sort | diff ../there -
+	for name in $(cat ../there); do
 		cmp "$root/examples/$name" "$name"
 		grep -q "$name" README.md || [ "$name" = README.md ]
 	done

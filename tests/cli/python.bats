@@ -29,14 +29,14 @@ python_tests() {
 }
 
 @test "python: models, scenes and calibrations, with Debian's packages" {
-	python_tests /usr/bin/python3 -m unittest -v test_model test_plan test_names
+	python_tests /usr/bin/python3 -m unittest -v test_model test_plan test_host test_names
 }
 
 @test "python: without any package" {
 	# -S leaves out dist-packages, and so numpy
 	run /usr/bin/python3 -S -c 'import numpy'
 	[ "$status" = 1 ]
-	python_tests /usr/bin/python3 -S -m unittest -v test_plan test_recording.Import \
+	python_tests /usr/bin/python3 -S -m unittest -v test_plan test_host test_recording.Import \
 		test_recording.Recordings.test_streams_are_the_blocks \
 		test_recording.Recordings.test_pairs_are_those_of_the_tool \
 		test_model.Models.test_forms_of_inputs test_model.Models.test_wrong_inputs
@@ -45,6 +45,13 @@ python_tests() {
 @test "python: pyarrow, Parquet, polars, DuckDB and pandas 3 read the streams" {
 	[ -x "$peers" ] || skip "pip could not install tests/python/requirements.txt"
 	python_tests "$peers" -m unittest -v test_foreign
+}
+
+# bats test_tags=check
+@test "python: MuJoCo, by attach() and by the plugin" {
+	[ -x "$peers" ] || skip "pip could not install tests/python/requirements.txt"
+	python_tests "$peers" -m unittest -v test_mujoco
+	grep 'us$' <<<"$output" | sed 's/^/# /' >&3
 }
 
 @test "python: scikit-learn's protocol" {

@@ -16,9 +16,9 @@ import tempfile
 
 import incise
 
-MODULES = "_corpus _library arrow calibrate capture model plan recording verify wall".split()
+MODULES = "_corpus _host _library arrow calibrate capture model plan recording verify wall".split()
 HEADERS = (
-    "arrow camera capture calibrate_depth calibrate_force calibrate_tip calibration corpus fixed model plan prove recording "
+    "arrow camera capture calibrate_depth calibrate_force calibrate_tip calibration corpus fixed host model plan prove recording "
     "stability tracker train uncertainty verify wall"
 ).split()
 

@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The cutting force in MuJoCo: on a body, at each mujoco.mj_step().
+
+    tool = incise.mujoco.attach(model, data, body="blade", scene="neck", frame="patient")
+
+MuJoCo has metres and newton metres, incise millimetres and newton millimetres: attach() converts.
+The plugin of examples/mujoco gives the same forces to the bit, without Python.
+"""
+
+from __future__ import annotations
+
+import errno
+import warnings
+from typing import Any, Tuple, Union
+
+from ._host import FADES, Host
+from ._library import Invalid, NotFound
+from .plan import Tick, Vector
+from .recording import PathLike
+
+_attached: Tuple[Attachment, ...] = ()
+_callback_before: Any = None  # the program's own, which runs first
+
+
+def attach(
+    model: Any, data: Any, body: str, scene: Union[PathLike, Host], frame: str = "world"
+) -> Attachment:
+    """Let the tissue of a scene push a body, from the next mj_step() of this data on.
+
+    body: a body, or a site on one; it is the tip of the blade, with the axes of the scene's group
+    "tool". scene: a .scene file, the name of a shipped one, or a Host with settings of its own,
+    whose step_s is the model's timestep; the scene's group "device" has the mass and the damping of
+    the robot. frame: the body or site that the scene lies in; it may move.
+
+    The wrench is in data.xfrc_applied of the body, which is then no longer yours. A time that goes
+    back, as by mj_resetData(), heals the cuts. model and data are kept until detach().
+
+    It is computed in MuJoCo's passive callback, of which a process has one: set one of your own
+    before. While a callback in Python is set, MuJoCo compiles no model ("Python exception raised"):
+    make all of them before. The plugin has neither limit.
+    """
+    try:
+        import mujoco
+    except ImportError:
+        raise ImportError("incise.mujoco needs MuJoCo; pip install mujoco") from None
+    if not isinstance(model, mujoco.MjModel) or not isinstance(data, mujoco.MjData):
+        raise TypeError("attach() takes a mujoco.MjModel and its mujoco.MjData")
+    if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
+        raise Invalid(
+            errno.EINVAL,
+            'integrator="RK4": it tries poses that never are, and a cut stays; take "implicitfast"',
+        )
+    return Attachment(mujoco, model, data, body, scene, frame)
+
+
+class _Place:
+    """Where a body or a site is in the world."""
+
+    def __init__(self, mujoco: Any, model: Any, data: Any, option: str, name: str):
+        import numpy
+
+        kinds = mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_SITE
+        body, site = (mujoco.mj_name2id(model, kind, str(name)) for kind in kinds)
+        if body >= 0:
+            self.position, self.quaternion = data.xpos[body], data.xquat[body]
+            self.body, self._matrix = body, None
+        elif site >= 0:
+            self.position, self.quaternion = data.site_xpos[site], numpy.zeros(4)
+            self.body, self._matrix = int(model.site_bodyid[site]), data.site_xmat[site]
+        else:
+            names = [model.body(i).name for i in range(model.nbody)]
+            names += [model.site(i).name for i in range(model.nsite)]
+            raise NotFound(
+                errno.ENOENT,
+                f"{option}={name!r}: no such body or site; one of: {', '.join(filter(None, names))}",
+            )
+        self._quaternion_of = mujoco.mju_mat2Quat
+
+    def read(self) -> None:
+        """Update the quaternion, which MuJoCo has of bodies only."""
+        if self._matrix is not None:
+            self._quaternion_of(self.quaternion, self._matrix)
+
+
+class Attachment:
+    """A tissue that pushes a body; made by attach()."""
+
+    def __init__(
+        self, mujoco: Any, model: Any, data: Any, body: str, scene: Any, frame: str
+    ) -> None:
+        global _attached, _callback_before
+        import numpy
+
+        self._mujoco, self._data = mujoco, data
+        self._tip = _Place(mujoco, model, data, "body", body)
+        self._frame = _Place(mujoco, model, data, "frame", frame)
+        if any(a._data is data and a._tip.body == self._tip.body for a in _attached):
+            raise Invalid(errno.EBUSY, f"body={body!r}: a tissue pushes it already; detach() that")
+        self.host = scene if isinstance(scene, Host) else Host(scene, step_s=model.opt.timestep)
+        self._centre = data.xipos[self._tip.body]
+        self._force, self._torque = numpy.split(data.xfrc_applied[self._tip.body], 2)
+        self._position = numpy.frombuffer(self.host.pose.position_mm)
+        self._quaternion = numpy.frombuffer(self.host.pose.quaternion)
+        self._push = numpy.frombuffer(self.host.wrench.force_N)
+        self._twist = numpy.frombuffer(self.host.wrench.torque_N_mm)
+        self._from, self._turn = numpy.zeros(3), numpy.zeros(4)
+        self._lever, self._moment = numpy.zeros(3), numpy.zeros(3)
+        self._time = data.time
+        if not _attached:
+            _callback_before = mujoco.get_mjcb_passive()
+            mujoco.set_mjcb_passive(_apply_all)
+        _attached += (self,)
+
+    def __repr__(self) -> str:
+        return f"<incise.mujoco.Attachment of {self.host.path}>"
+
+    @property
+    def force_N(self) -> Vector:
+        """The force on the body, in the frame of the world."""
+        return tuple(self._force.tolist())
+
+    @property
+    def tick(self) -> Tick:
+        """The last tick, in mm and in the frame of the scene."""
+        return self.host.tick
+
+    def detach(self) -> None:
+        """End the force."""
+        global _attached
+        if self not in _attached:
+            return
+        _attached = tuple(a for a in _attached if a is not self)
+        if not _attached:
+            self._mujoco.set_mjcb_passive(_callback_before)
+        self._force[:] = self._torque[:] = 0
+
+    def _apply(self) -> None:
+        mujoco, tip, frame, time = self._mujoco, self._tip, self._frame, self._data.time
+        if time < self._time:
+            self.host.reset()
+        self._time = time
+        tip.read()
+        frame.read()
+        mujoco.mju_negPose(self._from, self._turn, frame.position, frame.quaternion)
+        mujoco.mju_mulPose(
+            self._position, self._quaternion, self._from, self._turn, tip.position, tip.quaternion
+        )
+        self._position *= 1e3
+        fades = self.host.advance(time)
+        if fades:
+            warnings.warn(f"MuJoCo: {FADES[fades]}: the force ramps to 0", stacklevel=2)
+        mujoco.mju_rotVecQuat(self._force, self._push, frame.quaternion)
+        mujoco.mju_rotVecQuat(self._torque, self._twist, frame.quaternion)
+        self._torque *= 1e-3
+        mujoco.mju_sub3(self._lever, tip.position, self._centre)
+        mujoco.mju_cross(self._moment, self._lever, self._force)
+        self._torque += self._moment
+
+
+def _apply_all(model: Any, data: Any) -> None:
+    """MuJoCo's passive callback."""
+    if _callback_before is not None:
+        _callback_before(model, data)
+    for attachment in _attached:
+        if attachment._data is data:
+            attachment._apply()
