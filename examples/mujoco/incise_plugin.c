@@ -70,15 +70,15 @@ static struct place find_place(const mjModel *m, int instance, const char *key,
 	return place;
 }
 
+/* Position and attitude in the world. */
 static const mjtNum *read_place(const mjData *d, const struct place *place,
 				mjtNum quaternion[4])
 {
-	if (place->site < 0) {
-		mju_copy4(quaternion, d->xquat + 4 * place->body);
-		return d->xpos + 3 * place->body;
-	}
-	mju_mat2Quat(quaternion, d->site_xmat + 9 * place->site);
-	return d->site_xpos + 3 * place->site;
+	bool is_site = place->site >= 0;
+
+	mju_mat2Quat(quaternion, is_site ? d->site_xmat + 9 * place->site
+					 : d->xmat + 9 * place->body);
+	return is_site ? d->site_xpos + 3 * place->site : d->xpos + 3 * place->body;
 }
 
 static int count_states(const mjModel *m, int instance)

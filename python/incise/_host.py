@@ -9,7 +9,7 @@ import threading
 from typing import Any, NamedTuple, Optional, Sequence
 
 from . import _library
-from ._library import Failure, Invalid, c_bool, c_char_p, c_double, c_int, c_int64, c_void_p
+from ._library import Failure, Invalid, c_bool, c_double, c_int, c_int64, c_void_p
 from ._library import function
 from .plan import PHASES, TOOLS, StabilityStruct, Tick, TickStruct, Vector, find_scene
 from .recording import PathLike
@@ -39,11 +39,7 @@ class HostPose(ctypes.Structure):
 class HostWrench(ctypes.Structure):
     """struct incise_host_wrench"""
 
-    _fields_ = [
-        ("force_N", c_double * 3),
-        ("torque_N_mm", c_double * 3),
-        ("flags", ctypes.c_uint),
-    ]
+    _fields_ = [("force_N", c_double * 3), ("torque_N_mm", c_double * 3), ("flags", ctypes.c_uint)]
     c_name = "struct incise_host_wrench"
 
 
@@ -60,25 +56,21 @@ class HostInfo(ctypes.Structure):
     c_name = "struct incise_host_info"
 
 
+_options, _pose, _velocity, _wrench, _tick, _info = map(
+    ctypes.POINTER, (HostOptions, HostPose, c_double, HostWrench, TickStruct, HostInfo)
+)
 _library.declare(
     "libincise",
     {
         "incise_clock_new_real": (c_void_p,),
         "incise_clock_free": (None, c_void_p),
-        "incise_host_new": (c_void_p, c_void_p, ctypes.POINTER(HostOptions), c_void_p),
+        "incise_host_new": (c_void_p, c_void_p, _options, c_void_p),
         "incise_host_free": (None, c_void_p),
-        "incise_host_step": (
-            c_int,
-            c_void_p,
-            c_int64,
-            ctypes.POINTER(HostPose),
-            ctypes.POINTER(c_double),
-            ctypes.POINTER(HostWrench),
-        ),
+        "incise_host_step": (c_int, c_void_p, c_int64, _pose, _velocity, _wrench),
         "incise_host_reset": (None, c_void_p),
         "incise_host_set_tool": (c_int, c_void_p, c_int),
-        "incise_host_last": (None, c_void_p, ctypes.POINTER(TickStruct)),
-        "incise_host_info": (None, c_void_p, ctypes.POINTER(HostInfo)),
+        "incise_host_last": (None, c_void_p, _tick),
+        "incise_host_info": (None, c_void_p, _info),
     },
 )
 
@@ -122,35 +114,20 @@ class Host:
         live: bool = False,
     ):
         failure = Failure()
+        made, handle = failure.require, _library.Handle
         self.path = find_scene(scene)
-        self._scene = _library.Handle(
-            failure.require(
-                function("incise_scene_load")(
-                    _library.path_bytes(self.path),
-                    None if model is None else _library.path_bytes(model),
-                    failure.ref,
-                )
-            ),
-            "incise_scene_free",
-        )
+        paths = [name and _library.path_bytes(name) for name in (self.path, model)]
+        loaded = made(function("incise_scene_load")(*paths, failure.ref))
+        self._scene = handle(loaded, "incise_scene_free")
         if arithmetic is not None:
-            failure.check(
-                function("incise_scene_set_arithmetic")(
-                    self._scene, arithmetic.encode(), failure.ref
-                )
-            )
+            set_arithmetic = function("incise_scene_set_arithmetic")
+            failure.check(set_arithmetic(self._scene, arithmetic.encode(), failure.ref))
         options = HostOptions(step_s, velocity, fit_gain, tuple(tip_mm), find_tool(tool))
         if live:
-            self._clock = _library.Handle(
-                failure.require(function("incise_clock_new_real")()), "incise_clock_free"
-            )
+            self._clock = handle(made(function("incise_clock_new_real")()), "incise_clock_free")
             options.clock = self._clock._as_parameter_
-        self._host = _library.Handle(
-            failure.require(
-                function("incise_host_new")(self._scene, ctypes.byref(options), failure.ref)
-            ),
-            "incise_host_free",
-        )
+        host = made(function("incise_host_new")(self._scene, options, failure.ref))
+        self._host = handle(host, "incise_host_free")
         self._step = function("incise_host_step")
         self._use = threading.Lock()
         self.pose, self.wrench = HostPose(), HostWrench()
@@ -176,12 +153,9 @@ class Host:
         """The last tick; all 0 before the first. Its t_ns is not the simulator's time."""
         last = TickStruct()
         function("incise_host_last")(self._host, ctypes.byref(last))
-        values = {name: getattr(last, name) for name in Tick._fields}
-        for name, value in values.items():
-            if isinstance(value, ctypes.Array):
-                values[name] = tuple(value)
-        values.update(phase=PHASES[last.phase], tool=TOOLS[last.tool])
-        return Tick(**values)
+        values = [getattr(last, name) for name in Tick._fields]
+        tick = Tick(*(tuple(v) if isinstance(v, ctypes.Array) else v for v in values))
+        return tick._replace(phase=PHASES[last.phase], tool=TOOLS[last.tool])
 
     def set_tool(self, tool: str) -> None:
         """Say what the hand holds: auto, blade, handle or tube. It changes out of the tissue."""
@@ -197,11 +171,7 @@ class Host:
             raise Invalid(errno.EINVAL, f"t={t!r}: not within 4e9 seconds")
         rc: int = self._step(self._host, round(t * 1e9), self.pose, velocity, self.wrench)
         if rc not in FADES:
-            raise Invalid(
-                -rc,
-                f"t={t!r}: pose {(*self.pose.position_mm, *self.pose.quaternion)}: a number is not "
-                "finite or out of range, or a velocity is missing",
-            )
+            raise Invalid(-rc, f"t={t!r}: the pose is not finite or too far away, or has no velocity")
         return rc
 
     def step(self, t: float, pose: Any, velocity_mm_s: Optional[Sequence[float]] = None) -> Wrench:
@@ -216,16 +186,11 @@ class Host:
                 if velocity is not None:
                     velocity[:] = [*velocity_mm_s]
             except (TypeError, ValueError, IndexError) as failure:
-                raise Invalid(
-                    errno.EINVAL,
-                    "a pose is (x, y, z) in mm, or that and a quaternion (w, x, y, z), and a "
-                    f"velocity (x, y, z) in mm/s: {failure}",
-                ) from None
+                said = "a pose is (x, y, z) in mm, or that and a quaternion (w, x, y, z), a velocity "
+                raise Invalid(errno.EINVAL, f"{said}(x, y, z) in mm/s: {failure}") from None
             fades = FADES[self.advance(t, velocity)]
-            wrench = self.wrench
-            return Wrench(
-                tuple(wrench.force_N), tuple(wrench.torque_N_mm), wrench.flags, fades
-            )
+            found = self.wrench
+            return Wrench(tuple(found.force_N), tuple(found.torque_N_mm), found.flags, fades)
 
 
 def find_tool(tool: str) -> int:

@@ -53,33 +53,18 @@ def attach(
     return Attachment(mujoco, model, data, body, scene, frame)
 
 
-class _Place:
-    """Where a body or a site is in the world."""
-
-    def __init__(self, mujoco: Any, model: Any, data: Any, option: str, name: str):
-        import numpy
-
-        kinds = mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_SITE
-        body, site = (mujoco.mj_name2id(model, kind, str(name)) for kind in kinds)
-        if body >= 0:
-            self.position, self.quaternion = data.xpos[body], data.xquat[body]
-            self.body, self._matrix = body, None
-        elif site >= 0:
-            self.position, self.quaternion = data.site_xpos[site], numpy.zeros(4)
-            self.body, self._matrix = int(model.site_bodyid[site]), data.site_xmat[site]
-        else:
-            names = [model.body(i).name for i in range(model.nbody)]
-            names += [model.site(i).name for i in range(model.nsite)]
-            raise NotFound(
-                errno.ENOENT,
-                f"{option}={name!r}: no such body or site; one of: {', '.join(filter(None, names))}",
-            )
-        self._quaternion_of = mujoco.mju_mat2Quat
-
-    def read(self) -> None:
-        """Update the quaternion, which MuJoCo has of bodies only."""
-        if self._matrix is not None:
-            self._quaternion_of(self.quaternion, self._matrix)
+def _find(model: Any, data: Any, option: str, name: str) -> Tuple[int, Any, Any]:
+    """A body, or that of a site; position and axes of either in the world."""
+    bodies = [model.body(i).name or None for i in range(model.nbody)]
+    sites = [model.site(i).name or None for i in range(model.nsite)]
+    if name in bodies:
+        body = bodies.index(name)
+        return body, data.xpos[body], data.xmat[body]
+    if name in sites:
+        site = sites.index(name)
+        return int(model.site_bodyid[site]), data.site_xpos[site], data.site_xmat[site]
+    names = ", ".join(filter(None, bodies + sites))
+    raise NotFound(errno.ENOENT, f"{option}={name!r}: no such body or site; one of: {names}")
 
 
 class Attachment:
@@ -92,27 +77,23 @@ class Attachment:
         import numpy
 
         self._mujoco, self._data = mujoco, data
-        self._tip = _Place(mujoco, model, data, "body", body)
-        self._frame = _Place(mujoco, model, data, "frame", frame)
-        if any(a._data is data and a._tip.body == self._tip.body for a in _attached):
+        self._body, self._tip, self._tip_axes = _find(model, data, "body", body)
+        _, self._frame, self._frame_axes = _find(model, data, "frame", frame)
+        if any(a._data is data and a._body == self._body for a in _attached):
             raise Invalid(errno.EBUSY, f"body={body!r}: a tissue pushes it already; detach() that")
         self.host = scene if isinstance(scene, Host) else Host(scene, step_s=model.opt.timestep)
-        self._centre = data.xipos[self._tip.body]
-        self._force, self._torque = numpy.split(data.xfrc_applied[self._tip.body], 2)
-        self._position = numpy.frombuffer(self.host.pose.position_mm)
-        self._quaternion = numpy.frombuffer(self.host.pose.quaternion)
-        self._push = numpy.frombuffer(self.host.wrench.force_N)
-        self._twist = numpy.frombuffer(self.host.wrench.torque_N_mm)
-        self._from, self._turn = numpy.zeros(3), numpy.zeros(4)
-        self._lever, self._moment = numpy.zeros(3), numpy.zeros(3)
+        pose, wrench = self.host.pose, self.host.wrench
+        self._pose = numpy.frombuffer(pose.position_mm), numpy.frombuffer(pose.quaternion)
+        self._wrench = numpy.frombuffer(wrench.force_N), numpy.frombuffer(wrench.torque_N_mm)
+        self._centre = data.xipos[self._body]
+        self._force, self._torque = numpy.split(data.xfrc_applied[self._body], 2)
+        self._from, self._lever, self._moment = numpy.zeros((3, 3))
+        self._tip_turn, self._frame_turn, self._turn = numpy.zeros((3, 4))
         self._time = data.time
         if not _attached:
             _callback_before = mujoco.get_mjcb_passive()
             mujoco.set_mjcb_passive(_apply_all)
         _attached += (self,)
-
-    def __repr__(self) -> str:
-        return f"<incise.mujoco.Attachment of {self.host.path}>"
 
     @property
     def force_N(self) -> Vector:
@@ -135,24 +116,23 @@ class Attachment:
         self._force[:] = self._torque[:] = 0
 
     def _apply(self) -> None:
-        mujoco, tip, frame, time = self._mujoco, self._tip, self._frame, self._data.time
-        if time < self._time:
+        mujoco, tip_turn, frame_turn = self._mujoco, self._tip_turn, self._frame_turn
+        position, (force, torque) = self._pose[0], self._wrench
+        if self._data.time < self._time:
             self.host.reset()
-        self._time = time
-        tip.read()
-        frame.read()
-        mujoco.mju_negPose(self._from, self._turn, frame.position, frame.quaternion)
-        mujoco.mju_mulPose(
-            self._position, self._quaternion, self._from, self._turn, tip.position, tip.quaternion
-        )
-        self._position *= 1e3
-        fades = self.host.advance(time)
+        self._time = self._data.time
+        mujoco.mju_mat2Quat(tip_turn, self._tip_axes)
+        mujoco.mju_mat2Quat(frame_turn, self._frame_axes)
+        mujoco.mju_negPose(self._from, self._turn, self._frame, frame_turn)
+        mujoco.mju_mulPose(*self._pose, self._from, self._turn, self._tip, tip_turn)
+        position *= 1e3
+        fades = self.host.advance(self._time)
         if fades:
             warnings.warn(f"MuJoCo: {FADES[fades]}: the force ramps to 0", stacklevel=2)
-        mujoco.mju_rotVecQuat(self._force, self._push, frame.quaternion)
-        mujoco.mju_rotVecQuat(self._torque, self._twist, frame.quaternion)
+        mujoco.mju_rotVecQuat(self._force, force, frame_turn)
+        mujoco.mju_rotVecQuat(self._torque, torque, frame_turn)
         self._torque *= 1e-3
-        mujoco.mju_sub3(self._lever, tip.position, self._centre)
+        mujoco.mju_sub3(self._lever, self._tip, self._centre)
         mujoco.mju_cross(self._moment, self._lever, self._force)
         self._torque += self._moment
 

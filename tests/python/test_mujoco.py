@@ -29,7 +29,7 @@ MOVED = """
   <extension><plugin plugin="incise.tissue"/></extension>
   <option timestep="{step}" integrator="{integrator}"/>
   <worldbody>
-    <body name="bed" pos="0.1 0.2 0.3" quat="0.9 0.1 0.3 -0.2"><site name="patient" pos="0.02 0 0"/></body>
+    <body name="bed" mocap="true" pos="0.1 0.2 0.3" quat="0.9 0.1 0.3 -0.2"><site name="patient" pos="0.02 0 0"/></body>
     <body name="blade"><freejoint/><geom size="0.01" pos="0 0 0.05" mass="0.1"/>
       <site name="tip" pos="0 0.003 -0.01" euler="0 0 0.4"/>{plugin}
     </body>
@@ -114,33 +114,30 @@ class MuJoCo(Case):
         print(f"{STEPS} steps: attach() costs {attached - of_plugin:.1f} us more than the plugin; Host.step() {stepped:.1f} us")
 
     def test_sites_and_frames(self):
-        """A site, and a patient that lies askew: the wrench is turned, and taken to the centre of mass."""
+        """A site, and a patient that moves and lies askew: the wrench is turned, and taken to the centre of mass."""
         model, data = self.model()
         made, of_plugin = self.model(plugin(tip="tip", frame="patient"))
         tissue = self.attach(model, data, body="tip", scene="neck", frame="patient")
-        frame, blade = data.site("patient"), model.body("blade").id
-        most = 0.0
+        patient, tip, blade = data.site("patient"), data.site("tip"), model.body("blade").id
+        position, turn, most = numpy.zeros(3), numpy.zeros(4), 0.0
         for k in range(2000):
-            position, turn = pose_at(k)
-            world, turned, own, tip = numpy.zeros(3), numpy.zeros(4), numpy.zeros(4), numpy.zeros(4)
-            mujoco.mju_mat2Quat(own, frame.xmat)
-            if k == 0:
-                own, origin = numpy.array([1.0, 0, 0, 0]), numpy.zeros(3)
-            else:
-                origin = frame.xpos
-            mujoco.mju_mulPose(world, turned, origin, own, numpy.array(position), numpy.array(turn))
             for m, d in ((model, data), (made, of_plugin)):
-                d.qpos[:7] = *world, *turned
+                d.mocap_pos[0] = 0.1, 0.2 + 0.01 * math.sin(k * 0.002), 0.3
+                mujoco.mj_kinematics(m, d)
+            place, attitude = map(numpy.array, pose_at(k))
+            mujoco.mju_mat2Quat(turn, patient.xmat)
+            mujoco.mju_mulPose(position, turn, patient.xpos, turn.copy(), place + [0, 0, 0.01], attitude)
+            for m, d in ((model, data), (made, of_plugin)):
+                d.qpos[:7] = *position, *turn
                 d.qvel[:] = 0
                 mujoco.mj_step(m, d)
             self.assertEqual(data.xfrc_applied.tobytes(), of_plugin.xfrc_applied.tobytes())
-            force = frame.xmat.reshape(3, 3) @ numpy.array(tissue.host.wrench.force_N)
-            twist = frame.xmat.reshape(3, 3) @ numpy.array(tissue.host.wrench.torque_N_mm) * 1e-3
-            moment = twist + numpy.cross(data.site("tip").xpos - data.xipos[blade], force)
+            wrench, axes = tissue.host.wrench, patient.xmat.reshape(3, 3)
+            force, twist = (axes @ numpy.array(part) for part in (wrench.force_N, wrench.torque_N_mm))
+            moment = 1e-3 * twist + numpy.cross(tip.xpos - data.xipos[blade], force)
             numpy.testing.assert_allclose(data.xfrc_applied[blade], [*force, *moment], atol=1e-12)
             most = max(most, numpy.linalg.norm(force))
         self.assertGreater(most, 0.2)
-        del tip
 
     def test_the_robot_rests(self):
         """The example: at rest under the lean, without swing, by attach() and by the plugin alike."""
