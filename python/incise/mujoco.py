@@ -29,8 +29,8 @@ def attach(
 
     body: a body, or a site on one; it is the tip of the blade, with the axes of the scene's group
     "tool". scene: a .scene file, the name of a shipped one, or a Host with settings of its own,
-    whose step_s is the model's timestep; the scene's group "device" has the mass and the damping of
-    the robot. frame: the body or site that the scene lies in; it may move.
+    whose step_s is the model's timestep. A robot with the mass and the damping of the scene's group
+    "device" comes to rest. frame: the body or site that the scene lies in; it may move.
 
     The wrench is in data.xfrc_applied of the body, which is then no longer yours. A time that goes
     back, as by mj_resetData(), heals the cuts. model and data are kept until detach().

@@ -155,13 +155,34 @@ class MuJoCo(Case):
             '<site name="tip"', plugin(tip="tip", frame="patient") + '<site name="tip"')  # fmt: skip
         made = mujoco.MjModel.from_xml_string(changed)
         data, of_plugin = mujoco.MjData(model), mujoco.MjData(made)
-        self.attach(model, data, body="tip", scene="neck", frame="patient")
+        tissue = self.attach(model, data, body="tip", scene="neck", frame="patient")
         for m, d in ((model, data), (made, of_plugin)):
             d.qpos[:] = -0.66, 1.3, 0, -0.7
             d.ctrl[:] = -0.6, 1.3, -0.7, -1
             mujoco.mj_step(m, d, 1500)
         self.assertGreater(data.xfrc_applied[:, 2].max(), 0.5)
         self.assertEqual(data.qpos.tobytes(), of_plugin.qpos.tobytes())
+
+    def test_the_robot_rests_under_any_lean(self):
+        """The robot has the damping of the scene's device; it falls on the neck, with steps of MuJoCo up to 8 ms."""
+        model = mujoco.MjModel.from_xml_path(os.path.join(EXAMPLE, "scara.xml"))
+        for step in (0.001, 0.002, 0.008):
+            model.opt.timestep = step
+            data = mujoco.MjData(model)
+            tissue = self.attach(model, data, body="tip", scene="neck", frame="patient")
+            for lean in (0.5, 1, 2, 3.5):
+                mujoco.mj_resetData(model, data)
+                data.qpos[:] = -0.66, 1.3, 0, -0.7
+                data.ctrl[:] = -0.66, 1.3, -0.7, -lean
+                mujoco.mj_step(model, data, int(4 / step))
+                before = data.site("tip").xpos.copy()
+                moved = []
+                for _ in range(int(1 / step)):
+                    mujoco.mj_step(model, data)
+                    moved.append(numpy.abs(data.site("tip").xpos - before).max())
+                self.assertLess(max(moved), 1e-6, (step, lean))
+                self.assertAlmostEqual(tissue.force_N[2], lean, places=3)
+            tissue.detach()
 
     def test_episodes(self):
         """After mj_resetData() the cuts are healed, also with a Host of one's own."""
