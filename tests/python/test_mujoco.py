@@ -70,6 +70,17 @@ class MuJoCo(Case):
         model = mujoco.MjModel.from_xml_string(MOVED.format(plugin=made, step=step, integrator=integrator))
         return model, mujoco.MjData(model)
 
+    def robot(self):
+        """The robot of the example, with the plugin."""
+        with open(os.path.join(EXAMPLE, "scara.xml")) as file:
+            text = file.read()
+        for before, added in (
+            ("<worldbody>", '<extension><plugin plugin="incise.tissue"/></extension>'),
+            ('<site name="tip"', plugin(tip="tip", frame="patient")),
+        ):
+            text = text.replace(before, added + before, 1)
+        return mujoco.MjModel.from_xml_string(text)
+
     def attach(self, *arguments, **named):
         attached = incise.mujoco.attach(*arguments, **named)
         self.addCleanup(attached.detach)
@@ -148,12 +159,7 @@ class MuJoCo(Case):
         done = subprocess.run([sys.executable, program, "--scene", "nek"], env=environment, text=True, stderr=subprocess.PIPE)
         self.assertEqual(done.returncode, 1)
         self.assertIn("one of: liver, neck, wall", done.stderr)
-        with open(os.path.join(EXAMPLE, "scara.xml")) as file:
-            text = file.read()
-        model = mujoco.MjModel.from_xml_string(text)
-        changed = text.replace("<worldbody>", '<extension><plugin plugin="incise.tissue"/></extension><worldbody>', 1).replace(
-            '<site name="tip"', plugin(tip="tip", frame="patient") + '<site name="tip"')  # fmt: skip
-        made = mujoco.MjModel.from_xml_string(changed)
+        model, made = mujoco.MjModel.from_xml_path(os.path.join(EXAMPLE, "scara.xml")), self.robot()
         data, of_plugin = mujoco.MjData(model), mujoco.MjData(made)
         tissue = self.attach(model, data, body="tip", scene="neck", frame="patient")
         for m, d in ((model, data), (made, of_plugin)):
@@ -183,6 +189,26 @@ class MuJoCo(Case):
                 self.assertLess(max(moved), 1e-6, (step, lean))
                 self.assertAlmostEqual(tissue.force_N[2], lean, places=3)
             tissue.detach()
+
+    def test_rollouts(self):
+        """The plugin in rollouts of two threads: each as by itself."""
+        from mujoco import rollout
+
+        model, kind = self.robot(), mujoco.mjtState.mjSTATE_FULLPHYSICS
+        data, start = mujoco.MjData(model), numpy.zeros(mujoco.mj_stateSize(model, kind))
+        data.qpos[:] = -0.66, 1.3, 0, -0.7
+        mujoco.mj_getState(model, data, start, kind)
+        controls = numpy.zeros((4, 600, model.nu))
+        controls[:] = -0.66, 1.3, -0.7, 0
+        controls[:, :, 3] = numpy.array([[-0.5], [-1], [-2], [-3]])
+        states, _ = rollout.rollout(model, [mujoco.MjData(model) for _ in range(2)], numpy.tile(start, (4, 1)), controls)
+        for control, state in zip(controls, states):
+            mujoco.mj_setState(model, data, start, kind)
+            for k in range(600):
+                data.ctrl[:] = control[k]
+                mujoco.mj_step(model, data)
+            self.assertGreater(data.xfrc_applied[:, 2].max(), 0.1)
+            self.assertEqual(data.qpos.tobytes(), state[-1, 1 : 1 + model.nq].tobytes())
 
     def test_episodes(self):
         """After mj_resetData() the cuts are healed, also with a Host of one's own."""
