@@ -11,23 +11,24 @@ import argparse
 import math
 import pathlib
 import sys
+from typing import Iterator, Sequence, Tuple
 
 import incise
 
-ARM_M = 0.2  # of either arm
-LEAN_N = 1.0
+ARM_M, LEAN_N = 0.2, 1.0  # of either arm; of the quill
 START_M, CUT_M, CUT_M_S = 0.28, 0.03, 0.01
 LOWER_S, REST_S = 2.0, 1.0
+Row = Tuple[float, float, float, Sequence[float]]
 
 
-def aim(x, y):
+def aim(x: float, y: float) -> Tuple[float, float, float]:
     """Angles of shoulder, elbow and wrist with the quill at a point and the blade along x."""
     elbow = math.acos((x * x + y * y) / (2 * ARM_M**2) - 1)
     shoulder = math.atan2(y, x) - elbow / 2
     return shoulder, elbow, -shoulder - elbow
 
 
-def run(scene):
+def run(scene: str) -> Iterator[Row]:
     """Yield time, way along the neck, depth and force, in s, mm and N, at each step."""
     import mujoco
 
@@ -45,23 +46,22 @@ def run(scene):
     tissue.detach()
 
 
-def draw(rows, file):
+def draw(rows: Sequence[Row], file: str) -> None:
     """Draw depth and force by the time."""
     from matplotlib import pyplot
 
     time, _, depth, force = zip(*rows)
     figure, (above, below) = pyplot.subplots(2, sharex=True)
     above.plot(time, depth)
-    above.set_ylabel("depth (mm)")
+    above.set(ylabel="depth (mm)")
     below.plot(time, force, label=("along", "across", "up"))
-    below.set_ylabel("force on the blade (N)")
-    below.set_xlabel("time (s)")
+    below.set(xlabel="time (s)", ylabel="force on the blade (N)")
     below.legend()
     figure.savefig(file)
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+def main() -> None:
+    parser = argparse.ArgumentParser(description="A robot cuts the neck.")
     parser.add_argument("--scene", default="neck", help="a .scene file or the name of a shipped one")
     parser.add_argument("--figure", help="draw depth and force to this file")
     options = parser.parse_args()

@@ -66,6 +66,13 @@ class Hosts(Case):
         self.assertGreater(force[2], 0.1)
         self.assertAlmostEqual(wrench.torque_N_mm[0], lever[1] * force[2] - lever[2] * force[1], places=6)
 
+    def test_live(self):
+        """By a clock the force fades or not, as the machine goes; it is never more than the scene's."""
+        host = incise.Host("wall", live=True)
+        for k in range(300):
+            wrench = host.step(k * 1e-3, (0, 0, 1 - k * 0.01))
+            self.assertLessEqual(abs(wrench.force_N[2]), 0.33 * 2.01)
+
     def test_errors(self):
         host = incise.Host("wall")
         self.assertIn("wall", repr(host))
