@@ -109,6 +109,7 @@ static bool helps(struct incise_plan *plan, const struct incise_tracker_info *tr
 #define DAMPING_MOST 16 /* times the device's own, or than 1 mN s/mm */
 #define HALVINGS 5
 #define ATTEMPTS 6
+#define HOST_ATTEMPTS 16 /* shorter steps swing in other ways */
 
 /* For a message. */
 static double three_digits(double value, double (*round)(double))
@@ -132,9 +133,10 @@ static double find_advice(struct incise_plan *plan,
 	double (*safe)(double) = damps ? ceil : floor;
 	double from = damps ? least_damping(plan) : plan->gain;
 	double end = from * (damps ? DAMPING_MOST : GAIN_LEAST), factor = damps ? 2 : 0.5;
+	int attempts = plan->hold.ticks > 1 ? HOST_ATTEMPTS : ATTEMPTS;
 
 	advice->damps = damps;
-	for (int i = 0; i < ATTEMPTS; i++) {
+	for (int i = 0; i < attempts; i++) {
 		double good, bad = from;
 		int any = -1;
 
