@@ -162,7 +162,7 @@ replaces_when_told() {
 	replaces_when_told a.csv export d.rec -o a.csv
 	replaces_when_told a.fis train pairs.csv -o a.fis --epochs 2
 	replaces_when_told b.fis.sd train pairs.csv -o b.fis --epochs 2
-	replaces_when_told c0.fis train pairs.csv -o c.fis --epochs 2 -o c0.initial.fis
+	replaces_when_told c0.initial.fis train pairs.csv -o c.fis --epochs 2 -o c0.initial.fis
 	replaces_when_told dh.csv train pairs.csv -o d.fis --epochs 2 -o dh.csv
 	replaces_when_told r.csv replay d.rec wall -o r.csv
 	replaces_when_told l.csv haptic wall --rig $quick --duration 100ms -o l.csv
