@@ -215,14 +215,15 @@ static uint32_t short_of(const struct bench *of)
 	return of->info.pulse_ns > SHORT_NS ? of->info.pulse_ns : SHORT_NS;
 }
 
-static void bare_wires(void)
+static void bare_wires(unsigned int motors)
 {
-	if (!opens(bench, bench_bind_bare(bench, 0, 1)))
+	if (!opens(bench, bench_bind_bare(bench, 0, motors)))
 		return;
 	if (check(short_of(bench) <= INCISE_STEPPER_WAIT_MAX_NS,
 		  "pulses that are waited for are accepted")) {
 		cruise(1, short_of(bench), 0);
-		cruise(1, short_of(bench), INCISE_STEPPER_CONFIG_NO_WAIT);
+		if (motors == 1)
+			cruise(1, short_of(bench), INCISE_STEPPER_CONFIG_NO_WAIT);
 	}
 	closes(1);
 }
@@ -242,7 +243,8 @@ static void several_controllers(void)
 int main(void)
 {
 	idle_rounds_s = spin(CRUISE_NS);
-	bare_wires();
+	bare_wires(1);
+	bare_wires(8);
 	all_wires(1);
 	all_wires(8);
 	several_controllers();
