@@ -38,6 +38,7 @@ struct chip_line {
 	size_t n_held;
 	char path[64];
 	int master;
+	int slave; /* held open: else poll() returns at once, and the thread spins */
 	pthread_t thread;
 	atomic_bool stop;
 };
@@ -174,6 +175,9 @@ static inline int chip_begin(struct chip_line *l)
 	if (l->master < 0 || grantpt(l->master) || unlockpt(l->master) ||
 	    ptsname_r(l->master, l->path, sizeof(l->path)))
 		return -1;
+	l->slave = open(l->path, O_RDWR | O_NOCTTY | O_CLOEXEC);
+	if (l->slave < 0)
+		return -1;
 	return pthread_create(&l->thread, NULL, chip_run, l);
 }
 
@@ -181,6 +185,7 @@ static inline void chip_end(struct chip_line *l)
 {
 	l->stop = true;
 	pthread_join(l->thread, NULL);
+	close(l->slave);
 	close(l->master);
 }
 
