@@ -20,14 +20,15 @@
  * shot, the shortest pulse is p = E + M: below that most edges would be late by more than
  * their own length. The largest rate is
  *
- *                   10⁹
- *   rate = ────────────────────────       n motors: k = 9/4; one: k = 7/4
- *          max(2p + S, kn(S + p))
+ *                     10⁹
+ *   rate = ───────────────────────────       D = 2(C + 2W)
+ *          max(2p + S, 7/4 (S + p))          one motor
+ *          max(2p + S, 2nD)                  n motors
  *
- * with S the shorter of the two costs of a step. First: high and low last p each. Second: n
- * motors share one processor, and their steps, with a pulse that is waited for, shall take four
- * ninths of it at most: with half of it, ticks that coincide with steps put motions off by up to
- * 1/600. Four sevenths where no motor waits for another.
+ * with S the shorter of the two costs of a step. First: high and low last p each. Second: the steps
+ * of one motor, with a pulse that is waited for, shall take four sevenths of the processor at most.
+ * Those of n motors, with two firings, take half of it: beyond that, ticks that coincide with
+ * steps put motions off.
  *
  * Motors that stand cost ticks. With T the median cost of a shot and of what a tick
  * computes, the ticks of n motors shall take a quarter of the processor at most:
@@ -205,9 +206,9 @@ int stepper_ability_measure(struct stepper *stepper)
 	info->step_ns = min_t(u64, 2 * (close + 2 * way), U32_MAX);
 	info->wait_step_ns = min_t(u64, close + way + info->edge_ns, U32_MAX);
 	period = min(info->step_ns, info->wait_step_ns);
-	share = 2 * stepper->n_motors * (period + pulse);
-	period = max(2 * pulse + period,
-		     stepper->n_motors > 1 ? share + (share >> 3) : share - (share >> 3));
+	share = stepper->n_motors > 1 ? 2ULL * stepper->n_motors * info->step_ns
+				      : (period + pulse) * 7 / 4;
+	period = max(2 * pulse + period, share);
 	info->rate_max = clamp(div64_u64(NSEC_PER_SEC, max(period, 1ULL)), 1ULL,
 			       (u64)INCISE_PROFILE_VELOCITY_MAX);
 	info->resolution_ns = hrtimer_resolution;

@@ -101,7 +101,8 @@ static void feed_ramp(void)
  * interrupt in that very moment: 7.3 us were seen. It makes one gap long and the next one short.
  * The number depends on the phase of the kernel's tick against the timer: 0 of
  * 600000 and 170 of 100000 were seen. A tick of 250 Hz comes once in 40 gaps, and makes two of
- * them so at most; none is by so much that it could be taken for another.
+ * them so at most; none is by so much that it could be taken for another. The kernel's trigger
+ * leaves a firing out, and no sample is missing, where a file of the host has the processor longer.
  */
 #define WITHIN_NS 5000
 #define RARE 20
@@ -109,7 +110,7 @@ static void feed_ramp(void)
 static void all_come(const char *trigger, const char *called, int seconds)
 {
 	int many = HZ * seconds;
-	int64_t least = INT64_MAX, most = 0, begin = now_ns(), cpu;
+	int64_t least = INT64_MAX, most = 0, far = 0, begin = now_ns(), cpu;
 	uint64_t missing = 0, clipped = 0;
 	/* each ramp has one code at either end, and the last ramp has begun */
 	uint64_t ends = 2 * (uint64_t)(many / 4096) + (many % 4096 != 0);
@@ -139,7 +140,10 @@ static void all_come(const char *trigger, const char *called, int seconds)
 	}
 	for (int i = 1; i < n; i++) {
 		int64_t gap = samples[i].t_ns - samples[i - 1].t_ns;
+		int64_t off = llabs(gap % PERIOD_NS);
 
+		off = off < PERIOD_NS / 2 ? off : PERIOD_NS - off;
+		far = off > far ? off : far;
 		least = gap < least ? gap : least;
 		most = gap > most ? gap : most;
 		outside += gap < PERIOD_NS - WITHIN_NS || gap > PERIOD_NS + WITHIN_NS;
@@ -166,8 +170,8 @@ static void all_come(const char *trigger, const char *called, int seconds)
 		      "%s: both ends of the range are told as clipped", called);
 		check(!counted("overflows") && !counted("lost") && !counted("skipped"),
 		      "%s: the simulator lost none either", called);
-		check(outside <= (many + RARE - 1) / RARE &&
-			      least > PERIOD_NS - NEVER_NS && most < PERIOD_NS + NEVER_NS,
+		check(outside <= (many + RARE - 1) / RARE && far < NEVER_NS &&
+			      least > PERIOD_NS / 2,
 		      "%s: spacing within 5 us of 100 us, but for %d", called, outside);
 	}
 	force->ops->close(force);
