@@ -130,7 +130,8 @@ rig() { # DRIVER, KEY...
 		stepper = "mine:";
 		actuator = { spring_N_mm = 2.0; travel_mm = 4.0; lead_mm = 8.0;
 			driver = "$1"; $2
-			tmc = { sense_ohm = 0.11; run_A = 0.6; hold_A = 0.3; stall_mm_s = 2; stall_threshold = 60; }; };
+			tmc = { sense_ohm = 0.11; run_A = 0.6; hold_A = 0.3; stall_mm_s = 2; stall_threshold = 60;
+				answer_ms = 10000; }; };
 	END
 }
 

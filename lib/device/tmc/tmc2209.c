@@ -44,8 +44,6 @@ static uint8_t crc8(const uint8_t *bytes, int n)
 	return crc;
 }
 
-int64_t tmc2209_answer_ns = 50000000; /* 12 bytes at 115200 bit/s take 1 ms */
-
 static int send_datagram(const struct tmc_driver *d, uint8_t *bytes, int n)
 {
 	bytes[n - 1] = crc8(bytes, n - 1);
@@ -66,10 +64,11 @@ static bool parse_answer(const uint8_t *a, uint8_t reg, uint32_t *value)
 
 static int receive_answer(const struct tmc_driver *d, uint8_t reg, uint32_t *value)
 {
-	int64_t end_ns = incise_monotonic_ns() + tmc2209_answer_ns, left_ns;
+	int64_t end_ns = incise_monotonic_ns(), left_ns;
 	struct pollfd wait = {.fd = d->line->fd, .events = POLLIN};
 	uint8_t bytes[64];
 
+	end_ns += (int64_t)(d->actuator.tmc.answer_s * INCISE_NS_PER_S);
 	for (size_t n = 0; n < sizeof(bytes); n++) {
 		left_ns = end_ns - incise_monotonic_ns();
 		if (poll(&wait, 1, left_ns > 0 ? (int)(left_ns / 1000000) : 0) <= 0)

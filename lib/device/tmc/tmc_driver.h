@@ -92,7 +92,4 @@ uint32_t tmc_currents(const struct tmc_driver *d, double most_A);
 uint32_t tmc_microsteps(const struct tmc_driver *d);
 uint32_t tmc_step_clocks(const struct tmc_driver *d, double mm_s);
 
-/* The wait for an answer, ns: a test on a busy machine has patience. */
-extern int64_t tmc2209_answer_ns;
-
 #endif

@@ -29,6 +29,9 @@ const struct incise_setting incise_actuator_tmc_settings[] = {
 	SETTING_TRUTH(stall_home, tmc.stall_home, "false",
 		      "true if the output DIAG is wired to the home input: a stall is "
 		      "the edge and no fault"),
+	SETTING_NUMBER(
+		answer_ms, tmc.answer_s, "ms", 5, 10000, "50",
+		"longest time for an answer of a TMC2209; on the line it takes 1 ms"),
 	{0},
 };
 

@@ -272,6 +272,7 @@ struct incise_actuator_tmc {
 	double stall_mm_s;	 /**< StallGuard from it on; 0: never */
 	int stall_threshold;
 	bool stall_home; /**< a stall is the edge of the home input, and no fault */
+	double answer_s; /**< longest time for the answer of a TMC2209 */
 };
 
 /** The group `actuator` of rig.conf. */

@@ -44,7 +44,7 @@ static const char everything[] =
 	"	encoder = \"counter0/count0\"; encoder_counts_per_mm = -500; driver = \"tmc2209:/dev/serial0:1\"; tmc = { sense_ohm = 0.1; run_A = 0.8;\n"
 	"		hold_A = 0.2; interpolate = false; stealthchop = false;\n"
 	"		stealthchop_mm_s = 5; stall_mm_s = 0.5; stall_threshold = 60;\n"
-	"		stall_home = true; }; },\n"
+	"		stall_home = true; answer_ms = 60; }; },\n"
 	"	{ spring_N_mm = 1; travel_mm = 10; lead_mm = 2; direction = [0, 1, 0]; } );\n";
 
 struct keys {

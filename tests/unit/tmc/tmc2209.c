@@ -19,7 +19,6 @@ static int begin(void **state)
 {
 	(void)state;
 	memset(&line, 0, sizeof(line));
-	tmc2209_answer_ns = 500000000;
 	return chip_begin(&line);
 }
 
@@ -46,7 +45,8 @@ static struct incise_actuator asked(int node)
 			.stealthchop = true,
 			.stealthchop_mm_s = 3.75,
 			.stall_mm_s = 2,
-			.stall_threshold = 75},
+			.stall_threshold = 75,
+			.answer_s = 0.5},
 	};
 
 	snprintf(a.driver, sizeof(a.driver), "tmc2209:%s:%d", line.path, node);
