@@ -27,8 +27,8 @@
  *
  * with S the shorter of the two costs of a step. First: high and low last p each. Second: the steps
  * of one motor, with a pulse that is waited for, shall take four sevenths of the processor at most.
- * Those of n motors, with two firings, take half of it: beyond that, ticks that coincide with
- * steps put motions off.
+ * The steps of n motors, with two firings, take half of it: beyond that, ticks that coincide
+ * with steps put motions off.
  *
  * Motors that stand cost ticks. With T the median cost of a shot and of what a tick
  * computes, the ticks of n motors shall take a quarter of the processor at most:

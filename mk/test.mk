@@ -132,7 +132,7 @@ can-drive: ## the CAN drive of the tests, $(O)/tests/can/drive; see tests/can/RE
 mcap-reader: ## other readers for the tests of MCAP, $(O)/tests/mcap/check and ros2
 	@tests/venv tests/mcap $(O)/tests/mcap 'tests read MCAP with our own reader alone' check:--package ros2
 
-# What reads Arrow streams in place, and MuJoCo, for the tests of incise for Python.
+# Readers of Arrow streams in place, and MuJoCo, for the tests of incise for Python.
 python-peers: ## pyarrow, polars, DuckDB, pandas 3, xarray, scikit-learn, MuJoCo and mypy for the tests of python/
 	@tests/venv tests/python $(O)/tests/python 'tests with pyarrow, polars, DuckDB, pandas 3, xarray, scikit-learn, MuJoCo and mypy are skipped'
 

@@ -82,7 +82,7 @@ static inline bool apart_cuts_alike(struct incise_plan *const plan[2],
 		       apart_find_place(plan[1], other->growing, b);
 }
 
-/* What fades to nothing a tick later returns a tick later. */
+/* A force that fades to nothing a tick later returns a tick later. */
 static inline bool apart_ramps_alike(struct incise_plan *const plan[2])
 {
 	return fabs(plan[0]->doubles.state.gain -

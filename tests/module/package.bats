@@ -56,7 +56,7 @@ tree() {
 	source=$dest/usr/src
 	[ ! -e "$source/incise-$version/driver/sim" ]
 	mkdir -p tree "lib/modules/$release"
-	# What depmod looks for in a kernel's folder.
+	# depmod looks for these files in a kernel's folder.
 	touch "lib/modules/$release"/modules.{order,builtin}
 	dkms() {
 		command dkms "$@" -m incise -v "$version" --dkmstree "$PWD/tree" \

@@ -2,14 +2,15 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Send changed datagrams of RTPS to the only participant of DDS on 127.0.0.1.
 
-    attack.py DOMAIN CASES SEED
+    attack.py DOMAIN CASES SEED PID
 
 Takes the server's prefix from what it sends to look for others, and puts it where the kept datagrams
 (datagrams.txt) name their receiver. Each datagram has up to eight changes, in three of four cases behind the
-head; the same ones for each SEED. The next ones wait until the server has taken those before. Prints
+head; the same ones for each SEED. The next ones wait until the server, process PID, has taken those before. Prints
 JSON: how many were sent, and how many the kernel dropped.
 """
 import json
+import os
 import random
 import socket
 import sys
@@ -23,7 +24,7 @@ EXTREMES = [b"\0" * 4, b"\xff" * 4, b"\xff\xff\xff\x7f", b"\0\0\0\x80", b"\1\0\0
 
 
 def submessages(datagram):
-    """Where each begins."""
+    """Offsets of their begins."""
     at, found = HEAD, []
     while at + 4 <= len(datagram):
         found.append(at)
@@ -66,6 +67,7 @@ def server_prefix(base):
     """From the datagram by which it looks for the second participant."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
         receiver.bind(("127.0.0.1", base + 12))
+        receiver.settimeout(120)
         return receiver.recv(65536)[8:20]
 
 
@@ -80,7 +82,7 @@ def waiting(ports):
     return size, dropped
 
 
-def main(domain, cases, seed):
+def main(domain, cases, seed, server):
     base = PORTS + 250 * int(domain)
     ports = (base + 10, base + 11)
     prefix = server_prefix(base)
@@ -94,6 +96,7 @@ def main(domain, cases, seed):
             port = draw.randrange(2)
             sender.sendto(changed(draw, kept[port]), ("127.0.0.1", ports[port]))
             while i % 20 == 0 and waiting(ports)[0]:
+                os.kill(int(server), 0)
                 time.sleep(0.0005)
     json.dump({"sent": int(cases), "dropped": waiting(ports)[1]}, sys.stdout)
 

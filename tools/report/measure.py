@@ -154,36 +154,39 @@ def remove(path):
             os.unlink(path)
 
 
-def make_report(job, unfinished):
-    for part in ("data", "plots"):
-        os.makedirs(os.path.join(unfinished, part))
-    report = measure_all(job, unfinished)
-    if report and "old" in job:
-        report["against"] = compare_with(job["against"], job["old"], report)
-    if report:
-        with open(os.path.join(unfinished, "report.json"), "w", encoding="utf-8") as file:
-            json.dump(report, file, indent=1, ensure_ascii=False)
-            file.write("\n")
-        pages.bench(unfinished)
+def begin_report(job, unfinished):
+    """The measurements in a folder, or nothing."""
+    report = None
+    try:
+        for part in ("data", "plots"):
+            os.makedirs(os.path.join(unfinished, part))
+        report = measure_all(job, unfinished)
+    finally:
+        if not report:
+            remove(unfinished)
+            if job["made"]:
+                os.rmdir(job["folder"])
+    if not report:
+        fail(f"{signal.strsignal(stopped[0])}: {job['folder']} is unchanged")
     return report
 
 
 def make(job):
-    """A new report is made within the folder, hidden, and takes the old one's place when it is whole."""
+    """A new report is made within the folder, hidden, and takes the old one's place when it is whole. If it cannot,
+    the measurements stay there."""
     folder, unfinished = job["folder"], os.path.join(job["folder"], ".unfinished")
     remove(unfinished)
-    report = None
-    try:
-        report = make_report(job, unfinished)
-        for part in ("data", "plots", "report.json", "report.html", "report.md") if report else ():
-            remove(os.path.join(folder, part))
-            os.rename(os.path.join(unfinished, part), os.path.join(folder, part))
-    finally:
-        remove(unfinished)
-        if not report and job["made"]:
-            os.rmdir(folder)
-    if not report:
-        fail(f"{signal.strsignal(stopped[0])}: {folder} is unchanged")
+    report = begin_report(job, unfinished)
+    if "old" in job:
+        report["against"] = compare_with(job["against"], job["old"], report)
+    with open(os.path.join(unfinished, "report.json"), "w", encoding="utf-8") as file:
+        json.dump(report, file, indent=1, ensure_ascii=False)
+        file.write("\n")
+    pages.bench(unfinished)
+    for part in ("data", "plots", "report.json", "report.html", "report.md"):
+        remove(os.path.join(folder, part))
+        os.rename(os.path.join(unfinished, part), os.path.join(folder, part))
+    os.rmdir(unfinished)
 
 
 def print_report(job, report):

@@ -115,6 +115,8 @@ static dds_entity_t make_domain(uint32_t number, const char *interface)
 	bool lo = !strcmp(interface, "lo");
 	char config[600];
 
+	if (strlen(interface) > 60 || strpbrk(interface, "<&\""))
+		return DDS_RETCODE_BAD_PARAMETER;
 	snprintf(
 		config, sizeof(config),
 		"<CycloneDDS><Domain><General><Interfaces><NetworkInterface name=\"%.60s\"/>"
@@ -166,7 +168,8 @@ static dds_entity_t make_topic(const struct incise_outlet_setup *setup,
 		.m_meta = "",
 	};
 
-	snprintf(name, sizeof(name), "rt/%s", setup->name);
+	if (snprintf(name, sizeof(name), "rt/%s", setup->name) >= (int)sizeof(name))
+		return DDS_RETCODE_BAD_PARAMETER;
 	snprintf(message, sizeof(message), "%.*s::msg::dds_::%s_",
 		 (int)strcspn(type->name, "/"), type->name, strrchr(type->name, '/') + 1);
 	return dds_create_topic(ros2.participant, &described, name, NULL, NULL);

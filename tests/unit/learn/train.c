@@ -335,7 +335,7 @@ TEST(test_a_weight_counts_pairs)
 	incise_model_free(repeated);
 }
 
-/* Of two outputs at the same places the heavy one is learnt, by the average and by one ridge. */
+/* The heavy one of two outputs at the same places is learnt, by the average and by one ridge. */
 TEST(test_light_pairs_hardly_count)
 {
 	double rows[WEIGHED * 3], weights[WEIGHED];

@@ -234,7 +234,7 @@ static void leaves_out_what_lacks(const struct lack *lack, const struct surface 
 	incise_scene_free(scene);
 }
 
-/* Of the surfaces and evaluators each lack has one. */
+/* Each lack has one of the surfaces and evaluators. */
 TEST(test_each_lack_leaves_out_its_stage)
 {
 	for (int i = 0; i < LACKS; i++) {
