@@ -100,7 +100,7 @@ words_of(s) = strstrt(s, '_') ? s[:strstrt(s, '_') - 1].' '.words_of(s[strstrt(s
 # Names next to points, of which none covers another, a marker or an error bar. A script fixes the
 # ranges and the plot's margins with `eval name_margins`, adds each point with name_point(), and
 # places all with `eval name_points`: each name tries distances and directions around its point.
-name_left = 90.0; name_right = 20.0; name_top = 3.4 * line_px + 14; name_bottom = below(1) # px
+name_left = 90.0; name_right = 30.0; name_top = 3.4 * line_px + 14; name_bottom = below(1) # px
 name_margins = 'set lmargin at screen name_left / figure_width; set rmargin at screen 1 - name_right / figure_width; \
 	set bmargin at screen name_bottom / figure_height; set tmargin at screen 1 - name_top / figure_height; \
 	name_width = figure_width - name_left - name_right; name_height = figure_height - name_top - name_bottom; \
