@@ -52,7 +52,6 @@ readme_code() {
 	python_tests "$peers" -m unittest -v test_foreign
 }
 
-# bats test_tags=check
 @test "python: MuJoCo, by attach() and by the plugin" {
 	[ -x "$peers" ] || skip "pip could not install tests/python/requirements.txt"
 	python_tests "$peers" -m unittest -v test_mujoco

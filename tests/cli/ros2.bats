@@ -37,7 +37,6 @@ in_network() {
 	[ "$status" = 0 ] || complain "$output"
 }
 
-# bats test_tags=check
 @test "topics of ROS 2: the values and times of a recording, read by Cyclone DDS for Python" {
 	has_python
 	export CYCLONEDDS_URI=$alone_uri
@@ -93,7 +92,6 @@ in_network() {
 	END
 }
 
-# bats test_tags=check
 @test "topics of ROS 2: Fast DDS reads the command of a loop, in CDR, in the domain of ROS_DOMAIN_ID" {
 	[ -x "$peers/fastdds_read" ] || skip "libfastrtps-dev is not installed"
 	cp "$root"/scenes/* .
@@ -140,7 +138,6 @@ in_network() {
 }
 
 # CASES=100000 for all of it; a build with O=build/check under sanitizers. The seeds differ by their cases.
-# bats test_tags=check
 @test "topics of ROS 2: damaged datagrams end nothing, and memory is bounded" {
 	has_python
 	export peers root cases=${CASES:-2000}
