@@ -24,7 +24,7 @@
 #include "drawn.h"
 
 #define HOSTED 1000
-#define HOSTED_FEW 20
+#define HOSTED_FEW 4
 #define SCENES 500
 #define SCENES_FEW 20
 #define LEANS 6
