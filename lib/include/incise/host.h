@@ -44,8 +44,10 @@ struct incise_host;
 /** Settings of a host. All 0: a host at the scene's rate, without velocities, on its own clock. */
 struct incise_host_options {
 	/**
-	 * Largest step of the host, s, up to 512 ticks; 0: a tick. A step that is no multiple of the tick counts as a tick longer,
-	 * as the last tick before it may be so old.
+	 * Largest step of the host, s, up to 512 ticks; 0: a tick. A multiple of the tick, or a
+	 * whole part of it, counts as the step of a host that always steps by just that; a host
+	 * that also makes shorter steps adds a thousandth of a tick. Any other step counts as up
+	 * to a tick longer, as the last tick before it may be so old.
 	 */
 	double host_period_s;
 	bool gives_velocity; /**< each step has a velocity; false: velocities are not read */

@@ -24,7 +24,7 @@ static const char hill[] =
 	"effects = { average_ticks = 8; };"
 	"tissue = { plane_N_mm = 0.1; insertion_N_mm = 0.05; spread_N_mm = 0.05; };";
 
-/* Of the test that runs. */
+/* The test that runs has these. */
 static struct fed_folder folder;
 static struct incise_scene *scene;
 static struct incise_host *host;
@@ -181,7 +181,7 @@ static int press(int64_t *t_ns, int steps, int64_t step_ns)
 	return rc;
 }
 
-/* Of the flat scene, at that depth. */
+/* The flat scene's force at that depth. */
 #define PRESSED_N 0.4
 
 TEST(test_a_late_step_lets_go)
@@ -211,6 +211,33 @@ TEST(test_a_late_step_lets_go)
 	assert_int_equal(press(&t_ns, 200, 10 * TICK_NS), 0);
 	assert_float_equal(wrench.force_N[2], PRESSED_N, 1e-3);
 	end();
+}
+
+/* Steps up to the largest are never late, wherever the ticks fall between them. */
+static void press_in_steps(double period_s, const int64_t step_ns[2], int hold_ticks,
+			   int steps)
+{
+	const struct incise_host_options options = {.host_period_s = period_s};
+	struct incise_host_info info;
+	int64_t t_ns = 0;
+
+	start(flat, &options);
+	incise_host_info(host, &info);
+	assert_int_equal(info.hold_ticks, hold_ticks);
+	for (int k = 0; k < steps; k++)
+		assert_int_equal(press(&t_ns, 1, step_ns[k % 2]), 0);
+	assert_float_equal(wrench.force_N[2], PRESSED_N, 1e-3);
+	end();
+}
+
+TEST(test_no_step_up_to_the_largest_is_late)
+{
+	press_in_steps(0.0005, (int64_t[]){500000, 500000}, 1, 3000);
+	press_in_steps(0.0007, (int64_t[]){700000, 700000}, 2, 3000);
+	press_in_steps(0.010, (int64_t[]){9500000, 10000000}, 10, 300);
+	press_in_steps(0.010001, (int64_t[]){9500000, 10000000}, 11, 300);
+	/* This host drifts through a whole tick. */
+	press_in_steps(0.0040008, (int64_t[]){4000800, 4000800}, 5, 3000);
 }
 
 TEST(test_time_back_lets_go)
