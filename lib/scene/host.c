@@ -17,6 +17,7 @@
 #define BEGIN_NS (2 * INCISE_NS_PER_S)
 #define TIME_MOST_NS INT64_C(4000000000000000000)
 #define SPEED_MOST_MM_S 1e6
+#define PLACE_MOST_MM 1e4 /* the predictor passes over others */
 
 /* A host that adds up its steps in double is off by less than this share of a tick. */
 #define SNAP 0.01
@@ -191,9 +192,12 @@ static bool is_pose(const struct incise_host_pose *pose)
 {
 	double size2 = 0;
 
+	for (int i = 0; i < 3; i++)
+		if (!(fabs(pose->position_mm[i]) < PLACE_MOST_MM))
+			return false;
 	for (int i = 0; i < 4; i++)
 		size2 += pose->quaternion[i] * pose->quaternion[i];
-	return v3_finite(pose->position_mm) && size2 > 0.9 * 0.9 && size2 < 1.1 * 1.1;
+	return size2 > 0.9 * 0.9 && size2 < 1.1 * 1.1;
 }
 
 static bool is_speed(const double mm_s[3])

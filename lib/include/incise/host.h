@@ -64,9 +64,9 @@ struct incise_host_options {
 
 /** A pose of the tool in the frame of the scene. */
 struct incise_host_pose {
-	double position_mm[3];
-	double quaternion
-		[4]; /**< w first, of any length above 0; from the tool's to the scene's frame */
+	double position_mm[3]; /**< each within ±1e4, not at it */
+	/** w first, from the tool's to the scene's frame; its length is between 0.9 and 1.1 */
+	double quaternion[4];
 };
 
 /** A wrench on the tool, in the frame of the scene. */

@@ -357,6 +357,8 @@ TEST(test_a_refused_step_is_not_made)
 {
 	struct incise_host_pose pose = {.position_mm = {NAN}, .quaternion = {1}};
 	struct incise_host_pose turned = {.quaternion = {0}};
+	struct incise_host_pose far = {.position_mm = {0, 0, -2}, .quaternion = {1}};
+	struct incise_host_pose longer = {.quaternion = {1.2}};
 	struct incise_tick before, after;
 	int64_t t_ns = 0;
 
@@ -366,6 +368,13 @@ TEST(test_a_refused_step_is_not_made)
 	assert_int_equal(incise_host_step(host, t_ns, &pose, NULL, &wrench), -EINVAL);
 	assert_true(size(wrench.force_N) == 0 && size(wrench.torque_N_mm) == 0);
 	assert_int_equal(incise_host_step(host, t_ns, &turned, NULL, &wrench), -EINVAL);
+	assert_int_equal(incise_host_step(host, t_ns, &longer, NULL, &wrench), -EINVAL);
+	for (int i = 0; i < 6; i++) {
+		far.position_mm[i % 3] = i < 3 ? 1e4 : -1e300;
+		assert_int_equal(incise_host_step(host, t_ns, &far, NULL, &wrench),
+				 -EINVAL);
+		far.position_mm[i % 3] = 0;
+	}
 	assert_int_equal(incise_host_step(host, t_ns, NULL, NULL, &wrench), -EINVAL);
 	incise_host_last(host, &after);
 	assert_memory_equal(&before, &after, sizeof(before));
