@@ -734,6 +734,7 @@ static void note_rest(const struct search *s, const struct rest_run *run,
 		.force_N = {lean_N[0], lean_N[1], lean_N[2]},
 		.swing_N = moved_of(s, last->N),
 		.way = way,
+		.hold_ticks = s->plan.hold.ticks,
 		.weakest = before.weakest,
 	};
 }

@@ -90,9 +90,10 @@ struct incise_host_info {
  *
  * @param scene   must outlive the host
  * @param options or NULL: all 0
- * @return host, to be freed with incise_host_free(); NULL with errno EINVAL (options out of range), EDOM (the scene
- *         swings at this step: the error names the largest safe tissue.gain, and with fit_gain there is none), or of
- *         incise_plan_new_fed(). Takes up to some seconds.
+ * @return host, to be freed with incise_host_free(); NULL with errno EINVAL (options out of
+ *         range), EDOM (the scene swings at this step: the error names the largest safe
+ *         tissue.gain, and with fit_gain there is none; or host_period_s is more than
+ *         limits.pose_age_ms allows), or of incise_plan_new_fed(). Takes up to some seconds.
  */
 INCISE_API struct incise_host *incise_host_new(const struct incise_scene *scene,
 					       const struct incise_host_options *options,

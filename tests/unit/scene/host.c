@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * A plan in the loop of a simulator: equal to the plan itself at its rate, safe with any input, and at rest at the
- * steps of slow hosts, which an independent loop shows.
+ * A plan in the loop of a simulator: equal to the plan itself at its rate, safe with any input,
+ * and at rest at the steps of slow hosts, which an independent loop shows.
  */
 #include "../unit.h"
 #include <pthread.h>
@@ -478,7 +478,7 @@ TEST(test_options_are_checked)
 	/* Poses of such steps are always too old. */
 	options = (struct incise_host_options){.host_period_s = 0.06};
 	assert_error(incise_host_new(scene, &options, &err), EDOM, &err, folder.scene,
-		     "limits.pose_age_ms");
+		     "limits.pose_age_ms: a host's poses", "host_period_s");
 	incise_host_free(NULL);
 	end();
 }
