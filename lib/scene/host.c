@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * A plan in the loop of a simulator; see incise/host.h. The plan's time starts late enough that none is negative,
- * and its ticks follow each other without a gap; the host's time is shifted to it.
+ * A plan in the loop of a simulator; see incise/host.h. The plan's time starts late enough that
+ * none is negative, and its ticks follow each other without a gap; the host's time is shifted
+ * to it.
  *
  *   plan's ticks  ┼───┼───┼───┼───┼───┼───┼───┼───┼     tick_ns apart
  *   host's steps      ●─────────────●────────────●      from_ns earlier
@@ -22,7 +23,7 @@
 /* A host that adds up its steps in double is off by less than this share of a tick. */
 #define SNAP 0.01
 
-/* A ratio of step and tick is whole to this share: then they stay together for millions of steps. */
+/* A ratio of step and tick that is whole to this share: they stay together for very long. */
 #define DRIFT 1e-9
 
 /* The check of stability takes longer with more ticks in a step. */
