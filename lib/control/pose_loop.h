@@ -27,8 +27,9 @@
  * faster than the loop. Beyond 64 ticks in a P, or 16 P in a tick or 32 in the latency, tick or P are made longer
  * too.
  *
- * In the loop of a host (incise/host.h) a period is its step: a pose, the ticks since the last one with poses between,
- * and the last force, held for the step. Its states are the last pose, and its velocity, in place of those on their way.
+ * In the loop of a host (incise/host.h) a period is its step: a pose, the ticks since the last
+ * one with poses between, and the last force, held for the step. Its states are the last pose,
+ * and its velocity, in place of those on their way.
  *
  * N, mm, s.
  */

@@ -239,6 +239,14 @@ static int check_age(const struct incise_plan *plan,
 
 	if (plan->scene->limits.pose_age_ms >= least_ms)
 		return 0;
+	if (plan->hold.ticks > 1)
+		return incise_error_set(
+			err, EDOM,
+			"%s: limits.pose_age_ms: a host's poses are up to %.4g ms old "
+			"with this host_period_s, and after %g ms there is no force; "
+			"set it to %.1f or more, or host_period_s to less",
+			plan->scene->path, least_ms, plan->scene->limits.pose_age_ms,
+			ceil(least_ms * 10) / 10);
 	return incise_error_set(
 		err, EDOM,
 		"%s: limits.pose_age_ms: poses of a tracker of %g Hz with a latency of "

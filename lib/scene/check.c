@@ -237,7 +237,7 @@ int incise_plan_check_rest(struct incise_plan *plan,
 	name_run(rest, run);
 	if (plan->hold.ticks > 1)
 		snprintf(delay, sizeof(delay), "a host that steps once in %.4g ms",
-			 plan->hold.ticks * s->device.period_s * 1e3);
+			 rest->hold_ticks * s->device.period_s * 1e3);
 	else if (s->own_delay)
 		snprintf(delay, sizeof(delay), "a delay of %d ticks",
 			 s->device.delay_ticks);

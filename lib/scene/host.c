@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * A plan in the loop of a simulator; see incise/host.h. The plan's time starts late enough that none is negative,
- * and its ticks follow each other without a gap; the host's time is shifted to it.
+ * A plan in the loop of a simulator; see incise/host.h. The plan's time starts late enough that
+ * none is negative, and its ticks follow each other without a gap; the host's time is shifted
+ * to it.
  *
  *   plan's ticks  ┼───┼───┼───┼───┼───┼───┼───┼───┼     tick_ns apart
  *   host's steps      ●─────────────●────────────●      from_ns earlier
@@ -17,9 +18,13 @@
 #define BEGIN_NS (2 * INCISE_NS_PER_S)
 #define TIME_MOST_NS INT64_C(4000000000000000000)
 #define SPEED_MOST_MM_S 1e6
+#define PLACE_MOST_MM 1e4 /* the predictor passes over others */
 
 /* A host that adds up its steps in double is off by less than this share of a tick. */
 #define SNAP 0.01
+
+/* A ratio of step and tick that is whole to this share: they stay together for very long. */
+#define DRIFT 1e-9
 
 /* The check of stability takes longer with more ticks in a step. */
 #define HOLD_MOST 512
@@ -44,6 +49,7 @@ struct incise_host {
 	int n_parts;
 	struct incise_host_options options;
 	double tick_ns;
+	double late_ns; /* a longer step was not checked */
 	/* From here on a reset sets all to 0. */
 	struct host_state {
 		bool started, fading;
@@ -87,12 +93,19 @@ static bool keep_plan(struct incise_host *host)
 	       keep_part(host, plan->integers, sizeof(*plan->integers));
 }
 
-/* Steps of the host in ticks; see incise_host_options. */
+/*
+ * The longest hold of a force in ticks; see incise_host_options. Steps and ticks that are not
+ * multiples of each other drift apart.
+ */
 static int count_hold(double host_period_s, double rate_hz)
 {
-	double ticks = fmax(host_period_s * rate_hz, 1);
+	double ticks = host_period_s * rate_hz, ratio = ticks < 1 ? 1 / ticks : ticks;
 
-	return (int)(fabs(ticks - rint(ticks)) <= SNAP ? rint(ticks) : ceil(ticks) + 1);
+	if (!(ticks > 0))
+		return 1;
+	if (fabs(ratio - rint(ratio)) <= DRIFT * ratio)
+		return (int)fmax(rint(ticks), 1);
+	return (int)ceil(ticks - SNAP) + 1;
 }
 
 static struct incise_plan *new_host_plan(const struct incise_scene *scene,
@@ -147,6 +160,10 @@ struct incise_host *incise_host_new(const struct incise_scene *scene,
 	if (options)
 		host->options = *options;
 	host->tick_ns = INCISE_NS_PER_S / incise_scene_rate_hz(scene);
+	host->late_ns = SNAP * host->tick_ns;
+	host->late_ns += host->options.host_period_s > 0
+				 ? host->options.host_period_s * INCISE_NS_PER_S
+				 : host->tick_ns;
 	pthread_mutex_init(&host->lock, NULL);
 	host->plan = new_host_plan(scene, &host->options, err);
 	if (host->plan && keep_plan(host))
@@ -176,9 +193,12 @@ static bool is_pose(const struct incise_host_pose *pose)
 {
 	double size2 = 0;
 
+	for (int i = 0; i < 3; i++)
+		if (!(fabs(pose->position_mm[i]) < PLACE_MOST_MM))
+			return false;
 	for (int i = 0; i < 4; i++)
 		size2 += pose->quaternion[i] * pose->quaternion[i];
-	return v3_finite(pose->position_mm) && size2 > 0.9 * 0.9 && size2 < 1.1 * 1.1;
+	return size2 > 0.9 * 0.9 && size2 < 1.1 * 1.1;
 }
 
 static bool is_speed(const double mm_s[3])
@@ -192,7 +212,7 @@ static int64_t tick_at(const struct incise_host *host, int64_t tick)
 	return BEGIN_NS + llround((double)tick * host->tick_ns);
 }
 
-/* How far the clock went ahead of the host's time, where that is too far; else 0. */
+/* The clock's lead over the host's time, where that is too much; else 0. */
 static int64_t find_lag(struct incise_host *host, int64_t t_ns)
 {
 	struct host_state *now = &host->now;
@@ -236,7 +256,6 @@ static int take_time(struct incise_host *host, int64_t t_ns)
 {
 	struct host_state *now = &host->now;
 	int64_t lag_ns = find_lag(host, t_ns), most_ns = too_late(host);
-	double hold_ns = (host->plan->hold.ticks + SNAP) * host->tick_ns;
 
 	if (!now->started || t_ns - now->from_ns < now->last.t_ns) {
 		now->from_ns = t_ns - tick_at(host, now->ticks);
@@ -245,7 +264,7 @@ static int take_time(struct incise_host *host, int64_t t_ns)
 	now->from_ns -= lag_ns;
 	if (t_ns - now->from_ns > most_ns)
 		now->from_ns = t_ns - most_ns;
-	if ((double)(t_ns - now->from_ns - tick_at(host, now->ticks - 1)) > hold_ns)
+	if ((double)(t_ns - now->from_ns - now->last.t_ns) > host->late_ns)
 		return let_go(now, -ESTALE);
 	return 0;
 }

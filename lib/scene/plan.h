@@ -167,8 +167,8 @@ incise_stage_fn incise_stage_pose, incise_stage_fed, incise_stage_actuate;
 /* --- plan --- */
 
 /*
- * As incise_plan_new_fed(), in the loop of a host that steps once in so many ticks of the tracker. With hold->fit
- * hold->gain is the gain that was found.
+ * As incise_plan_new_fed(), in the loop of a host that steps once in so many ticks of the
+ * tracker. With hold->fit hold->gain is the gain that was found.
  */
 struct incise_plan *incise_plan_new_held(const struct incise_scene *scene,
 					 const struct incise_tracker_info *tracker,

@@ -123,6 +123,8 @@ struct search {
 	struct parts rested_parts;
 	struct incise_plan air; /* … and before the hand leans */
 	struct parts air_parts;
+	struct incise_plan leaned; /* … and where a run came to rest */
+	struct parts leaned_parts;
 	struct incise_touch place[PLACES]; /* the first one is the top */
 	int n_places;
 	struct incise_surface *plane; /* at the top, without an end */
@@ -734,6 +736,7 @@ static void note_rest(const struct search *s, const struct rest_run *run,
 		.force_N = {lean_N[0], lean_N[1], lean_N[2]},
 		.swing_N = moved_of(s, last->N),
 		.way = way,
+		.hold_ticks = s->plan.hold.ticks,
 		.weakest = before.weakest,
 	};
 }
@@ -851,7 +854,12 @@ static bool judge_steps(struct search *s, const struct rest_run *run, double dep
 	int longest = s->plan.hold.ticks;
 	bool rests = true;
 
+	s->leaned = s->plan;
+	s->leaned_parts = s->parts;
 	for (int ticks = longest; ticks && rests; ticks = ticks * 3 / 4) {
+		/* A kicked run moves on from there. */
+		s->plan = s->leaned;
+		s->parts = s->leaned_parts;
 		s->plan.hold.ticks = ticks;
 		rests = judge_linear(s, run, depth_mm, way, rest);
 	}

@@ -48,7 +48,8 @@ struct incise_rest {
 	struct incise_plan_lean worst;
 	double force_N[3]; /* its lean */
 	double swing_N;
-	int way; /* of the search */
+	int way;	/* of the search */
+	int hold_ticks; /* its step, of a host */
 	struct incise_plan_weakest weakest;
 	/* Range of position and force, of a hand that leans with half of the scene's limit, by
 	 * the noise of a tracker: INCISE_REST_NOISE_MM. Results for a plan that rests. */

@@ -85,12 +85,12 @@ class Hosts(Case):
         for pose in ((1, 2), ("a", 0, 0), None, 5, ((1, 2), (1, 0, 0, 0)), (1, 2, 3, 4)):
             self.says(incise.Invalid, "a pose is", host.step, 0, pose)
         self.says(incise.Invalid, "velocity", host.step, 0, (0, 0, 5), (1, 2))
-        for x in (math.nan, math.inf, -math.inf):
+        for x in (math.nan, math.inf, -math.inf, 1e4, -1e300):
             self.says(incise.Invalid, "not finite or too far away", host.step, 0, (0, 0, x))
             self.assertEqual(tuple(host.wrench.force_N), (0, 0, 0))
         for t in (math.nan, math.inf, 1e30):
             self.says(incise.Invalid, "t=", host.step, t, (0, 0, 5))
-        self.assertTrue(all(map(math.isfinite, host.step(0, (0, 0, -1e300)).force_N)))
+        self.assertTrue(all(map(math.isfinite, host.step(0, (0, 0, -9999)).force_N)))
 
 
 class Sofa(Case):

@@ -14,7 +14,7 @@
 
 INCISE_BEGIN_DECLS
 
-/** The language of the readers. */
+/** The protocol that readers speak. */
 enum incise_outlet_protocol { INCISE_OUTLET_LSL, INCISE_OUTLET_ROS2 };
 
 /** A channel, in the words of XDF. */

@@ -26,8 +26,8 @@ struct incise_pairs {
 	size_t n;
 	int n_inputs;
 	/**
-	 * Weight of each training pair, above 0: one of weight 2 counts as two. NULL: 1. Reported
-	 * errors and the noise of the standard deviation do not have them.
+	 * The weight of each training pair, above 0: one of weight 2 counts as two. NULL: 1.
+	 * Reported errors and the noise of the standard deviation do not have weights.
 	 */
 	const double *weights;
 };

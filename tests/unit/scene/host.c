@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * A plan in the loop of a simulator: equal to the plan itself at its rate, safe with any input, and at rest at the
- * steps of slow hosts, which an independent loop shows.
+ * A plan in the loop of a simulator: equal to the plan itself at its rate, safe with any input,
+ * and at rest at the steps of slow hosts, which an independent loop shows.
  */
 #include "../unit.h"
 #include <pthread.h>
@@ -24,7 +24,7 @@ static const char hill[] =
 	"effects = { average_ticks = 8; };"
 	"tissue = { plane_N_mm = 0.1; insertion_N_mm = 0.05; spread_N_mm = 0.05; };";
 
-/* Of the test that runs. */
+/* The test that runs has these. */
 static struct fed_folder folder;
 static struct incise_scene *scene;
 static struct incise_host *host;
@@ -181,7 +181,7 @@ static int press(int64_t *t_ns, int steps, int64_t step_ns)
 	return rc;
 }
 
-/* Of the flat scene, at that depth. */
+/* The flat scene's force at that depth. */
 #define PRESSED_N 0.4
 
 TEST(test_a_late_step_lets_go)
@@ -211,6 +211,33 @@ TEST(test_a_late_step_lets_go)
 	assert_int_equal(press(&t_ns, 200, 10 * TICK_NS), 0);
 	assert_float_equal(wrench.force_N[2], PRESSED_N, 1e-3);
 	end();
+}
+
+/* Steps up to the largest are never late, wherever the ticks fall between them. */
+static void press_in_steps(double period_s, const int64_t step_ns[2], int hold_ticks,
+			   int steps)
+{
+	const struct incise_host_options options = {.host_period_s = period_s};
+	struct incise_host_info info;
+	int64_t t_ns = 0;
+
+	start(flat, &options);
+	incise_host_info(host, &info);
+	assert_int_equal(info.hold_ticks, hold_ticks);
+	for (int k = 0; k < steps; k++)
+		assert_int_equal(press(&t_ns, 1, step_ns[k % 2]), 0);
+	assert_float_equal(wrench.force_N[2], PRESSED_N, 1e-3);
+	end();
+}
+
+TEST(test_no_step_up_to_the_largest_is_late)
+{
+	press_in_steps(0.0005, (int64_t[]){500000, 500000}, 1, 3000);
+	press_in_steps(0.0007, (int64_t[]){700000, 700000}, 2, 3000);
+	press_in_steps(0.010, (int64_t[]){9500000, 10000000}, 10, 300);
+	press_in_steps(0.010001, (int64_t[]){9500000, 10000000}, 11, 300);
+	/* This host drifts through a whole tick. */
+	press_in_steps(0.0040008, (int64_t[]){4000800, 4000800}, 5, 3000);
 }
 
 TEST(test_time_back_lets_go)
@@ -330,6 +357,8 @@ TEST(test_a_refused_step_is_not_made)
 {
 	struct incise_host_pose pose = {.position_mm = {NAN}, .quaternion = {1}};
 	struct incise_host_pose turned = {.quaternion = {0}};
+	struct incise_host_pose far = {.position_mm = {0, 0, -2}, .quaternion = {1}};
+	struct incise_host_pose longer = {.quaternion = {1.2}};
 	struct incise_tick before, after;
 	int64_t t_ns = 0;
 
@@ -339,6 +368,13 @@ TEST(test_a_refused_step_is_not_made)
 	assert_int_equal(incise_host_step(host, t_ns, &pose, NULL, &wrench), -EINVAL);
 	assert_true(size(wrench.force_N) == 0 && size(wrench.torque_N_mm) == 0);
 	assert_int_equal(incise_host_step(host, t_ns, &turned, NULL, &wrench), -EINVAL);
+	assert_int_equal(incise_host_step(host, t_ns, &longer, NULL, &wrench), -EINVAL);
+	for (int i = 0; i < 6; i++) {
+		far.position_mm[i % 3] = i < 3 ? 1e4 : -1e300;
+		assert_int_equal(incise_host_step(host, t_ns, &far, NULL, &wrench),
+				 -EINVAL);
+		far.position_mm[i % 3] = 0;
+	}
 	assert_int_equal(incise_host_step(host, t_ns, NULL, NULL, &wrench), -EINVAL);
 	incise_host_last(host, &after);
 	assert_memory_equal(&before, &after, sizeof(before));
@@ -442,7 +478,7 @@ TEST(test_options_are_checked)
 	/* Poses of such steps are always too old. */
 	options = (struct incise_host_options){.host_period_s = 0.06};
 	assert_error(incise_host_new(scene, &options, &err), EDOM, &err, folder.scene,
-		     "limits.pose_age_ms");
+		     "limits.pose_age_ms: a host's poses", "host_period_s");
 	incise_host_free(NULL);
 	end();
 }

@@ -7,8 +7,8 @@
  *                   ▲                                                                 │
  *                   └───────────────── held for a tick ◀──────────────────────────────┘
  *
- * A scene that is refused with a gain is made again with that gain, and judged if it is accepted then. Of
- * twice that gain `incise bench stability` has a figure.
+ * A scene that is refused with a gain is made again with that gain, and judged if it is accepted then.
+ * `incise bench stability` has a figure of twice that gain.
  *
  * The same in the loop of a host, whose steps and holds are in place of tracker and ticks: at its largest gain, with steps
  * of one length or of any.
@@ -793,7 +793,7 @@ static void try_hosted(uint64_t seed)
 	hosted.irregular = chance(&random, 0.5);
 	hosted.velocity = options.gives_velocity = chance(&random, 0.5);
 	options.host_period_s =
-		hosted.step_s + (hosted.irregular ? 1 / scene->rate_hz : 0);
+		hosted.step_s + (hosted.irregular ? 1e-3 / scene->rate_hz : 0);
 	gain = fit(scene, &options, &hosted.host);
 	sum.no_advice += !hosted.host;
 	if (hosted.host) {
@@ -826,7 +826,7 @@ static void summarize(void)
 	printf("; in %d scenes; %.3g ticks\n", sum.failed_scenes, (double)sum.ticks);
 }
 
-/* Those of SEEDS, else so many that are accepted. */
+/* Seeds are those of SEEDS, else so many that are accepted. */
 static void try_all(void (*try)(uint64_t), int scenes)
 {
 	const char *seeds = getenv("SEEDS");
@@ -870,7 +870,7 @@ TEST(test_an_accepted_host_rests)
 /* With a ninth more than the largest gain that is accepted a shipped scene swings, as the refusal says. */
 TEST(test_no_more_gain_rests)
 {
-	/* Of a model more is kept in reserve: of liver four fifths. */
+	/* The check keeps more of a model in reserve: four fifths of liver. */
 	static const char *const names[] = {"neck", "wall"};
 	static const char words[] = "set tissue.gain to at most ";
 
