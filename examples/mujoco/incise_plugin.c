@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * A plugin for MuJoCo: the tissue of a scene pushes a body. It computes the forces of incise.mujoco.attach(), and
- * needs no Python. In a model:
+ * needs no Python. mj_copyData() and mj_setState() copy neither its cuts nor its time. In a model:
  *
  *     <extension><plugin plugin="incise.tissue"/></extension>
  *     <body name="blade">

@@ -302,7 +302,7 @@ class Table(Tabular):
 
     @property
     def metadata(self) -> Dict[str, str]:  # type: ignore[override]
-        """Where the rows come from: sources, date, options, calibration."""
+        """The origin of the rows: sources, date, options, calibration."""
         return dict(self._read_schema()[1])
 
     def units(self) -> Dict[str, str]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""What tables, rows of them and logs of ticks have in common: DataFrames, xarray, plots and HTML."""
+"""Tables, rows of them and logs of ticks as DataFrames, xarray, plots and HTML."""
 
 from __future__ import annotations
 

@@ -104,7 +104,7 @@ def _without_choice(path: bytes) -> bytes:
 
 
 def _text(path: bytes, recording: Optional[int]) -> bytes:
-    """What factors and models keep of a source."""
+    """The text of a source that factors and models keep."""
     text = ctypes.create_string_buffer(TEXT_MAX)
     call("incise_source_text", path, recording, text)
     return text.value

@@ -159,7 +159,7 @@ class Haptic:
         for line in lines:
             if line.startswith(prefix + "warning: "):
                 warnings.warn(line.partition("warning: ")[2], stacklevel=4)
-        if code > 0:
+        if code not in (0, -signal.SIGHUP):  # SIGHUP: of a stop() before the loop listens
             said = [line[len(prefix) :] for line in lines if line.startswith(prefix)]
             raise Error(errno.EIO, said[-1] if said else f"incise haptic ended with {code}")
         if out:

@@ -65,7 +65,7 @@ class Wrench(NamedTuple):
 
     force_N: Vector
     torque_N_mm: Vector  #: about the position of the pose
-    flags: int  #: bits of incise.plan.FLAGS
+    flags: int  #: bits of incise.FLAGS
     fades: str  #: why the force ramps to 0; "": it does not
 
 
@@ -95,6 +95,8 @@ class Host:
         options = HostOptions(step_s, velocity, fit_gain, tuple(tip_mm), find_tool(tool))
         if live:
             clock = function("incise_clock_new_real")()
+            if not clock:
+                raise MemoryError("no memory for a clock")
             self._clock = _library.Handle(clock, "incise_clock_free")
             options.clock = clock
         self._host = _library.Handle(

@@ -168,7 +168,7 @@ class Handle:
 
 
 def _folders():
-    """Where the libraries may be, in order; None stands for the system's own search."""
+    """The folders of the libraries, in order; None stands for the system's own search."""
     given = os.environ.get("INCISE_LIBDIR")
     if given:
         yield given

@@ -406,7 +406,7 @@ class CompiledModel:
 
     @classmethod
     def _of(cls, pointer: Any) -> "CompiledModel":
-        """Of a pointer that it frees."""
+        """The compiled model of a pointer, which it frees."""
         compiled = cls.__new__(cls)
         compiled._own(pointer)
         return compiled
@@ -500,7 +500,7 @@ class Model:
 
     @classmethod
     def _of(cls, pointer: int) -> "Model":
-        """Of a pointer that it frees."""
+        """The model of a pointer, which it frees."""
         model = cls.__new__(cls)
         model._own(pointer)
         return model
@@ -911,14 +911,14 @@ def train(
     above. The tool searches the premises of more than 20000 pairs on a random sample of them, and
     holds out other single rows where check is given without group; so does a list, [source] too.
 
-    group: column that names the cut, or with y the cut of each row; cross-validation and check keep whole cuts together. In a list
-    also "recording" or "rig"; cuts of different sources are different ones. Without it data are
-    grouped by "cut" where all have it; "none" takes each row by itself.
+    group: column that names the cut, or with y the cut of each row; cross-validation and check
+    keep whole cuts together. In a list also "recording" or "rig"; cuts of different sources are
+    different ones. Without it data are grouped by "cut" where all have it; "none" takes each row by itself.
     sample_weight: of each row of X, 0 or more: one of weight 2 counts as two; without check.
     check: share that is kept back, 0 to 1; its error is in ``model.report``.
     mf: membership functions of each input (default 5, 4; else 3 each), or "auto".
     classic: the method of MATLAB's anfis; not for a list.
-    all_rows: also take rows whose column ``advancing`` is 0.
+    all_rows: also take rows whose column ``advancing`` is 0, as X and y always do.
     progress: called with a :class:`incise.TrainStep` after each epoch and some 10 ms of computing,
     in another thread; an exception of it ends the training, as Ctrl-C does.
     """
@@ -926,8 +926,8 @@ def train(
         raise Invalid(errno.EINVAL, f"mf_type={mf_type!r}: gaussmf or gbellmf")
     if not 0 <= check < 1:
         raise Invalid(errno.EINVAL, f"check={check!r}: a share from 0 to below 1")
-    weights = None
-    if y is not None:
+    weights, whole = None, y is not None  # of X every row, to which its weights belong
+    if whole:
         data, inputs, target, group = _table_of(data, y, inputs, target, group)
         if sample_weight is not None:
             data, weights = _weighed(data, sample_weight)
@@ -957,7 +957,7 @@ def train(
     group = None if group == "none" else group
     # Not in this thread, whose KeyboardInterrupt a callback of the reading would swallow.
     dataset, left_out = _library.call_interruptible(
-        lambda: _read_dataset(data, names, group, None if all_rows else "advancing"),
+        lambda: _read_dataset(data, names, group, None if all_rows or whole else "advancing"),
         lambda: None,
     )
     stop = Stop(options, progress)

@@ -158,7 +158,7 @@ class Tick(NamedTuple):
 
 
 class Stability(NamedTuple):
-    """What the plan's device can hold; see incise-plan(1)."""
+    """The limits of the plan's device; see incise-plan(1)."""
 
     stiffness_N_mm: float  #: largest of the scene
     damping_N_s_mm: float

@@ -8,7 +8,7 @@ import errno
 import math
 import os
 import threading
-from typing import Any, Dict, NamedTuple, Optional, Tuple
+from typing import Any, Dict, List, NamedTuple, Optional, Tuple
 
 from . import _library
 from ._arrow import Table
@@ -70,7 +70,7 @@ class Stream(NamedTuple):
 
 
 class Info(NamedTuple):
-    """What a recording says of itself."""
+    """A recording's own summary."""
 
     complete: bool  #: closed by its recorder
     start_ns: int  #: first force sample, CLOCK_MONOTONIC
@@ -191,7 +191,7 @@ class Recording:
         self._checked = False
         self._frames: Optional[int] = None
         self._start_ns: Optional[int] = None
-        self._limits: Dict[str, Any] = {}  # the part that tables are of
+        self._limits: List[Dict[str, Any]] = []  # all of the part that tables are of
         self._calibration = load_calibration(calibration) if calibration is not None else None
         self._calibration_path = (
             _library.path_bytes(calibration) if calibration is not None else None
@@ -290,7 +290,7 @@ class Recording:
     def _part(self, **limits: Any) -> "Recording":
         part = Recording(self.path, damaged=self._damaged)
         part._calibration, part._calibration_path = self._calibration, self._calibration_path
-        part._limits = limits
+        part._limits = [*self._limits, limits]
         return part
 
     def between(self, from_s: float = 0, to_s: Optional[float] = None) -> "Recording":
@@ -304,8 +304,9 @@ class Recording:
         return self._part(cut=_cut_number(number))
 
     def _span(self, number: int) -> Tuple[float, float]:
-        """Where a cut begins and ends, in seconds."""
-        times = [batch.column("t_s") for batch in self.pairs().cut(number).batches()]
+        """Begin and end of a cut, in seconds."""
+        pairs = self._whole("table", f"pairs of {self.path}", {"cut": number})
+        times = [batch.column("t_s") for batch in pairs.batches()]
         return times[0][0], times[-1][-1] + 1e-9
 
     def plot(self, rate_hz: float = 100) -> Any:
@@ -326,7 +327,9 @@ class Recording:
         with self._lock:
             self._open()
         table = self._whole(what, f"{about} of {self.path}", options)
-        return table._part(**self._limits) if self._limits else table
+        for limits in self._limits:
+            table = table._part(**limits)
+        return table
 
     def _whole(self, what: str, about: str, options: Dict[str, Any]) -> Table:
         def part(

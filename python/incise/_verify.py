@@ -181,7 +181,7 @@ class Report(NamedTuple):
 
 @contextlib.contextmanager
 def _proved(path: PathLike, level: int, found: List[Finding], *trust: Any) -> Iterator[ProofStruct]:
-    """What incise_prove() says. Ctrl-C ends it."""
+    """The proof of incise_prove(). Ctrl-C ends it."""
     stop: List[bool] = []
 
     def on_found(user: Any, pointer: Any) -> None:

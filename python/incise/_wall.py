@@ -68,7 +68,7 @@ class Wall:
 
     @classmethod
     def _of(cls, pointer: int) -> "Wall":
-        """Of a pointer that it frees."""
+        """The wall time of a pointer, which it frees."""
         wall = cls.__new__(cls)
         wall._handle = Handle(pointer, "incise_wall_free")
         return wall

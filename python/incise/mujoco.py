@@ -125,7 +125,11 @@ class Attachment:
         mujoco.mju_negPose(self._from, self._turn, self._frame, frame_turn)
         mujoco.mju_mulPose(*self._pose, self._from, self._turn, self._tip, tip_turn)
         position *= 1e3
-        fades = self.host.advance(self._time)
+        try:
+            fades = self.host.advance(self._time)
+        except Invalid:
+            self._force[:] = self._torque[:] = 0
+            raise
         if fades:
             warnings.warn(f"MuJoCo: {FADES[fades]}: the force ramps to 0", stacklevel=2)
         mujoco.mju_rotVecQuat(self._force, force, frame_turn)

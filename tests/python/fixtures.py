@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What the tests of python/incise share: recordings of the simulated rig, made once by the real programs.
+"""The base of the tests of python/incise: recordings of the simulated rig, made once by the real programs.
 
 INCISE_BUILD is the build folder; by default the one beside the sources.
 """

@@ -38,7 +38,7 @@ class Hosts(Case):
             self.assertGreater(most, 0.2)
 
     def test_slow_steps(self):
-        """Of steps of 10 ms the gain is fitted, and the force follows."""
+        """The gain of steps of 10 ms is fitted, and the force follows."""
         host = incise.Host("neck", step_s=0.01, fit_gain=True)
         self.assertEqual(host.info.hold_ticks, 10)
         self.assertLessEqual(host.info.gain, host.info.scene_gain)

@@ -262,6 +262,16 @@ class MuJoCo(Case):
             warnings.simplefilter("error")
             mujoco.mj_step(model, data)
 
+    def test_a_wrong_pose_leaves_no_force(self):
+        model, data = self.model()
+        tissue = self.attach(model, data, body="blade", scene="wall")
+        for k in range(150, 400):
+            self.move(model, data, k)
+        self.assertGreater(tissue.force_N[2], 0.1)
+        tissue._frame = numpy.full(3, numpy.nan)
+        self.says(incise.Invalid, "the pose is not finite", tissue._apply)
+        self.assertFalse(data.xfrc_applied.any())
+
     def test_errors(self):
         model, data = self.model()
         attach = incise.mujoco.attach

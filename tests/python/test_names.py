@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What is exported may be called with anything: it works or raises, and Python goes on."""
+"""Each exported name may be called with anything: it works or raises, and Python goes on."""
 
 import pathlib
 import subprocess

@@ -180,6 +180,11 @@ class Haptics(Case):
         loop.stop()
         self.assertIsNone(loop.wait())
 
+    def test_a_loop_that_was_killed(self):
+        loop = incise.Haptic("neck", "sim:", realtime=False)
+        loop._process.kill()
+        self.says(incise.Error, "ended with -9", loop.wait)
+
     def test_it_ends_with_python(self):
         start = "loop = incise.Haptic('neck', 'sim:', realtime=False)"
         pid = int(run(sys.executable, "-c", f"import incise; {start}; print(loop._process.pid)"))

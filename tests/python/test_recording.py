@@ -55,7 +55,7 @@ class Recordings(Case):
         self.assertEqual(info.surface_normal, (0, 0, 1))
 
     def test_parts_are_rows_of_the_whole(self):
-        """Of each stream the rows whose times are in the part, and of a cut those from its first pair
+        """A part has the rows of each stream whose times are in it, a cut those from its first pair
         to its last; next to a filter in Python."""
         start_ns = self.rec.info.start_ns
         cut = rows(self.rec.pairs().cut(3))["t_s"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What researchers type: each line works, or raises one line that says what to do."""
+"""Lines that researchers type: each works, or raises one line that says what to do."""
 
 import contextlib
 import os
@@ -42,6 +42,10 @@ len(rec.force.cut(3)) == len(rec.pairs().cut(3))    -> True
 len(rec.cut(3).force) == len(rec.force.cut(3))      -> True
 rec.cut(3).resample(rate_hz=100)["cut"].min()       -> 3
 rec.between(1, 2).depth                             -> depth of
+rec.between(1, 2).cut(3).pairs().between(0)._about  -> 1 s to 2 s, cut 3
+rec.cut(3).between(0, 5).force["seq"]               !! the end is not behind the beginning
+len(rec.cut(3).between(8).force) == len(rec.force.cut(3).between(8))  -> True
+len(rec.between(8).cut(3).force) == len(rec.force.cut(3).between(8))  -> True
 rec.cut(0)                                          !! cut 0: cuts have numbers from 1
 rec.force.cut(99)                                   !! has no cut 99, but 14
 rec.pairs().cut(99)["cut"]                          !! has no cut 99, but 14
@@ -90,6 +94,7 @@ train(X, y, group="cut")                            !! train(X, y): X has no col
 train(X, y, group=cut)                              -> force_N of depth_mm, velocity_mm_s
 train(X, y, sample_weight=1)((5, 20)) == train(X, y)((5, 20))  -> True
 train(X, y, sample_weight=weight)                   -> force_N of depth_mm, velocity_mm_s
+train({"advancing": y > 1, "x": X[:, 0]}, y, sample_weight=weight).report.pairs == len(y)  -> True
 train(X, y, sample_weight=0 * y)                    !! sample_weight: all are zero
 train(X, y, sample_weight=[1, 2])                   !! sample_weight: expected one for each row, found 2
 train(X, y, sample_weight=-1)                       !! sample_weight: expected finite numbers, 0 or more
@@ -136,7 +141,7 @@ PACKAGES = {
 
 class Typed(Case):
     def names(self):
-        """What the lines use."""
+        """The names that the lines use."""
         rec = incise.open(os.path.join(self.shared, "short.rec"))
         fis = os.path.join(self.shared, "bare.fis")
         if not os.path.exists(fis):
