@@ -169,7 +169,7 @@ class Haptic:
 
 
 def _ask_end(process: Any) -> None:
-    """Ask a loop to end, once: a second SIGTERM kills it, and its ramp. SIGHUP reads the scene again."""
+    """Ask a loop to end, once: a second SIGTERM ends the ramp. SIGHUP may read the scene again."""
     if not process.asked:
         process.asked = True
         process.send_signal(signal.SIGTERM)
