@@ -116,9 +116,10 @@ class Haptic:
                     else f"={os.fspath(value) if hasattr(value, '__fspath__') else value}"
                 )
                 command.append(f"--{name.replace('_', '-')}{end}")
-        self._process = subprocess.Popen(
+        self._process: Any = subprocess.Popen(
             command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )
+        self._process.asked = False
         # At the end of Python, too: no force outlives it.
         self._end = weakref.finalize(self, _hang_up, self._process)
 
@@ -135,9 +136,7 @@ class Haptic:
     def stop(self) -> None:
         """End it; the force ramps to 0 first. Again is harmless."""
         if self._end.alive:
-            self._process.send_signal(
-                signal.SIGHUP
-            )  # which does not end the ramp if it comes twice
+            _ask_end(self._process)
             self.wait()
 
     def wait(self) -> Optional[Columns]:
@@ -159,7 +158,7 @@ class Haptic:
         for line in lines:
             if line.startswith(prefix + "warning: "):
                 warnings.warn(line.partition("warning: ")[2], stacklevel=4)
-        if code not in (0, -signal.SIGHUP):  # SIGHUP: of a stop() before the loop listens
+        if code and not (self._process.asked and code == -signal.SIGTERM):  # before it listens
             said = [line[len(prefix) :] for line in lines if line.startswith(prefix)]
             raise Error(errno.EIO, said[-1] if said else f"incise haptic ended with {code}")
         if out:
@@ -169,10 +168,17 @@ class Haptic:
             self.ticks._about = f"ticks of {self.scene}"
 
 
+def _ask_end(process: Any) -> None:
+    """Ask a loop to end, once: a second SIGTERM ends the ramp. SIGHUP may read the scene again."""
+    if not process.asked:
+        process.asked = True
+        process.send_signal(signal.SIGTERM)
+
+
 def _hang_up(process: Any) -> None:
     """End a loop that is still there, and wait for it."""
     if process.poll() is None:
-        process.send_signal(signal.SIGHUP)
+        _ask_end(process)
         process.communicate()
     process.stdout.close()
     process.stderr.close()

@@ -913,7 +913,8 @@ def train(
 
     group: column that names the cut, or with y the cut of each row; cross-validation and check
     keep whole cuts together. In a list also "recording" or "rig"; cuts of different sources are
-    different ones. Without it data are grouped by "cut" where all have it; "none" takes each row by itself.
+    different ones. Without it data are grouped by "cut" where all have it; "none" takes each row
+    by itself.
     sample_weight: of each row of X, 0 or more: one of weight 2 counts as two; without check.
     check: share that is kept back, 0 to 1; its error is in ``model.report``.
     mf: membership functions of each input (default 5, 4; else 3 each), or "auto".

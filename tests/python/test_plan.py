@@ -180,6 +180,19 @@ class Haptics(Case):
         loop.stop()
         self.assertIsNone(loop.wait())
 
+    def test_it_ends_without_a_terminal(self):
+        """It listens once it catches SIGTERM, bit 14; SIGHUP would read the scene again."""
+        program = (
+            "import incise, re\n"
+            "loop = incise.Haptic('neck', 'sim:', realtime=False)\n"
+            "status = f'/proc/{loop._process.pid}/status'\n"
+            "while not int(re.search('SigCgt:\\t(.*)', open(status).read())[1], 16) >> 14 & 1: pass\n"
+            "loop.stop()\n"
+            "print(loop._process.returncode, len(loop.report) > 0)\n"
+        )
+        said = run(sys.executable, "-c", program, start_new_session=True, timeout=120)
+        self.assertEqual(said, "0 True\n")
+
     def test_a_loop_that_was_killed(self):
         loop = incise.Haptic("neck", "sim:", realtime=False)
         loop._process.kill()
