@@ -186,12 +186,13 @@ static size_t read_edges(struct incise_sim_edge *edges, size_t n)
 }
 
 /* 1000 steps up and back: counted edges, and none shorter than the config says. */
-static void try_edges(struct bench *bench, const struct incise_stepper_config *config)
+static void try_edges(struct bench *bench, const struct incise_stepper_config *config,
+		      const struct incise_stepper_controller *info)
 {
 	static struct incise_sim_edge edges[EDGES_MAX];
 	int64_t lead = 0, trail = 0, dir = 0, up = 0, down = 0, shorts = 0;
-	/* A late step may be caught up by an eighth. */
-	int64_t interval = 875000000 / config->velocity;
+	/* A late step may be caught up by an eighth, and by what a firing costs. */
+	int64_t interval = 875000000 / config->velocity - info->step_ns / 2;
 	bool level = false;
 	size_t n;
 
@@ -522,7 +523,7 @@ int main(int argc, char **argv)
 	report(ioctl(bench.fd, INCISE_STEPPER_SET_CONFIG, &config) < 0 && errno == EBUSY,
 	       "no config while it has power");
 
-	try_edges(&bench, &config);
+	try_edges(&bench, &config, &info);
 	try_trace(&bench);
 	try_deadman(&bench);
 	try_limit(&bench);
