@@ -105,7 +105,7 @@ static int count_hold(double host_period_s, double rate_hz)
 		return 1;
 	if (fabs(ratio - rint(ratio)) <= DRIFT * ratio)
 		return (int)fmax(rint(ticks), 1);
-	return (int)ceil(ticks - SNAP) + 1;
+	return (int)ceil(ticks - SNAP) + 2;
 }
 
 static struct incise_plan *new_host_plan(const struct incise_scene *scene,

@@ -52,7 +52,8 @@ struct incise_host_options {
 	 * Largest step of the host, s, up to 512 ticks; 0: a tick. A multiple of the tick, or a
 	 * whole part of it, counts as the step of a host that always steps by just that; a host
 	 * that also makes shorter steps adds a thousandth of a tick. Any other step counts as up
-	 * to a tick longer, as the last tick before it may be so old.
+	 * to two ticks longer: the last tick before it may be one old, and a host whose steps
+	 * differ swung in a test without the other.
 	 */
 	double host_period_s;
 	bool gives_velocity; /**< each step has a velocity; false: velocities are not read */

@@ -233,11 +233,11 @@ static void press_in_steps(double period_s, const int64_t step_ns[2], int hold_t
 TEST(test_no_step_up_to_the_largest_is_late)
 {
 	press_in_steps(0.0005, (int64_t[]){500000, 500000}, 1, 3000);
-	press_in_steps(0.0007, (int64_t[]){700000, 700000}, 2, 3000);
+	press_in_steps(0.0007, (int64_t[]){700000, 700000}, 3, 3000);
 	press_in_steps(0.010, (int64_t[]){9500000, 10000000}, 10, 300);
-	press_in_steps(0.010001, (int64_t[]){9500000, 10000000}, 11, 300);
+	press_in_steps(0.010001, (int64_t[]){9500000, 10000000}, 12, 300);
 	/* This host drifts through a whole tick. */
-	press_in_steps(0.0040008, (int64_t[]){4000800, 4000800}, 5, 3000);
+	press_in_steps(0.0040008, (int64_t[]){4000800, 4000800}, 6, 3000);
 }
 
 TEST(test_time_back_lets_go)

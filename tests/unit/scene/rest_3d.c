@@ -162,7 +162,8 @@ static void step_host(struct loop *loop)
 	v3_copy(loop->sent_N, wrench.force_N);
 	loop->next_force_s = loop->t_s + late_s;
 	loop->next_step_s += hosted.irregular
-				     ? between(&hosted.seed, late_s, hosted.step_s)
+				     ? between(&hosted.seed, fmin(late_s, hosted.step_s),
+					       hosted.step_s)
 				     : hosted.step_s;
 	sum.ticks++;
 }
