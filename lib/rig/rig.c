@@ -11,7 +11,9 @@
 #include "../sim/sim.h"
 #include "backends.h"
 #include "encoder.h"
+#include "haptic_page.h"
 #include "rig_plan.h"
+#include "stylus.h"
 
 #define SIM_START_NS INCISE_NS_PER_S /* of a simulated clock: 0 would pass for unset */
 
@@ -29,6 +31,8 @@ struct incise_rig {
 	struct incise_driver *driver[INCISE_RIG_AXES_MAX], *encoder[INCISE_RIG_AXES_MAX];
 	double direction[INCISE_RIG_AXES_MAX][3];
 	int n_axes; /* that are open */
+	struct incise_haptic *haptic;
+	struct incise_stylus *stylus;
 	double point_mm[3], normal[3];
 	struct incise_vision_setup vision;
 	bool has_vision;
@@ -189,6 +193,27 @@ static int rig_devices(struct incise_rig *rig, const struct incise_rig_plan *pla
 	return rc;
 }
 
+/* A real device has an owner: another process. */
+static int rig_haptic(struct incise_rig *rig, const struct incise_rig_plan *plan,
+		      struct incise_error *err)
+{
+	bool own = !strncmp(plan->haptic_device, "sim:", 4);
+
+	rig->haptic = own ? incise_haptic_open(plan->haptic_device, plan->haptic_where,
+					       &plan->haptic, rig->clock, err)
+			  : incise_haptic_attach(rig->spec, plan->haptic_device,
+						 plan->haptic_where, &plan->haptic,
+						 rig->clock, err);
+	if (!rig->haptic)
+		return -errno;
+	rig->stylus = incise_stylus_new(rig->haptic, &plan->haptic);
+	if (!rig->stylus)
+		return incise_error_set(err, ENOMEM, "%s: %s", plan->haptic_where,
+					strerror(ENOMEM));
+	rig->tracker = incise_stylus_tracker(rig->stylus);
+	return 0;
+}
+
 static struct incise_rig *rig_new(const struct incise_rig_plan *plan, const char *spec,
 				  struct incise_error *err)
 {
@@ -216,6 +241,8 @@ static struct incise_rig *rig_new(const struct incise_rig_plan *plan, const char
 			goto close;
 	}
 	rc = rig_devices(rig, plan, err);
+	if (!rc && plan->haptic_device)
+		rc = rig_haptic(rig, plan, err);
 	if (!rc)
 		return rig;
 	errno = -rc;
@@ -255,7 +282,7 @@ void incise_rig_close(struct incise_rig *rig)
 {
 	if (!rig)
 		return;
-	if (rig->tracker)
+	if (rig->tracker && !rig->stylus)
 		rig->tracker->ops->close(rig->tracker);
 	if (rig->force)
 		rig->force->ops->close(rig->force);
@@ -274,6 +301,8 @@ void incise_rig_close(struct incise_rig *rig)
 	}
 	for (int slot = 0; slot < N_SLOTS; slot++)
 		incise_backend_unload(&rig->loaded[slot]);
+	incise_stylus_free(rig->stylus);
+	incise_haptic_close(rig->haptic);
 	incise_sim_free(rig->sim);
 	incise_clock_free(rig->clock);
 	free(rig->spec);
@@ -317,6 +346,16 @@ struct incise_stepper *incise_rig_axis(struct incise_rig *rig, int i, double dir
 	if (direction)
 		memcpy(direction, rig->direction[i], sizeof(rig->direction[i]));
 	return rig->stepper[i];
+}
+
+struct incise_haptic *incise_rig_haptic(struct incise_rig *rig)
+{
+	return rig->haptic;
+}
+
+struct incise_stylus *incise_rig_stylus(struct incise_rig *rig)
+{
+	return rig->stylus;
 }
 
 struct incise_sim *incise_rig_sim(struct incise_rig *rig)

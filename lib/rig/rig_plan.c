@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 #include <incise/infile.h>
 #include <incise/rig.h>
 #include "../sim/sim.h"
@@ -191,6 +192,59 @@ static const struct incise_setting vision_settings[] = {
 	{0},
 };
 
+#define OF_DEVICE "(by the device)"
+
+static const struct incise_setting haptic_settings[] = {
+	SETTING_NUMBER(mass_kg, haptic.mass_kg, "kg", 0.001, 100, OF_DEVICE,
+		       "mass that the hand feels"),
+	SETTING_NUMBER(damping_N_s_mm, haptic.damping_N_s_mm, "N s/mm", 1e-6, 10,
+		       OF_DEVICE, "damping of the device"),
+	SETTING_NUMBER(coulomb_N, haptic.coulomb_N, "N", 1e-6, 100, OF_DEVICE,
+		       "Coulomb friction of the device"),
+	SETTING_NUMBER(peak_N, haptic.peak_N, "N", 0.01, 1000, OF_DEVICE,
+		       "largest force"),
+	SETTING_NUMBER(continuous_N, haptic.continuous_N, "N", 0.01, 1000, OF_DEVICE,
+		       "force that the device stands for ever"),
+	SETTING_VECTOR(low_mm, haptic.low_mm, "mm", OF_DEVICE,
+		       "least corner of the workspace, in the frame of the device"),
+	SETTING_VECTOR(high_mm, haptic.high_mm, "mm", OF_DEVICE, "its other corner"),
+	SETTING_NUMBER(rate_hz, haptic.rate_hz, "Hz", 1, 20000, OF_DEVICE,
+		       "poses per second"),
+	SETTING_NUMBER(latency_ms, haptic.latency_ms, "ms", 0.001, 1000, OF_DEVICE,
+		       "from the acquisition of a pose to its arrival"),
+	SETTING_NUMBER(force_latency_ms, haptic.force_latency_ms, "ms", 0.001, 1000,
+		       OF_DEVICE, "from a new force to its action"),
+	SETTING_NUMBER(turn, haptic.turn, "", -1, 1, "[1, 0, 0, 0]",
+		       "rotation from the frame of the device to that of the scene, as a "
+		       "unit quaternion, w first; `incise calibrate frame` finds it"),
+	SETTING_VECTOR(origin_mm, haptic.origin_mm, "mm", "[0, 0, 0]",
+		       "place of the device's origin in the scene"),
+	SETTING_WHOLE(
+		clutch, haptic.clutch, "", 0, 32, "0",
+		"button, from 1 on, that uncouples the tool while it is pressed; 0: "
+		"none"),
+	SETTING_WHOLE(enable, haptic.enable, "", 0, 32, "0",
+		      "button, from 1 on, that must be pressed for a force; 0: none"),
+	SETTING_NUMBER(start_s, haptic.start_s, "s", 0.1, 60, "1",
+		       "time from no force to all of it, at each start"),
+	SETTING_NUMBER(lost_s, haptic.lost_s, "s", 0, 3600, "5",
+		       "the device's owner ends so long after its last user"),
+	SETTING_NUMBER(motor_direction, haptic.motor_direction, "", -1, 1, "(none)",
+		       "moteus: for each motor, the direction of the handle as it turns "
+		       "positively: three numbers each",
+		       .count = offsetof(struct incise_rig_plan,
+					 haptic.n_motor_directions)),
+	SETTING_NUMBER(
+		motor_mm_turn, haptic.motor_mm_turn, "mm", 0.01, 10000, "(none)",
+		"moteus: travel of the handle per turn of each motor: the lead of a "
+		"screw, or 2π times the radius of a drum",
+		.count = offsetof(struct incise_rig_plan, haptic.n_motors)),
+	SETTING_NUMBER(motor_torque_N_mm, haptic.motor_torque_N_mm, "N mm", 0.01, 1e6,
+		       "(none)", "moteus: largest torque of each motor",
+		       .count = offsetof(struct incise_rig_plan, haptic.n_motor_torques)),
+	{0},
+};
+
 /* Both must be there: no device is meant by default. */
 static const struct incise_setting foot_switch_settings[] = {
 	SETTING_TEXT(device, foot_switch.device, SETTING_REQUIRED,
@@ -217,11 +271,15 @@ const struct incise_setting incise_rig_settings[] = {
 	SETTING_OWN(camera, "", "(none)", "camera, as BACKEND:ARGUMENTS"),
 	SETTING_OWN(stepper, "", "(none)",
 		    "actuator, as BACKEND:ARGUMENTS, or an array of two or three"),
+	SETTING_OWN(
+		haptic, "", "(none)",
+		"haptic device, as BACKEND:ARGUMENTS, in place of tracker and stepper"),
 	SETTING_GROUP(surface, surface_settings, "plane of the tissue surface"),
 	SETTING_OWN(actuator, "group", "(none)",
 		    "mechanics of a real actuator, or a list of two or three groups",
 		    .read = read_actuators),
 	SETTING_GROUP(tracker_setup, tracker_settings, "settings of a real tracker"),
+	SETTING_GROUP(haptic_setup, haptic_settings, "settings of a haptic device"),
 	SETTING_GROUP(force_setup, force_settings, "settings of a real force channel"),
 	SETTING_GROUP(camera_setup, camera_settings, "settings of a real camera"),
 	SETTING_GROUP(vision, vision_settings, "look of the scalpel in camera frames"),
@@ -540,6 +598,66 @@ static bool virtual_camera(const config_setting_t *root)
 	       is_virtual(device);
 }
 
+/* Whether a rig with a haptic device opens it for these devices; then it is the tracker and the stepper. */
+static bool takes_haptic(struct incise_rig_plan *plan)
+{
+	const unsigned int both = INCISE_RIG_TRACKER | INCISE_RIG_STEPPER;
+	bool takes = plan->devices & (both | INCISE_RIG_HAPTIC);
+
+	plan->devices &= ~(both | INCISE_RIG_HAPTIC);
+	return takes;
+}
+
+static int keep_haptic(struct incise_rig_plan *plan, const char *device,
+		       struct incise_error *err)
+{
+	if (!takes_haptic(plan))
+		return 0;
+	if (plan->watch)
+		return incise_error_set(err, EOPNOTSUPP,
+					"%s: a haptic device cannot be watched",
+					plan->haptic_where);
+	if (plan->simulated && strncmp(device, SIM_BACKEND ":", strlen(SIM_BACKEND ":")))
+		return incise_error_set(err, EINVAL,
+					"%s: only the simulated rig can follow a "
+					"simulated clock; write clock = \"real\"",
+					plan->haptic_where);
+	plan->haptic_device = strdup(device);
+	return plan->haptic_device
+		       ? 0
+		       : incise_error_set(err, ENOMEM, "%s: %s", plan->haptic_where,
+					  strerror(ENOMEM));
+}
+
+static int plan_haptic(struct incise_rig_plan *plan, const config_setting_t *root,
+		       const char *path, struct incise_error *err)
+{
+	const config_setting_t *setting = config_setting_get_member(root, "haptic");
+	const char *device = setting ? config_setting_get_string(setting) : NULL;
+
+	if (!setting)
+		return plan->devices & INCISE_RIG_HAPTIC
+			       ? incise_error_set(
+					 err, ENODEV,
+					 "%.200s: haptic: missing, but required; add "
+					 "`haptic = \"BACKEND:ARGUMENTS\";`",
+					 path)
+			       : 0;
+	if (!device || !strchr(device, ':'))
+		return incise_conf_error(
+			setting, NULL, path, err,
+			"BACKEND:ARGUMENTS in quotes, such as \"haply:\"");
+	if (config_setting_get_member(root, "tracker") ||
+	    config_setting_get_member(root, "stepper"))
+		return incise_conf_error(
+			setting, NULL, path, err,
+			"no tracker and no stepper beside a haptic device, which gives the "
+			"pose and takes the force");
+	snprintf(plan->haptic_where, sizeof(plan->haptic_where), "%.200s:%d: haptic",
+		 path, incise_conf_line(setting));
+	return keep_haptic(plan, device, err);
+}
+
 static int plan_root(struct incise_rig_plan *plan, const config_setting_t *root,
 		     const char *path, struct incise_error *err)
 {
@@ -552,6 +670,8 @@ static int plan_root(struct incise_rig_plan *plan, const config_setting_t *root,
 		plan->devices &= ~INCISE_RIG_CAMERA;
 	if (!rc)
 		rc = check_tube_station(&plan->tracker, root, path, err);
+	if (!rc)
+		rc = plan_haptic(plan, root, path, err);
 	for (int kind = 0; kind < KIND_STEPPER && !rc; kind++)
 		rc = plan_device(plan, kind, root, path, err);
 	if (!rc)
@@ -635,6 +755,40 @@ static int plan_shorthand(struct incise_rig_plan *plan, const char *spec,
 	return 0;
 }
 
+#define SIM_HAPTIC SIM_BACKEND ":haptic"
+
+/* A rig that is a haptic device alone: no file has that name. */
+static bool is_haptic_alone(const char *spec)
+{
+	size_t length = strspn(spec, "abcdefghijklmnopqrstuvwxyz0123456789_");
+
+	if (!strncmp(spec, SIM_HAPTIC, strlen(SIM_HAPTIC)))
+		return true;
+	return length && spec[length] == ':' && strncmp(spec, SIM_BACKEND ":", 4) &&
+	       access(spec, F_OK);
+}
+
+static int plan_haptic_alone(struct incise_rig_plan *plan, const char *spec,
+			     struct incise_error *err)
+{
+	const char *words = spec + strlen(SIM_HAPTIC);
+	char device[300];
+
+	if (!takes_haptic(plan))
+		return 0;
+	plan->devices |= INCISE_RIG_HAPTIC;
+	snprintf(plan->haptic_where, sizeof(plan->haptic_where), "%.200s", spec);
+	if (strncmp(spec, SIM_HAPTIC, strlen(SIM_HAPTIC)))
+		return keep_haptic(plan, spec, err);
+	/* sim:haptic,clock=simulated,KEY=VALUE */
+	if (!strncmp(words, ",clock=simulated", 16)) {
+		plan->simulated = true;
+		words += 16;
+	}
+	snprintf(device, sizeof(device), SIM_BACKEND ":%.280s", *words ? words + 1 : "");
+	return keep_haptic(plan, device, err);
+}
+
 int incise_rig_plan_read(struct incise_rig_plan *plan, const char *spec,
 			 unsigned int devices, struct incise_error *err)
 {
@@ -645,6 +799,8 @@ int incise_rig_plan_read(struct incise_rig_plan *plan, const char *spec,
 	};
 	incise_settings_init(incise_rig_settings, plan);
 	incise_sim_config_init(&plan->config);
+	if (is_haptic_alone(spec))
+		return plan_haptic_alone(plan, spec, err);
 	if (!strncmp(spec, SIM_BACKEND ":", strlen(SIM_BACKEND ":")))
 		return plan_shorthand(plan, spec, err);
 	return plan_file(plan, spec, err);
@@ -656,4 +812,5 @@ void incise_rig_plan_free(struct incise_rig_plan *plan)
 		free(plan->real[slot].name);
 		free(plan->real[slot].arguments);
 	}
+	free(plan->haptic_device);
 }

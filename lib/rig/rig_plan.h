@@ -11,6 +11,7 @@
 #include <incise/error.h>
 #include <incise/foot_switch.h>
 #include <incise/force.h>
+#include <incise/haptic.h>
 #include <incise/rig.h>
 #include <incise/sim.h>
 #include <incise/tracker.h>
@@ -61,6 +62,10 @@ struct incise_rig_plan {
 	struct incise_camera_setup camera;
 	struct incise_vision_setup vision;
 	bool has_vision; /* rig.conf has it, or the camera is the virtual one */
+	/* The haptic device: its string, free(3); NULL: none, or not wanted. */
+	char *haptic_device;
+	char haptic_where[240];
+	struct incise_haptic_setup haptic;
 	struct incise_foot_switch_setup foot_switch;
 	bool has_foot_switch;
 	char sign_key[INCISE_RIG_KEY_PATH_MAX]; /* "": no key */

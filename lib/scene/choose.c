@@ -119,13 +119,17 @@ void incise_plan_choose(struct incise_plan *plan)
 								all[i].numbers});
 	}
 	/* A device that is not there cannot be kept. */
+	if (plan->stylus)
+		keep_choose(plan, (struct incise_stage){.name = "push",
+							.run = incise_stage_push});
 	if (plan->axes.n)
 		keep_choose(plan, (struct incise_stage){.name = "actuate",
 							.run = incise_stage_actuate});
 	else
 		leave_choose_out(plan, "actuate",
-				 plan->poses.tracker ? "the rig has no stepper"
-						     : "no rig, and so no stepper");
+				 plan->stylus	       ? "a haptic device takes the force"
+				 : plan->poses.tracker ? "the rig has no stepper"
+						       : "no rig, and so no stepper");
 	leave_choose_out(plan, "wound",
 			 plan->scene->picture.wound ? drawn : "picture.wound is false");
 	leave_choose_out(plan, "bleeding",

@@ -65,6 +65,14 @@ static void set_model(const struct incise_plan *plan, struct incise_double_plan 
 		to->numbers.phases |= T_WITHDRAWS;
 }
 
+/* A haptic device starts more slowly. */
+static double ramp_ms(const struct incise_plan *plan)
+{
+	double own_s = plan->stylus ? incise_stylus_setup(plan->stylus)->start_s : 0;
+
+	return fmax(plan->scene->limits.ramp_ms, own_s * 1e3);
+}
+
 void incise_plan_set_numbers(struct incise_plan *plan)
 {
 	const struct incise_scene *scene = plan->scene;
@@ -86,7 +94,7 @@ void incise_plan_set_numbers(struct incise_plan *plan)
 		.upright = plan->upright,
 		.incision = incise_scene_cuts(scene),
 		.small = scene->limits.start_N,
-		.ramp_ns = scene->limits.ramp_ms * 1e6,
+		.ramp_ns = ramp_ms(plan) * 1e6,
 		.fade_ns = scene->limits.fade_ms * 1e6,
 		.force = scene->limits.force_N,
 		.slew = scene->limits.slew_N_s / scene->rate_hz,

@@ -91,7 +91,10 @@ int incise_plan_release(struct incise_plan *plan)
 	int rc = plan->kernel.runs && !plan->kernel.feeds
 			 ? 0
 			 : incise_axes_release(&plan->axes, plan->fault);
+	const double none[3] = {0};
+	int pushed = plan->stylus ? incise_stylus_push(plan->stylus, none) : 0;
 
+	rc = rc ? rc : pushed;
 	if (!plan->fault)
 		plan->fault = rc;
 	return rc;
@@ -109,6 +112,11 @@ const char *incise_plan_fault(const struct incise_plan *plan)
 void incise_plan_poses(const struct incise_plan *plan, struct incise_pose_counts *counts)
 {
 	*counts = plan->poses.counts;
+}
+
+enum incise_stylus_off incise_plan_off(const struct incise_plan *plan)
+{
+	return plan->off;
 }
 
 char incise_plan_pose_flag(const struct incise_plan *plan)

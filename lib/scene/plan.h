@@ -12,6 +12,7 @@
 #include "../control/host_path.h"
 #include "../control/model_input.h"
 #include "../control/predict.h"
+#include "../rig/stylus.h"
 #include "../surface/surface.h"
 #include "../tissue/incision.h"
 #include "actuate.h"
@@ -148,7 +149,9 @@ struct incise_plan {
 	struct incise_doubles doubles;	  /* by all of the above */
 	struct incise_integers *integers; /* with arithmetic = "fixed"; else NULL */
 	double last_N[3];		  /* rendered last */
-	struct incise_axes axes;	  /* without axes nothing is rendered */
+	struct incise_axes axes;	  /* without axes nothing is rendered … */
+	struct incise_stylus *stylus;	  /* … but by a haptic device; or NULL */
+	enum incise_stylus_off off; /* of it, at the last tick; then the force fades */
 	struct incise_plan_kernel kernel;
 };
 
@@ -162,7 +165,8 @@ static inline bool incise_plan_has_model(const struct incise_plan *plan,
 
 /* --- stages of devices --- */
 
-incise_stage_fn incise_stage_pose, incise_stage_fed, incise_stage_actuate;
+incise_stage_fn incise_stage_pose, incise_stage_fed, incise_stage_actuate,
+	incise_stage_push;
 
 /* --- plan --- */
 
@@ -219,6 +223,9 @@ void incise_plan_fade(struct incise_plan *plan, bool fading) INCISE_REALTIME;
 
 /* Whether a force that fades has reached zero. Real-time safe. */
 bool incise_plan_faded(const struct incise_plan *plan) INCISE_REALTIME;
+
+/* The reason why the rig's haptic device takes no force. Real-time safe. */
+enum incise_stylus_off incise_plan_off(const struct incise_plan *plan) INCISE_REALTIME;
 
 /* The flag of the scalpel's newest pose; ' ' or 0: no flag. Real-time safe. */
 char incise_plan_pose_flag(const struct incise_plan *plan) INCISE_REALTIME;

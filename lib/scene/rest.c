@@ -177,6 +177,8 @@ static void set_plan(struct search *s, const struct incise_plan *plan,
 	own->poses.tracker = NULL;
 	own->poses.tube_station = 0;
 	own->axes.n = 0;
+	own->stylus = NULL;
+	own->off = INCISE_STYLUS_ON;
 	own->poses.fed = s->fed;
 	own->poses.n_fed = 0;
 	/* The scene says how late all of the loop is, poses and all. */
@@ -195,6 +197,7 @@ static void set_plan(struct search *s, const struct incise_plan *plan,
 	for (int i = 0; i < own->n_stages; i++) {
 		/* Beside a cut tissue is the stiffest. */
 		if (own->stage[i].run == incise_stage_actuate ||
+		    own->stage[i].run == incise_stage_push ||
 		    own->stage[i].numbers.in_double == incise_double_stage_incision)
 			continue;
 		own->stage[n] = own->stage[i];
@@ -506,7 +509,7 @@ static void hold_rest(const struct search *s, struct rest_run *run)
 /* In the air, until the force may start. */
 static void start_rest(struct search *s, struct rest_run *run)
 {
-	double air_s = AIR_S + s->plan.scene->limits.ramp_ms * 1e-3;
+	double air_s = AIR_S + s->plan.doubles.plan.numbers.ramp_ns * 1e-9;
 	int ticks = (int)(air_s / s->device.period_s);
 
 	*run = (struct rest_run){.lean_N = 0};

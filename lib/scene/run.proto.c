@@ -13,7 +13,7 @@ static INCISE_REALTIME void take_pose(struct incise_plan *plan, bool tube,
 	struct T(pose) pose = {
 		.t_ns = sample->t_ns,
 		.tool = (uint32_t)plan->wanted | (tube ? INCISE_FIXED_POSE_TUBE : 0) |
-			(plan->fading ? INCISE_FIXED_POSE_FADE : 0),
+			(plan->fading || plan->off ? INCISE_FIXED_POSE_FADE : 0),
 	};
 	double size = 0;
 
@@ -102,7 +102,7 @@ static INCISE_REALTIME int run_tick(struct incise_plan *plan, int64_t t_ns,
 static INCISE_REALTIME void hold_tool(struct incise_plan *plan)
 {
 	OWN(plan)->state.wanted = (int32_t)plan->wanted;
-	OWN(plan)->state.fading = plan->fading;
+	OWN(plan)->state.fading = plan->fading || plan->off;
 }
 
 static INCISE_REALTIME bool has_faded(const struct incise_plan *plan)

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The stages of devices: the tracker's poses, and the actuators.
+ * The stages of devices: the tracker's poses, and the actuators or a haptic device.
  */
 #include <errno.h>
+#include "../base/vector.h"
 #include "plan.h"
 
 static bool is_tube(const struct incise_plan *plan, uint8_t station)
@@ -59,6 +60,17 @@ static void take_stages(struct incise_plan *plan, struct incise_tracker_sample *
 		tick->flags |= INCISE_TICK_UNUSABLE;
 }
 
+/* A haptic device that is off takes no force: the plan fades its own, and lets it return. */
+static INCISE_REALTIME void watch_stylus(struct incise_plan *plan, int64_t now_ns)
+{
+	enum incise_stylus_off off = incise_stylus_off(plan->stylus, now_ns);
+
+	if (off == plan->off)
+		return;
+	plan->off = off;
+	plan->ops.hold(plan);
+}
+
 int incise_stage_pose(struct incise_plan *plan, struct incise_tick *tick)
 {
 	struct incise_tracker_sample samples[INCISE_PLAN_POSES];
@@ -69,6 +81,8 @@ int incise_stage_pose(struct incise_plan *plan, struct incise_tick *tick)
 			    tick->t_ns - plan->poses.unusable_ns >= INCISE_PLAN_BLIND_NS;
 	if (plan->poses.blind)
 		return -ENODEV;
+	if (plan->stylus)
+		watch_stylus(plan, tick->t_ns);
 	return n < 0 ? n : 0;
 }
 
@@ -82,4 +96,11 @@ int incise_stage_fed(struct incise_plan *plan, struct incise_tick *tick)
 int incise_stage_actuate(struct incise_plan *plan, struct incise_tick *tick)
 {
 	return incise_axes_render(&plan->axes, plan->last_N, tick);
+}
+
+int incise_stage_push(struct incise_plan *plan, struct incise_tick *tick)
+{
+	v3_copy(tick->actuated_N, plan->last_N);
+	v3_copy(tick->rendered_N, plan->last_N);
+	return incise_stylus_push(plan->stylus, plan->last_N);
 }

@@ -226,9 +226,30 @@ static void set_delay(struct incise_plan *plan, const struct incise_tracker_info
 			(tracker->rate_hz > 0 ? 1 / tracker->rate_hz : 0);
 	double ticks = ceil(late_s / device->period_s - 1e-9);
 
-	plan->stability.own_delay = plan->scene->device.delay_ticks >= 0;
+	/* A haptic device says its own. */
+	plan->stability.own_delay = plan->scene->device.delay_ticks >= 0 && !plan->stylus;
 	device->delay_ticks = plan->stability.own_delay ? plan->scene->device.delay_ticks
 							: (int)fmin(ticks, INT_MAX);
+}
+
+/* The lateness of a haptic device in place of the scene's. */
+static int set_own_lateness(struct incise_plan *plan,
+			    const struct incise_haptic_info *info,
+			    struct incise_error *err)
+{
+	struct incise_plan_stability *s = &plan->stability;
+	double ticks = ceil((double)info->force_latency_ns /
+				    (s->device.period_s * INCISE_NS_PER_S) -
+			    1e-9);
+
+	if (ticks > INCISE_POSE_LOOP_LATE_MAX)
+		return incise_error_set(
+			err, EDOM,
+			"%s: %s: its force is %.0f ticks late: stability can be checked "
+			"up to %d; lower rate_hz, or correct haptic_setup.force_latency_ms",
+			plan->scene->path, info->name, ticks, INCISE_POSE_LOOP_LATE_MAX);
+	s->late_ticks = (int)ticks;
+	return 0;
 }
 
 /* Lateness of each actuator: the scene's, or rig.conf's for this actuator. */
@@ -362,6 +383,7 @@ int incise_plan_survey(struct incise_plan *plan,
 {
 	struct incise_plan_stability *s = &plan->stability;
 	const struct incise_scene *scene = plan->scene;
+	struct incise_haptic_info info;
 
 	s->device = (struct incise_haptic_device){
 		.mass_kg = scene->device.mass_kg,
@@ -370,9 +392,17 @@ int incise_plan_survey(struct incise_plan *plan,
 		.encoder_mm = scene->device.encoder_mm,
 		.period_s = 1 / scene->rate_hz,
 	};
+	if (plan->stylus) {
+		incise_stylus_info(plan->stylus, &info);
+		s->device.mass_kg = info.mass_kg;
+		s->device.damping_N_s_mm = info.damping_N_s_mm;
+		s->device.coulomb_N = info.coulomb_N;
+		s->device.encoder_mm = info.encoder_mm;
+	}
 	set_delay(plan, tracker);
 	s->certified = true;
-	if (set_lateness(plan, err))
+	if (set_lateness(plan, err) ||
+	    (plan->stylus && set_own_lateness(plan, &info, err)))
 		return -EDOM;
 	if ((plan->model || plan->fixed) && survey_model(plan))
 		return incise_error_set(err, ENOMEM, "no memory for a plan");

@@ -42,6 +42,13 @@ struct incise_camera *incise_sim_camera_new(struct incise_sim *sim);
 struct incise_stepper *incise_sim_stepper_new(struct incise_sim *sim, int axis);
 
 /*
+ * A simulated haptic device, with a hand on it, by the arguments "KEY=VALUE,…"; on its own, without
+ * the virtual rig. NULL with errno EINVAL, ENOMEM.
+ */
+struct incise_haptic *incise_sim_haptic_new(const struct incise_backend_request *request,
+					    struct incise_error *err);
+
+/*
  * Directions of the actuators: out of the surface, whose normal is @normal; across the blade,
  * along y; along the cut, x. Returns how many there are.
  */

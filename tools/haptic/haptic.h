@@ -2,8 +2,8 @@
 /*
  * A running haptic loop, and the parts of incise haptic that share it.
  */
-#ifndef INCISE_HAPTIC_H
-#define INCISE_HAPTIC_H
+#ifndef INCISE_TOOLS_HAPTIC_H
+#define INCISE_TOOLS_HAPTIC_H
 
 #include <incise/loop.h>
 #include <incise/realtime.h>

@@ -22,6 +22,7 @@
 #include <incise/clock.h>
 #include <incise/error.h>
 #include <incise/force.h>
+#include <incise/haptic.h>
 #include <incise/scan.h>
 #include <incise/stepper.h>
 #include <incise/stepper_plan.h>
@@ -63,6 +64,37 @@ struct incise_force_ops {
 /** A force channel: the first member of its backend's struct. */
 struct incise_force {
 	const struct incise_force_ops *ops;
+};
+
+/** Functions of a haptic device; see incise/haptic.h. Its owner calls them, never a loop. */
+struct incise_haptic_ops {
+	/** As incise_haptic_read(). */
+	int (*read)(struct incise_haptic *haptic, struct incise_haptic_sample *samples,
+		    int n) INCISE_REALTIME;
+	/** As incise_haptic_push(), of numbers that are finite and within the device's limits. */
+	int (*push)(struct incise_haptic *haptic, const double force_N[3],
+		    const double torque_N_mm[3]) INCISE_REALTIME;
+	/**
+	 * Wait for the device's next sample, at most @most_ns: of a device that is the clock, or
+	 * whose messages need a poll(2). 0, or -EINTR. NULL: its owner waits by the clock, at
+	 * info.rate_hz.
+	 */
+	int (*wait)(struct incise_haptic *haptic, int64_t most_ns);
+	/** Without the settings of the rig, which go before it. */
+	void (*info)(const struct incise_haptic *haptic, struct incise_haptic_info *info);
+	uint64_t (*lost)(const struct incise_haptic *haptic);
+	/** No force, then close. */
+	void (*close)(struct incise_haptic *haptic);
+	/** Cause of an error, or of a flag of the last sample; may be NULL. */
+	int (*cause)(struct incise_haptic *haptic, char *text, size_t size);
+};
+
+/** A haptic device: the first member of its backend's struct. */
+struct incise_haptic {
+	const struct incise_haptic_ops *ops;
+	/* Of the library, set after open(). */
+	struct incise_haptic_info info; /**< with the settings of the rig */
+	void *module;
 };
 
 /** Functions of a camera; see incise/camera.h. */
@@ -308,7 +340,7 @@ struct incise_actuator {
 };
 
 /** Version of the structs and values that backends use. */
-#define INCISE_BACKEND_ABI 11
+#define INCISE_BACKEND_ABI 12
 
 /** Settings of rig.conf for a backend. */
 struct incise_backend_request {
@@ -321,6 +353,7 @@ struct incise_backend_request {
 	const struct incise_tracker_setup *tracker;
 	const struct incise_force_setup *force;
 	const struct incise_camera_setup *camera;
+	const struct incise_haptic_setup *haptic;
 	const struct incise_vision_setup *vision; /**< to be checked */
 	/**
 	 * For a stepper: the rig's steppers that this backend opened before; they may be
@@ -344,7 +377,7 @@ struct incise_backend_request {
  */
 struct incise_backend {
 	unsigned int abi; /**< INCISE_BACKEND_ABI */
-	const char *kind; /**< "tracker", "force", "camera", "stepper", "driver", … */
+	const char *kind; /**< "tracker", "force", "camera", "stepper", "haptic", … */
 	const char *name; /**< fewer than 32 letters a to z, digits, underscores */
 	/**
 	 * Open a device. close() must bring a powered device to rest.

@@ -5,6 +5,7 @@
  * rig.conf names them (incise/backend.h).
  *
  *     clock   = "real";          # or "simulated"
+ *     haptic  = "haply:";        # in place of tracker and stepper
  *     tracker = "sim:";
  *     force   = "sim:";
  *     camera  = "sim:";
@@ -23,6 +24,7 @@
 #include <incise/export.h>
 #include <incise/foot_switch.h>
 #include <incise/force.h>
+#include <incise/haptic.h>
 #include <incise/stepper.h>
 #include <incise/tracker.h>
 #include <incise/vision.h>
@@ -46,13 +48,18 @@ enum incise_rig_device {
 	INCISE_RIG_WATCH = 16,
 	/** With CAMERA: only if a rig.conf names one; "sim:KEY=VALUE,…" names no camera. */
 	INCISE_RIG_IF_NAMED = 32,
+	/**
+	 * The haptic device. It is opened for TRACKER and STEPPER, too, in a rig that has one.
+	 */
+	INCISE_RIG_HAPTIC = 64,
 };
 
 /**
  * Open a rig.
  *
  * @param spec    path of a rig.conf, or "sim:KEY=VALUE,…" for a simulated rig with the scalar
- *                keys of the `sim` group and `clock`; "sim:" for its defaults
+ *                keys of the `sim` group and `clock`; "sim:" for its defaults; or a haptic
+ *                device alone, "haply:", "sim:haptic,KEY=VALUE,…"
  * @param devices incise_rig_device bits to open
  * @return rig, to be closed with incise_rig_close(); NULL with errno of incise_infile_open(),
  *         EINVAL (syntax, unknown key, value out of range; the message has file and line),
@@ -94,6 +101,9 @@ INCISE_API struct incise_stepper *incise_rig_stepper(struct incise_rig *rig);
  */
 INCISE_API struct incise_stepper *incise_rig_axis(struct incise_rig *rig, int i,
 						  double direction[3]);
+
+/** The haptic device, or NULL; owned by the rig. Its poses are the rig's tracker, too. */
+INCISE_API struct incise_haptic *incise_rig_haptic(struct incise_rig *rig);
 
 /** The simulated rig of the `sim:` devices, or NULL; owned by the rig. */
 INCISE_API struct incise_sim *incise_rig_sim(struct incise_rig *rig);

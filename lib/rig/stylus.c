@@ -1,0 +1,339 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * A haptic device as the tool of a rig; see stylus.h.
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "../base/vector.h"
+#include "stylus.h"
+
+#define SAMPLES 32
+#define PLACE_MOST_MM 1e6
+/* Of the workspace along each axis, about its middle, where a force may begin. */
+#define MIDDLE 0.5
+/* An age is late beyond the assumed one by a quarter and half a millisecond, as a mean of so many ticks. */
+#define LATE_SHARE 1.25
+#define LATE_NS 500000
+#define AGE_TICKS 64
+
+struct incise_stylus {
+	struct incise_tracker tracker; /* the poses' face */
+	struct incise_haptic *haptic;
+	struct incise_haptic_info info;
+	struct incise_haptic_setup setup;
+	struct incise_haptic_sample last; /* device's frame */
+	bool seen;
+	double turn[4], origin_mm[3];
+	double held_mm
+		[3]; /* in the scene, where the tool was as the clutch was pressed */
+	bool clutched;
+	enum incise_stylus_off off;
+	int64_t latency_ns; /* assumed */
+	double age_ns;	    /* mean of the last ticks */
+	struct incise_stylus_ages ages;
+	double age_sum_ms, age_sum2_ms2;
+};
+
+static struct incise_stylus *of_stylus(struct incise_tracker *tracker)
+{
+	return (struct incise_stylus *)tracker;
+}
+
+static INCISE_REALTIME void multiply_turns(double q[4], const double a[4],
+					   const double b[4])
+{
+	double cross[3];
+
+	v3_cross(cross, a + 1, b + 1);
+	q[0] = a[0] * b[0] - v3_dot(a + 1, b + 1);
+	for (int i = 1; i < 4; i++)
+		q[i] = a[0] * b[i] + b[0] * a[i] + cross[i - 1];
+}
+
+static INCISE_REALTIME bool is_pressed(const struct incise_haptic_sample *sample,
+				       int button)
+{
+	return button > 0 && sample->buttons >> (button - 1) & 1;
+}
+
+/* --- poses --------------------------------------------------------------------------- */
+
+static INCISE_REALTIME void place_tool(struct incise_stylus *stylus,
+				       const struct incise_haptic_sample *sample,
+				       double position_mm[3])
+{
+	v3_rotate(position_mm, stylus->turn, sample->position_mm);
+	v3_add(position_mm, position_mm, 1, stylus->origin_mm);
+}
+
+/* While pressed the tool stays; let go it is where it stayed. */
+static INCISE_REALTIME void use_clutch(struct incise_stylus *stylus,
+				       const struct incise_haptic_sample *sample,
+				       double position_mm[3])
+{
+	bool pressed = is_pressed(sample, stylus->setup.clutch);
+
+	if (pressed && !stylus->clutched)
+		v3_copy(stylus->held_mm, position_mm);
+	if (pressed || stylus->clutched)
+		for (int i = 0; i < 3; i++)
+			stylus->origin_mm[i] += stylus->held_mm[i] - position_mm[i];
+	if (pressed || stylus->clutched)
+		v3_copy(position_mm, stylus->held_mm);
+	stylus->clutched = pressed;
+}
+
+static INCISE_REALTIME bool is_plain(const struct incise_haptic_sample *sample)
+{
+	double size2 = 0;
+
+	for (int i = 0; i < 3; i++)
+		if (!(fabs(sample->position_mm[i]) < PLACE_MOST_MM))
+			return false;
+	for (int i = 0; i < 4; i++)
+		size2 += sample->quaternion[i] * sample->quaternion[i];
+	return size2 > 0.98 && size2 < 1.02;
+}
+
+static INCISE_REALTIME void take_sample(struct incise_stylus *stylus,
+					const struct incise_haptic_sample *from,
+					struct incise_tracker_sample *to)
+{
+	*to = (struct incise_tracker_sample){
+		.t_ns = from->t_ns + stylus->info.latency_ns,
+		.seq = from->seq,
+		.status = ' ',
+		.station = 1,
+		.button = from->buttons,
+		.quaternion = {1},
+	};
+	stylus->ages.samples++;
+	if (!is_plain(from)) {
+		to->status = '~';
+		return;
+	}
+	if (from->flags & INCISE_HAPTIC_NOT_READY)
+		to->status = '!';
+	place_tool(stylus, from, to->position_mm);
+	use_clutch(stylus, from, to->position_mm);
+	multiply_turns(to->quaternion, stylus->turn, from->quaternion);
+	stylus->last = *from;
+	stylus->seen = true;
+}
+
+static INCISE_REALTIME int read_stylus(struct incise_tracker *tracker,
+				       struct incise_tracker_sample *samples, int n)
+{
+	struct incise_stylus *stylus = of_stylus(tracker);
+	struct incise_haptic_sample from[SAMPLES];
+	int got;
+
+	if (n > SAMPLES)
+		n = SAMPLES;
+	got = incise_haptic_read(stylus->haptic, from, n);
+	for (int i = 0; i < got; i++)
+		take_sample(stylus, &from[i], &samples[i]);
+	return got;
+}
+
+static void get_info(const struct incise_tracker *tracker,
+		     struct incise_tracker_info *info)
+{
+	const struct incise_stylus *stylus = (const struct incise_stylus *)tracker;
+
+	*info = (struct incise_tracker_info){
+		.rate_hz = stylus->info.rate_hz,
+		.latency_ns = stylus->latency_ns,
+		.stations = 1,
+		.scalpel_station = 1,
+	};
+	snprintf(info->name, sizeof(info->name), "%s", stylus->info.name);
+	snprintf(info->note, sizeof(info->note), "%s", stylus->info.note);
+}
+
+static uint64_t count_lost(const struct incise_tracker *tracker)
+{
+	return incise_haptic_lost(((const struct incise_stylus *)tracker)->haptic);
+}
+
+static int tell_cause(struct incise_tracker *tracker, char *text, size_t size)
+{
+	return incise_haptic_cause(of_stylus(tracker)->haptic, text, size);
+}
+
+/* The rig closes the device. */
+static void close_face(struct incise_tracker *tracker)
+{
+	(void)tracker;
+}
+
+static const struct incise_tracker_ops poses = {
+	.read = read_stylus,
+	.info = get_info,
+	.lost = count_lost,
+	.close = close_face,
+	.cause = tell_cause,
+};
+
+/* --- force --------------------------------------------------------------------------- */
+
+static INCISE_REALTIME bool is_in_middle(const struct incise_stylus *stylus)
+{
+	const struct incise_haptic_info *info = &stylus->info;
+
+	for (int i = 0; i < 3; i++) {
+		double half_mm = (info->high_mm[i] - info->low_mm[i]) / 2;
+		double middle_mm = info->low_mm[i] + half_mm;
+
+		if (half_mm > 0 &&
+		    !(fabs(stylus->last.position_mm[i] - middle_mm) <= MIDDLE * half_mm))
+			return false;
+	}
+	return true;
+}
+
+/* A period is the time for which a pose is used. */
+static INCISE_REALTIME int64_t assumed_ns(const struct incise_stylus *stylus)
+{
+	return stylus->latency_ns + (int64_t)(INCISE_NS_PER_S / stylus->info.rate_hz);
+}
+
+static INCISE_REALTIME void count_age(struct incise_stylus *stylus, int64_t now_ns)
+{
+	struct incise_stylus_ages *ages = &stylus->ages;
+	double age_ns = (double)(now_ns - stylus->last.t_ns);
+
+	stylus->age_ns += (age_ns - stylus->age_ns) / AGE_TICKS;
+	ages->ticks++;
+	stylus->age_sum_ms += age_ns * 1e-6;
+	stylus->age_sum2_ms2 += age_ns * age_ns * 1e-12;
+	ages->most_ms = fmax(ages->most_ms, age_ns * 1e-6);
+}
+
+/* The reason to be off now, wherever the handle is. */
+static INCISE_REALTIME enum incise_stylus_off find_reason(
+	const struct incise_stylus *stylus)
+{
+	const struct incise_haptic_sample *last = &stylus->last;
+
+	if (!stylus->seen ||
+	    last->flags & (INCISE_HAPTIC_NOT_READY | INCISE_HAPTIC_PROTECTED |
+			   INCISE_HAPTIC_CHANGED))
+		return INCISE_STYLUS_NOT_READY;
+	if (stylus->clutched)
+		return INCISE_STYLUS_CLUTCH;
+	if (stylus->setup.enable && !is_pressed(last, stylus->setup.enable))
+		return INCISE_STYLUS_ENABLE;
+	if (stylus->age_ns > LATE_SHARE * (double)assumed_ns(stylus) + LATE_NS)
+		return INCISE_STYLUS_LATE;
+	return INCISE_STYLUS_ON;
+}
+
+enum incise_stylus_off incise_stylus_off(struct incise_stylus *stylus, int64_t now_ns)
+{
+	enum incise_stylus_off reason;
+
+	if (stylus->seen)
+		count_age(stylus, now_ns);
+	reason = find_reason(stylus);
+	if (reason != INCISE_STYLUS_ON)
+		stylus->off = reason;
+	else if (stylus->off != INCISE_STYLUS_ON)
+		stylus->off =
+			is_in_middle(stylus) ? INCISE_STYLUS_ON : INCISE_STYLUS_OUTSIDE;
+	return stylus->off;
+}
+
+const char *incise_stylus_off_text(enum incise_stylus_off off)
+{
+	static const char *const texts[] = {
+		[INCISE_STYLUS_ON] = "on",
+		[INCISE_STYLUS_OUTSIDE] =
+			"move the handle to the middle of its workspace to start",
+		[INCISE_STYLUS_CLUTCH] = "the clutch is pressed",
+		[INCISE_STYLUS_ENABLE] = "press the enabling button",
+		[INCISE_STYLUS_NOT_READY] = "the device is not ready",
+		[INCISE_STYLUS_LATE] = "poses are older than the plan assumed",
+	};
+
+	return texts[off];
+}
+
+int incise_stylus_push(struct incise_stylus *stylus, const double force_N[3])
+{
+	const double back[4] = {stylus->turn[0], -stylus->turn[1], -stylus->turn[2],
+				-stylus->turn[3]};
+	double own_N[3];
+
+	v3_rotate(own_N, back, force_N);
+	return incise_haptic_push(stylus->haptic, own_N, NULL);
+}
+
+/* --- the stylus ---------------------------------------------------------------------- */
+
+struct incise_stylus *incise_stylus_new(struct incise_haptic *haptic,
+					const struct incise_haptic_setup *setup)
+{
+	struct incise_stylus *stylus = calloc(1, sizeof(*stylus));
+
+	if (!stylus)
+		return NULL;
+	stylus->setup = *setup;
+	stylus->tracker.ops = &poses;
+	stylus->haptic = haptic;
+	incise_haptic_info(haptic, &stylus->info);
+	stylus->off = INCISE_STYLUS_OUTSIDE;
+	stylus->latency_ns = stylus->info.latency_ns;
+	stylus->age_ns = (double)assumed_ns(stylus);
+	incise_stylus_place(stylus, setup->turn, setup->origin_mm);
+	return stylus;
+}
+
+void incise_stylus_free(struct incise_stylus *stylus)
+{
+	free(stylus);
+}
+
+struct incise_tracker *incise_stylus_tracker(struct incise_stylus *stylus)
+{
+	return &stylus->tracker;
+}
+
+const struct incise_haptic_setup *incise_stylus_setup(const struct incise_stylus *stylus)
+{
+	return &stylus->setup;
+}
+
+void incise_stylus_info(const struct incise_stylus *stylus,
+			struct incise_haptic_info *info)
+{
+	*info = stylus->info;
+}
+
+void incise_stylus_place(struct incise_stylus *stylus, const double turn[4],
+			 const double origin_mm[3])
+{
+	memcpy(stylus->turn, turn, sizeof(stylus->turn));
+	v3_copy(stylus->origin_mm, origin_mm);
+}
+
+void incise_stylus_assume(struct incise_stylus *stylus, int64_t latency_ns)
+{
+	stylus->latency_ns = latency_ns;
+}
+
+void incise_stylus_ages(const struct incise_stylus *stylus,
+			struct incise_stylus_ages *ages)
+{
+	*ages = stylus->ages;
+	ages->lost = incise_haptic_lost(stylus->haptic);
+	ages->assumed_ms = (double)assumed_ns(stylus) * 1e-6;
+	if (!ages->ticks)
+		return;
+	ages->mean_ms = stylus->age_sum_ms / (double)ages->ticks;
+	ages->jitter_ms = sqrt(fmax(0, stylus->age_sum2_ms2 / (double)ages->ticks -
+					       ages->mean_ms * ages->mean_ms));
+}
