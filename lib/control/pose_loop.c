@@ -28,7 +28,7 @@
 /* For a mean over more ticks than one and these, each holds several. */
 #define CELLS_MOST 31
 
-/* Part of a tick that a pose waits before it is taken in: the mean. */
+/* Part of a tick, or of the shorter time between poses, that the last one waits before it is taken in: the mean. */
 #define LEAD 0.5
 
 /*
@@ -46,7 +46,8 @@ struct loop {
 	double tick_s, pose_s, latency_s;
 	int ticks, poses;	/* in a period */
 	int waiting;		/* poses on their way when a period starts */
-	int late;		/* ticks until a force acts */
+	int late;		/* ticks until a force acts … */
+	double early_s;		/* … less this */
 	int cells;		/* of the mean … */
 	double cell_ticks;	/* … and so many ticks in each */
 	int own_states, states; /* of an axis */
@@ -64,7 +65,7 @@ struct pose_loop_run {
 	double late_N[INCISE_POSE_LOOP_LATE_MAX + 1]
 		     [3];		   /* on their way, the oldest first */
 	double cell_mm[CELLS_MOST + 1][3]; /* places before this tick, the oldest first */
-	double t_s;
+	double t_s, change_s; /* … and when the next of them acts, before a tick */
 };
 
 static int64_t to_ns(double t_s)
@@ -109,12 +110,21 @@ static double unit(const struct loop *loop, int state)
 	return late >= 0 && late < loop->late && most_N_mm > 0 ? most_N_mm : 1;
 }
 
-static void go_to(struct pose_loop_run *run, double t_s)
+static void go_straight(struct pose_loop_run *run, double t_s)
 {
 	for (int i = 0; i < 3; i++)
 		incise_plant_step(&run->plant[i], run->force_N[i],
 				  fmax(t_s - run->t_s, 0));
 	run->t_s = t_s;
+}
+
+static void go_to(struct pose_loop_run *run, double t_s)
+{
+	if (run->change_s > run->t_s && run->change_s <= t_s) {
+		go_straight(run, run->change_s);
+		v3_copy(run->force_N, run->late_N[0]);
+	}
+	go_straight(run, t_s);
 }
 
 static void take_place(struct pose_loop_run *run, const double at_mm[3], double arrival_s)
@@ -176,6 +186,7 @@ static void set_force(const struct loop *loop, struct pose_loop_run *run,
 	memcpy(run->force_N, run->late_N[0], sizeof(run->force_N));
 	memmove(run->late_N[0], run->late_N[1],
 		(size_t)loop->late * sizeof(run->late_N[0]));
+	run->change_s = run->t_s + (loop->early_s > 0 ? loop->tick_s - loop->early_s : 0);
 }
 
 /* A step of a host. */
@@ -206,10 +217,16 @@ static void run_step(const struct loop *loop, struct pose_loop_run *run)
 	}
 }
 
+/* The time for which a pose waits. */
+static double lead(const struct loop *loop)
+{
+	return LEAD * fmin(loop->tick_s, loop->pose_s);
+}
+
 /* Round a period: the last poses are taken in before the tick that starts the next one. */
 static void run_period(const struct loop *loop, struct pose_loop_run *run)
 {
-	double lead_s = LEAD * loop->tick_s, force_N[3];
+	double lead_s = lead(loop), force_N[3];
 	int taken = 0;
 
 	for (int k = 1; k <= loop->ticks; k++) {
@@ -291,8 +308,7 @@ static void set_times(struct loop *loop, double tick_s)
 	loop->poses = (int)fmax(tick_s / pose_s + 1e-9, 1);
 	loop->pose_s = fmax(pose_s, tick_s / loop->poses);
 	loop->tick_s = loop->pose_s * loop->poses / loop->ticks;
-	loop->waiting =
-		(int)((loop->latency_s + LEAD * loop->tick_s) / loop->pose_s + 1e-9);
+	loop->waiting = (int)((loop->latency_s + lead(loop)) / loop->pose_s + 1e-9);
 }
 
 /* A pose for each tick; a host's last one waits, with its velocity. */
@@ -312,7 +328,8 @@ static void set_predict(struct loop *loop)
 	p->period_s = loop->pose_s;
 	incise_double_predict_init(&p->now);
 	p->now.started = true;
-	p->now.arrival_ns = to_ns(-loop->tick_s * (loop->hosted ? loop->ticks : LEAD));
+	p->now.arrival_ns =
+		to_ns(-(loop->hosted ? loop->tick_s * loop->ticks : lead(loop)));
 	p->now.t_ns = p->now.arrival_ns - p->latency_ns;
 }
 
@@ -324,6 +341,7 @@ static void loop_init(struct loop *loop, const struct incise_pose_loop *of,
 	*loop = (struct loop){
 		.predict = *of->predict,
 		.late = of->late_ticks,
+		.early_s = of->early_s,
 		.map = *map,
 		.hosted = of->hold.ticks > 1,
 		.cubic = of->hold.ticks > 1 && of->hold.cubic,

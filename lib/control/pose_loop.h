@@ -52,7 +52,8 @@ struct incise_pose_loop {
 	double period_s; /* of a tick */
 	/* As initialised for the tracker: its gains, period and latency count. */
 	const struct incise_predict *predict;
-	int late_ticks; /* until a force acts, 0 … INCISE_POSE_LOOP_LATE_MAX */
+	int late_ticks; /* until a force acts, 0 … INCISE_POSE_LOOP_LATE_MAX … */
+	double early_s; /* … less this part of the last of them */
 	/* With more ticks than one there is a host in place of the tracker, whose period is a tick. */
 	struct incise_host_hold hold;
 };

@@ -151,6 +151,7 @@ struct incise_plan {
 	double last_N[3];		  /* rendered last */
 	struct incise_axes axes;	  /* without axes nothing is rendered … */
 	struct incise_stylus *stylus;	  /* … but by a haptic device; or NULL */
+	double early_s; /* its force acts so much before stability.late_ticks have passed */
 	enum incise_stylus_off off; /* of it, at the last tick; then the force fades */
 	struct incise_plan_kernel kernel;
 };

@@ -159,6 +159,7 @@ struct rest_run {
 	double command_N[3];	       /* of the plan; a host holds it */
 	double late_N[INCISE_STABILITY_DELAY_MAX + 1][3];
 	double sent_N[3]; /* after the actuator's slew, along the axes */
+	double change_s;  /* when the next one acts, before a tick */
 	double noise_mm;  /* of each pose, sd */
 	uint64_t random;  /* its key */
 };
@@ -226,6 +227,7 @@ static void describe_device(const struct incise_plan *plan,
 		.pose_s = 1 / tracker->rate_hz,
 		.latency_s = (double)tracker->latency_ns / INCISE_NS_PER_S,
 		.late_ticks = plan->stability.late_ticks,
+		.early_s = plan->early_s,
 		.slew_N_s = INFINITY,
 		.force_N = plan->scene->limits.force_N,
 		.continuous_N = plan->scene->limits.force_N,
@@ -380,7 +382,7 @@ static void set_lean(const struct search *s, const struct rest_run *run, double 
 			run->lean_N * (s->way.askew * s->along[i] - s->way.at->normal[i]);
 }
 
-static void go_to(const struct search *s, struct rest_run *run, double t_s)
+static void go_straight(const struct search *s, struct rest_run *run, double t_s)
 {
 	double way_s = t_s - run->t_s, lean_N[3];
 
@@ -393,6 +395,15 @@ static void go_to(const struct search *s, struct rest_run *run, double t_s)
 	if (s->way.guided)
 		run->device[1].position_mm += s->way.along_mm_s * way_s;
 	run->t_s = t_s;
+}
+
+static void go_to(const struct search *s, struct rest_run *run, double t_s)
+{
+	if (run->change_s > run->t_s && run->change_s <= t_s) {
+		go_straight(s, run, run->change_s);
+		v3_copy(run->sent_N, run->late_N[0]);
+	}
+	go_straight(s, run, t_s);
 }
 
 /* Feed a place along the axes. */
@@ -490,6 +501,9 @@ static void tick(struct search *s, struct rest_run *run)
 	}
 	memmove(run->late_N, run->late_N + 1,
 		(size_t)s->device.late_ticks * sizeof(*run->late_N));
+	run->change_s =
+		run->t_s +
+		(s->device.early_s > 0 ? s->device.period_s - s->device.early_s : 0);
 	if (hosted)
 		run->next_pose_s = run->t_s + s->device.period_s;
 	else
@@ -781,6 +795,7 @@ static bool judge_linear(struct search *s, const struct rest_run *run, double de
 		.period_s = s->device.period_s,
 		.predict = &s->plan.predict,
 		.late_ticks = s->device.late_ticks,
+		.early_s = s->device.early_s,
 		.hold = s->plan.hold,
 	};
 	const double *at_mm = s->way.at->point_mm;

@@ -68,7 +68,8 @@ struct incise_device {
 	double period_s;       /* of ticks; a force is held so long */
 	double pose_s;	       /* from pose to pose … */
 	double latency_s;      /* … and how old one is when it comes */
-	int late_ticks;	       /* until a force acts */
+	int late_ticks;	       /* until a force acts … */
+	double early_s;	       /* … less this part of the last of them */
 	double slew_N_s;       /* the fastest that its force changes; infinite: at once */
 	double force_N;	       /* the largest … */
 	double continuous_N;   /* … and one that it keeps for ever */

@@ -249,6 +249,8 @@ static int set_own_lateness(struct incise_plan *plan,
 			"up to %d; lower rate_hz, or correct haptic_setup.force_latency_ms",
 			plan->scene->path, info->name, ticks, INCISE_POSE_LOOP_LATE_MAX);
 	s->late_ticks = (int)ticks;
+	plan->early_s = fmax(0, ticks * s->device.period_s -
+					(double)info->force_latency_ns * 1e-9);
 	return 0;
 }
 
