@@ -173,11 +173,11 @@ static INCISE_REALTIME double rub(const struct config *config, double before, do
 	return v - copysign(config->coulomb_N * STEP_S / mass, v);
 }
 
-/* By the midpoint's rule, which neither adds nor takes energy; @k: of the hand. */
+/* By the midpoint's rule, which neither adds nor takes energy. */
 static INCISE_REALTIME void move_handle(const struct config *config, struct axis *axis,
-					double force_N, double k, double place_mm)
+					double force_N, double place_mm)
 {
-	double m = 1e-3 * (config->mass_kg + config->hand_kg), v;
+	double m = 1e-3 * (config->mass_kg + config->hand_kg), k = config->hand_N_mm, v;
 	double A = STEP_S * (config->damping_N_s_mm + config->hand_N_s_mm) / m / 2;
 	double B = STEP_S * STEP_S * k / m / 4;
 
@@ -208,17 +208,14 @@ static INCISE_REALTIME void move_axis(struct sim_haptic *sim, int i, double plac
 {
 	const struct config *config = &sim->config;
 	struct axis *axis = &sim->axis[i];
-	double k = config->hand_N_mm, force_N = stop_force(config, axis->at);
+	double force_N = stop_force(config, axis->at);
 
 	axis->motor_N += (axis->pushed_N - axis->motor_N) * STEP_S /
 			 (STEP_S / 2 + fmax(config->motor_ms * 1e-3, STEP_S / 2));
 	force_N += axis->motor_N;
-	if (i == 2 && config->motion == LEAN &&
-	    (double)sim->t_ns * NS >= config->begin_s) {
-		k = 0;
+	if (i == 2 && config->motion == LEAN && (double)sim->t_ns * NS >= config->begin_s)
 		force_N -= config->lean_N;
-	}
-	move_handle(config, axis, force_N, k, place_mm);
+	move_handle(config, axis, force_N, place_mm);
 	follow_handle(config, axis);
 }
 
