@@ -48,9 +48,7 @@ struct config {
 
 #define SETTINGS_OF struct config
 #define REAL(name, ...) SETTING_NUMBER(name, name, __VA_ARGS__)
-#define FAULT(name, which, help) \
-	SETTING_NUMBER(name, fault_s[which], "s", 0, 1e6, "0", help)
-#define BUTTON(key, member, help) SETTING_NUMBER(key, member, "s", 0, 1e6, "0", help)
+#define TIME(name, member, help) SETTING_NUMBER(name, member, "s", 0, 1e6, "0", help)
 
 static const char *const motions[] = {"still", "press", "circle", "lean", NULL};
 
@@ -87,17 +85,17 @@ const struct incise_setting incise_sim_haptic_settings[] = {
 	REAL(depth_mm, "mm", -1e4, 1e4, "5", "press: so far below z = 0"),
 	REAL(radius_mm, "mm", 0, 1e4, "10", "circle: its radius"),
 	REAL(lean_N, "N", 0, 100, "1", "lean: the constant force down"),
-	BUTTON(button1_from_s, button_from_s[0], "button 1 is pressed from here …"),
-	BUTTON(button1_to_s, button_to_s[0], "… to here"),
-	BUTTON(button2_from_s, button_from_s[1], "button 2 is pressed from here …"),
-	BUTTON(button2_to_s, button_to_s[1], "… to here"),
-	FAULT(unplugged_s, UNPLUGGED, "an error from here; 0 in these: never"),
-	FAULT(dies_s, DIES, "no more samples from here"),
-	FAULT(nan_s, GIVES_NAN, "positions are no numbers from here"),
-	FAULT(late_s, LATE, "samples are later by late_ms from here"),
+	TIME(button1_from_s, button_from_s[0], "button 1 is pressed from here …"),
+	TIME(button1_to_s, button_to_s[0], "… to here"),
+	TIME(button2_from_s, button_from_s[1], "button 2 is pressed from here …"),
+	TIME(button2_to_s, button_to_s[1], "… to here"),
+	TIME(unplugged_s, fault_s[UNPLUGGED], "an error from here; 0 in these: never"),
+	TIME(dies_s, fault_s[DIES], "no more samples from here"),
+	TIME(nan_s, fault_s[GIVES_NAN], "positions are no numbers from here"),
+	TIME(late_s, fault_s[LATE], "samples are later by late_ms from here"),
 	REAL(late_ms, "ms", 0, 1000, "20", "by so much"),
-	FAULT(changes_s, CHANGES, "the device is another one from here"),
-	FAULT(not_ready_s, NOT_READY, "the device is not ready from here"),
+	TIME(changes_s, fault_s[CHANGES], "the device is another one from here"),
+	TIME(not_ready_s, fault_s[NOT_READY], "the device is not ready from here"),
 	{0},
 };
 
@@ -111,11 +109,6 @@ struct push {
 	double force_N[3];
 };
 
-struct arrival {
-	int64_t t_ns;
-	struct incise_haptic_sample sample;
-};
-
 struct sim_haptic {
 	struct incise_haptic haptic;
 	struct config config;
@@ -123,9 +116,8 @@ struct sim_haptic {
 	int64_t start_ns, t_ns; /* of the script, by the clock; of the script */
 	int64_t fed_ns;		/* of the script, at the last push */
 	uint64_t n, key;	/* next sample; of its noise */
-	double last_mm[3];	/* of the last sample */
 	struct axis axis[3];
-	struct incise_sim_ring pushes, arrivals;
+	struct incise_sim_ring pushes, samples;
 };
 
 static struct sim_haptic *of_haptic(const struct incise_haptic *haptic)
@@ -136,9 +128,8 @@ static struct sim_haptic *of_haptic(const struct incise_haptic *haptic)
 static INCISE_REALTIME bool has_fault(const struct sim_haptic *sim, enum fault fault,
 				      int64_t t_ns)
 {
-	double from_s = sim->config.fault_s[fault];
-
-	return from_s > 0 && (double)t_ns * NS >= from_s;
+	return sim->config.fault_s[fault] > 0 &&
+	       (double)t_ns * NS >= sim->config.fault_s[fault];
 }
 
 /* --- hand and device -------------------------------------------------------------------- */
@@ -162,27 +153,18 @@ static INCISE_REALTIME void place_hand(const struct config *config, double t_s,
 	}
 }
 
-/* What friction leaves of a speed that other forces would give. */
-static INCISE_REALTIME double rub(const struct config *config, double before, double v,
-				  double mass)
-{
-	double most_N = config->coulomb_N + (before == 0 ? config->stiction_N : 0);
-
-	if (fabs(v) <= most_N * STEP_S / mass)
-		return 0;
-	return v - copysign(config->coulomb_N * STEP_S / mass, v);
-}
-
-/* By the midpoint's rule, which neither adds nor takes energy. */
+/* By the midpoint's rule, which neither adds nor takes energy; then friction takes its part of the speed. */
 static INCISE_REALTIME void move_handle(const struct config *config, struct axis *axis,
 					double force_N, double place_mm)
 {
-	double m = 1e-3 * (config->mass_kg + config->hand_kg), k = config->hand_N_mm, v;
+	double m = 1e-3 * (config->mass_kg + config->hand_kg), k = config->hand_N_mm;
 	double A = STEP_S * (config->damping_N_s_mm + config->hand_N_s_mm) / m / 2;
-	double B = STEP_S * STEP_S * k / m / 4;
+	double B = STEP_S * STEP_S * k / m / 4, v, rub;
 
 	v = axis->v * (1 - A - B) + STEP_S * (force_N - k * (axis->at - place_mm)) / m;
-	v = rub(config, axis->v, v / (1 + A + B), m);
+	v /= 1 + A + B;
+	rub = STEP_S * (config->coulomb_N + (axis->v == 0 ? config->stiction_N : 0)) / m;
+	v = fabs(v) <= rub ? 0 : v - copysign(STEP_S * config->coulomb_N / m, v);
 	axis->at += STEP_S * (axis->v + v) / 2;
 	axis->v = v;
 }
@@ -197,22 +179,16 @@ static INCISE_REALTIME void follow_handle(const struct config *config, struct ax
 					       : copysign(half_mm, axis->motor_N));
 }
 
-static INCISE_REALTIME double stop_force(const struct config *config, double at)
-{
-	double beyond_mm = fabs(at) - config->workspace_mm / 2;
-
-	return beyond_mm > 0 ? -copysign(config->stop_N_mm * beyond_mm, at) : 0;
-}
-
 static INCISE_REALTIME void move_axis(struct sim_haptic *sim, int i, double place_mm)
 {
 	const struct config *config = &sim->config;
 	struct axis *axis = &sim->axis[i];
-	double force_N = stop_force(config, axis->at);
+	double free_mm = config->workspace_mm / 2, force_N;
 
 	axis->motor_N += (axis->pushed_N - axis->motor_N) * STEP_S /
 			 (STEP_S / 2 + fmax(config->motor_ms * 1e-3, STEP_S / 2));
-	force_N += axis->motor_N;
+	force_N = axis->motor_N - config->stop_N_mm * (fmax(axis->at - free_mm, 0) +
+						       fmin(axis->at + free_mm, 0));
 	if (i == 2 && config->motion == LEAN && (double)sim->t_ns * NS >= config->begin_s)
 		force_N -= config->lean_N;
 	move_handle(config, axis, force_N, place_mm);
@@ -251,31 +227,23 @@ static INCISE_REALTIME double measure(const struct sim_haptic *sim, int i, doubl
 /* The sample at @t_ns of the script, within a step after the device's. */
 static INCISE_REALTIME void take_sample(struct sim_haptic *sim, int64_t t_ns)
 {
-	const struct config *config = &sim->config;
-	double t_s = (double)t_ns * NS, late_ms = config->latency_ms;
-	struct arrival arrival = {.sample = {.t_ns = sim->start_ns + t_ns,
-					     .seq = sim->n,
-					     .quaternion = {1}}};
-	struct incise_haptic_sample *to = &arrival.sample;
+	struct incise_haptic_sample to = {
+		.t_ns = sim->start_ns + t_ns, .seq = sim->n, .quaternion = {1}};
+	double ahead_s = (double)(t_ns - sim->t_ns) * NS, t_s = (double)t_ns * NS;
+	bool spoilt = has_fault(sim, GIVES_NAN, t_ns);
 
 	for (int i = 0; i < 3; i++) {
-		to->position_mm[i] = measure(sim, i, (double)(t_ns - sim->t_ns) * NS);
-		to->velocity_mm_s[i] =
-			(to->position_mm[i] - sim->last_mm[i]) * config->rate_hz;
-		sim->last_mm[i] = to->position_mm[i];
-		if (has_fault(sim, GIVES_NAN, t_ns))
-			to->position_mm[i] = to->velocity_mm_s[i] = NAN;
+		to.position_mm[i] = spoilt ? NAN : measure(sim, i, ahead_s);
+		to.velocity_mm_s[i] = sim->axis[i].v;
 	}
 	for (int i = 0; i < BUTTONS; i++)
-		if (t_s >= config->button_from_s[i] && t_s < config->button_to_s[i])
-			to->buttons |= 1U << i;
-	to->flags = (has_fault(sim, CHANGES, t_ns) ? INCISE_HAPTIC_CHANGED : 0) |
-		    (has_fault(sim, NOT_READY, t_ns) ? INCISE_HAPTIC_NOT_READY : 0);
-	if (has_fault(sim, LATE, t_ns))
-		late_ms += config->late_ms;
-	arrival.t_ns = t_ns + llround(late_ms * 1e6);
+		if (t_s >= sim->config.button_from_s[i] &&
+		    t_s < sim->config.button_to_s[i])
+			to.buttons |= 1U << i;
+	to.flags = (has_fault(sim, CHANGES, t_ns) ? INCISE_HAPTIC_CHANGED : 0) |
+		   (has_fault(sim, NOT_READY, t_ns) ? INCISE_HAPTIC_NOT_READY : 0);
 	if (!has_fault(sim, DIES, t_ns))
-		incise_sim_ring_push(&sim->arrivals, &arrival);
+		incise_sim_ring_push(&sim->samples, &to);
 	sim->n++;
 }
 
@@ -310,16 +278,18 @@ static INCISE_REALTIME int sim_read(struct incise_haptic *haptic,
 				    struct incise_haptic_sample *samples, int n)
 {
 	struct sim_haptic *sim = of_haptic(haptic);
-	int64_t now_ns = advance(sim);
-	const struct arrival *oldest;
+	int64_t now_ns = advance(sim), late_ns;
+	const struct incise_haptic_sample *oldest;
 	int taken = 0;
 
 	if (has_fault(sim, UNPLUGGED, now_ns))
 		return -ENODEV;
-	while (taken < n && (oldest = incise_sim_ring_peek(&sim->arrivals)) &&
-	       oldest->t_ns <= now_ns) {
-		samples[taken++] = oldest->sample;
-		incise_sim_ring_pop(&sim->arrivals);
+	late_ns = llround(sim->config.latency_ms * 1e6) +
+		  (has_fault(sim, LATE, now_ns) ? llround(sim->config.late_ms * 1e6) : 0);
+	while (taken < n && (oldest = incise_sim_ring_peek(&sim->samples)) &&
+	       oldest->t_ns + late_ns <= sim->start_ns + now_ns) {
+		samples[taken++] = *oldest;
+		incise_sim_ring_pop(&sim->samples);
 	}
 	return taken;
 }
@@ -370,7 +340,7 @@ static void sim_info(const struct incise_haptic *haptic, struct incise_haptic_in
 
 static uint64_t sim_lost(const struct incise_haptic *haptic)
 {
-	return of_haptic(haptic)->arrivals.lost;
+	return of_haptic(haptic)->samples.lost;
 }
 
 static int sim_cause(struct incise_haptic *haptic, char *text, size_t size)
@@ -395,7 +365,7 @@ static void sim_close(struct incise_haptic *haptic)
 	struct sim_haptic *sim = of_haptic(haptic);
 
 	incise_sim_ring_free(&sim->pushes);
-	incise_sim_ring_free(&sim->arrivals);
+	incise_sim_ring_free(&sim->samples);
 	free(sim);
 }
 
@@ -425,46 +395,48 @@ static int read_words(struct config *config, char *words, const char *where,
 	return rc ? incise_error_set(err, EINVAL, "%s: %s", where, why.text) : 0;
 }
 
-static int set_up(struct sim_haptic *sim, const struct incise_backend_request *request,
-		  struct incise_error *err)
+/* For 2.5 s, and those that have not arrived. */
+static int make_rings(struct sim_haptic *sim)
 {
-	char *words = strdup(request->arguments);
-	struct config *config = &sim->config;
-	double place_mm[3], late_s;
-	int rc = -ENOMEM;
+	double late_s = (sim->config.latency_ms + sim->config.late_ms) * 1e-3;
 
-	sim->haptic.ops = &ops;
-	sim->clock = request->clock;
-	sim->start_ns = incise_clock_now(sim->clock);
-	incise_settings_init(incise_sim_haptic_settings, config);
-	if (words)
-		rc = read_words(config, words, request->where, err);
-	free(words);
-	late_s = (config->latency_ms + config->late_ms) * 1e-3;
-	if (!rc &&
-	    (incise_sim_ring_init(&sim->arrivals, sizeof(struct arrival), config->rate_hz,
-				  late_s) ||
-	     incise_sim_ring_init(&sim->pushes, sizeof(struct push), PUSHES_HZ, 0)))
-		rc = -ENOMEM;
-	sim->key = incise_random_key(config->seed, INCISE_RANDOM_TRACKER);
-	place_hand(config, 0, place_mm);
-	for (int i = 0; i < 3; i++)
-		sim->axis[i].at = sim->axis[i].motor_at = sim->last_mm[i] = place_mm[i];
-	return rc;
+	return incise_sim_ring_init(&sim->pushes, sizeof(struct push), PUSHES_HZ, 0) ||
+			       incise_sim_ring_init(&sim->samples,
+						    sizeof(struct incise_haptic_sample),
+						    sim->config.rate_hz, late_s)
+		       ? -ENOMEM
+		       : 0;
 }
 
 struct incise_haptic *incise_sim_haptic_new(const struct incise_backend_request *request,
 					    struct incise_error *err)
 {
 	struct sim_haptic *sim = calloc(1, sizeof(*sim));
-	int rc = sim ? set_up(sim, request, err) : -ENOMEM;
+	char *words = strdup(request->arguments);
+	double place_mm[3];
+	int rc = -ENOMEM;
 
+	if (sim && words) {
+		sim->haptic.ops = &ops;
+		sim->clock = request->clock;
+		sim->start_ns = incise_clock_now(sim->clock);
+		incise_settings_init(incise_sim_haptic_settings, &sim->config);
+		rc = read_words(&sim->config, words, request->where, err);
+	}
+	free(words);
+	if (!rc)
+		rc = make_rings(sim);
 	if (rc == -ENOMEM)
 		incise_error_set(err, ENOMEM, "%s: %s", request->where, strerror(ENOMEM));
-	if (!rc)
-		return &sim->haptic;
-	if (sim)
-		sim_close(&sim->haptic);
-	errno = -rc;
-	return NULL;
+	if (rc) {
+		if (sim)
+			sim_close(&sim->haptic);
+		errno = -rc;
+		return NULL;
+	}
+	sim->key = incise_random_key(sim->config.seed, INCISE_RANDOM_TRACKER);
+	place_hand(&sim->config, 0, place_mm);
+	for (int i = 0; i < 3; i++)
+		sim->axis[i].at = sim->axis[i].motor_at = place_mm[i];
+	return &sim->haptic;
 }

@@ -40,8 +40,10 @@ static const struct {
 	{"none", "hand_kg=0,hand_N_mm=0,hand_N_s_mm=0"},
 	{"damped", "hand_kg=0.05,hand_N_mm=0.1,hand_N_s_mm=0.005"},
 	{"firm", ""},
+	{"of a bare mass",
+	 "hand_kg=0.05,hand_N_mm=0,hand_N_s_mm=0"}, /* of all cases only */
 };
-#define HANDS ((int)(sizeof(hands) / sizeof(*hands)))
+#define HANDS (cases_are_all() ? 4 : 3)
 
 /* A touch with a hard lean, a drop with a light one; at other phases of samples and ticks. */
 static const struct {
