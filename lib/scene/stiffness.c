@@ -383,7 +383,7 @@ int incise_plan_survey(struct incise_plan *plan,
 {
 	struct incise_plan_stability *s = &plan->stability;
 	const struct incise_scene *scene = plan->scene;
-	struct incise_haptic_info info;
+	const struct incise_haptic_info *haptic = tracker->haptic;
 
 	s->device = (struct incise_haptic_device){
 		.mass_kg = scene->device.mass_kg,
@@ -392,17 +392,16 @@ int incise_plan_survey(struct incise_plan *plan,
 		.encoder_mm = scene->device.encoder_mm,
 		.period_s = 1 / scene->rate_hz,
 	};
-	if (plan->stylus) {
-		incise_stylus_info(plan->stylus, &info);
-		s->device.mass_kg = info.mass_kg;
-		s->device.damping_N_s_mm = info.damping_N_s_mm;
-		s->device.coulomb_N = info.coulomb_N;
-		s->device.encoder_mm = info.encoder_mm;
+	/* A haptic device says its own. */
+	if (haptic) {
+		s->device.mass_kg = haptic->mass_kg;
+		s->device.damping_N_s_mm = haptic->damping_N_s_mm;
+		s->device.coulomb_N = haptic->coulomb_N;
+		s->device.encoder_mm = haptic->encoder_mm;
 	}
 	set_delay(plan, tracker);
 	s->certified = true;
-	if (set_lateness(plan, err) ||
-	    (plan->stylus && set_own_lateness(plan, &info, err)))
+	if (set_lateness(plan, err) || (haptic && set_own_lateness(plan, haptic, err)))
 		return -EDOM;
 	if ((plan->model || plan->fixed) && survey_model(plan))
 		return incise_error_set(err, ENOMEM, "no memory for a plan");
