@@ -12,7 +12,7 @@
 
 #define SAMPLES 32
 #define PLACE_MOST_MM 1e6
-/* Of the workspace along each axis, about its middle, where a force may begin. */
+/* A force may begin in so much of the workspace along each axis, about its middle. */
 #define MIDDLE 0.5
 /* An age is late beyond the assumed one by a quarter and half a millisecond, as a mean of so many ticks. */
 #define LATE_SHARE 1.25

@@ -65,7 +65,7 @@ static void check_ages(struct haptic *haptic)
 		 info.name, mean_ms, assumed_ms);
 }
 
-/* What its user has to know before a force comes. */
+/* Say all that the user has to know before a force comes. */
 void haptic_begin_device(struct haptic *haptic)
 {
 	struct incise_scene_limits limits;
