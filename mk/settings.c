@@ -140,6 +140,7 @@ int main(void)
 
 	failed |= print_tables("rig.actuator", incise_actuator_settings);
 	failed |= print_tables("rig.sim", incise_sim_settings);
+	failed |= print_tables("rig.sim_haptic", incise_sim_haptic_settings);
 	failed |= print_tables("calibration", incise_calibration_settings);
 	failed |= print_tables("scene", incise_scene_settings);
 	print_forces();

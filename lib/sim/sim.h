@@ -48,6 +48,9 @@ struct incise_stepper *incise_sim_stepper_new(struct incise_sim *sim, int axis);
 struct incise_haptic *incise_sim_haptic_new(const struct incise_backend_request *request,
 					    struct incise_error *err);
 
+/* The keys of these arguments, in a struct of sim_haptic.c. */
+extern const struct incise_setting incise_sim_haptic_settings[];
+
 /*
  * Directions of the actuators: out of the surface, whose normal is @normal; across the blade,
  * along y; along the cut, x. Returns how many there are.
