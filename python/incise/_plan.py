@@ -49,7 +49,7 @@ SampleStruct, TrackerStruct, TickStruct, DeviceStruct = _library.structs("""
         bool network;
         char note[300];
         bool lost_unsure;
-        const struct incise_haptic_info *haptic;
+        const void *haptic;
     };
     struct incise_tick {
         int64_t t_ns;
