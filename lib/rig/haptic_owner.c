@@ -7,10 +7,10 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 #include <incise/haptic_owner.h>
 #include "../base/vector.h"
 #include "haptic_page.h"
-#include "page.h"
 #include "rig_plan.h"
 
 #define SAMPLES INCISE_HAPTIC_PAGE_RING
@@ -45,8 +45,8 @@ static void write_half(struct incise_haptic_owner *owner)
 {
 	owner->half.heartbeat_ns = incise_clock_now(owner->clock);
 	owner->half.lost = incise_haptic_lost(owner->haptic);
-	incise_page_write(&owner->page.map->owner, &owner->half,
-			  HAPTIC_PAGE_WORDS(owner->half));
+	incise_haptic_page_put(&owner->page.map->owner, &owner->half,
+			       sizeof(owner->half));
 }
 
 static void put_sample(struct incise_haptic_owner *owner,
@@ -64,8 +64,8 @@ static void put_sample(struct incise_haptic_owner *owner,
 	if (v3_finite(from->velocity_mm_s))
 		v3_copy(sample.velocity_mm_s, from->velocity_mm_s);
 	memcpy(sample.quaternion, from->quaternion, sizeof(sample.quaternion));
-	incise_page_write(&owner->page.map->ring[sample.number % SAMPLES], &sample,
-			  HAPTIC_PAGE_WORDS(sample));
+	incise_haptic_page_put(&owner->page.map->ring[sample.number % SAMPLES], &sample,
+			       sizeof(sample));
 	owner->half.samples++;
 	if (from->flags != owner->flags)
 		set_cause(owner);
@@ -107,18 +107,6 @@ static void put_device(struct incise_haptic_owner *owner, const char *device,
 		 *info.note && *note ? "; " : "", note);
 }
 
-/* The magic comes last: with it the page is complete. */
-static void put_head(struct incise_haptic_owner *owner)
-{
-	struct incise_haptic_page_head head = incise_haptic_page_head(), *to;
-
-	to = &owner->page.map->head;
-	memcpy((char *)to + sizeof(to->magic), (char *)&head + sizeof(to->magic),
-	       sizeof(head) - sizeof(to->magic));
-	__atomic_thread_fence(__ATOMIC_RELEASE);
-	memcpy(to->magic, head.magic, sizeof(to->magic));
-}
-
 /* --- a tick ------------------------------------------------------------------------------ */
 
 static int wait_for_device(struct incise_haptic_owner *owner)
@@ -155,8 +143,8 @@ static int give_force(struct incise_haptic_owner *owner,
 	const char *off;
 
 	for (int i = 0; i < HAPTIC_PAGE_TRIES && !whole; i++)
-		whole = incise_page_read(&owner->page.map->user, &half,
-					 HAPTIC_PAGE_WORDS(half));
+		whole = incise_haptic_page_get(&owner->page.map->user, &half,
+					       sizeof(half));
 	tick->t_ns = incise_clock_now(owner->clock);
 	off = incise_haptic_gate(&owner->gate, whole ? &half : NULL, tick->t_ns,
 				 tick->force_N, tick->torque_N_mm);
@@ -227,7 +215,7 @@ static int open_owned_device(struct incise_haptic_owner *owner, const char *devi
 	put_device(owner, device, note);
 	owner->half.state = INCISE_HAPTIC_PAGE_READY;
 	write_half(owner);
-	put_head(owner);
+	incise_haptic_page_publish(owner->page.map, (uint32_t)getpid());
 	return 0;
 }
 

@@ -19,7 +19,11 @@
 #define LOOK_NS 10000000
 #define LOOKS 3000
 
-_Static_assert(sizeof(struct incise_haptic_page) == 5696, "the layout of version 1");
+_Static_assert(sizeof(struct incise_haptic_page) == 5696 &&
+		       offsetof(struct incise_haptic_page, ring) == 1600 &&
+		       offsetof(struct incise_haptic_page, user) == 1472 &&
+		       offsetof(struct incise_haptic_page, owner) == 1152,
+	       "the layout of version 1");
 
 /* "haply:0" becomes haply-0-1a2b3c4d. */
 static int name_page(struct haptic_page *page, const char *device, const char *where,
@@ -156,47 +160,25 @@ int incise_haptic_page_new(struct haptic_page *page, const char *device,
 
 /* --- the user's ------------------------------------------------------------------------- */
 
-struct incise_haptic_page_head incise_haptic_page_head(void)
-{
-#define PART(name, n)                                                         \
-	{                                                                     \
-		.offset = offsetof(struct incise_haptic_page, name),          \
-		.size = sizeof(((struct incise_haptic_page *)0)->name) / (n), \
-		.count = (n)                                                  \
-	}
-	struct incise_haptic_page_head head = {
-		.major = INCISE_HAPTIC_PAGE_MAJOR,
-		.minor = INCISE_HAPTIC_PAGE_MINOR,
-		.size = sizeof(struct incise_haptic_page),
-		.pid = (uint32_t)getpid(),
-		.device = PART(device, 1),
-		.owner = PART(owner, 1),
-		.user = PART(user, 1),
-		.ring = PART(ring, INCISE_HAPTIC_PAGE_RING),
-	};
-
-	memcpy(head.magic, INCISE_HAPTIC_PAGE_MAGIC, sizeof(head.magic));
-	return head;
-}
-
 /* 0; -EAGAIN: its owner has not finished it. */
 static int look_at_head(const struct haptic_page *page)
 {
-	const struct incise_haptic_page_head own = incise_haptic_page_head();
+	struct incise_haptic_page own;
 	const size_t parts = offsetof(struct incise_haptic_page_head, device);
 	const size_t end = offsetof(struct incise_haptic_page_head, reserved);
 	struct incise_haptic_page_head head = {0};
 	struct stat st;
 
+	incise_haptic_page_publish(&own, 0);
 	if (!incise_haptic_page_held(page, INCISE_HAPTIC_PAGE_OWNER_BYTE))
 		return -ENOENT;
 	if (pread(page->fd, &head, sizeof(head), 0) != (ssize_t)sizeof(head) ||
 	    !head.magic[0])
 		return -EAGAIN;
-	if (memcmp(head.magic, own.magic, sizeof(own.magic)) || head.major != own.major ||
-	    head.size != own.size || fstat(page->fd, &st) ||
-	    st.st_size < (off_t)own.size ||
-	    memcmp((char *)&head + parts, (char *)&own + parts, end - parts))
+	if (memcmp(head.magic, own.head.magic, sizeof(own.head.magic)) ||
+	    head.major != own.head.major || head.size != own.head.size ||
+	    fstat(page->fd, &st) || st.st_size < (off_t)own.head.size ||
+	    memcmp((char *)&head + parts, (char *)&own.head + parts, end - parts))
 		return -EPROTO;
 	return 0;
 }

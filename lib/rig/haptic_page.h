@@ -15,7 +15,6 @@
 
 #define HAPTIC_PAGE_LOCAL "local:"
 #define HAPTIC_PAGE_TRIES 3 /* of a torn part */
-#define HAPTIC_PAGE_WORDS(part) (sizeof(part) / sizeof(uint32_t))
 
 /* An open page, and the lock of this side; with fd -1 there is none. */
 struct haptic_page {
@@ -43,9 +42,6 @@ void incise_haptic_page_close(struct haptic_page *page, bool remove);
 
 /* Whether a living process holds the lock of a side. */
 bool incise_haptic_page_held(const struct haptic_page *page, int byte);
-
-/* The head of a page. */
-struct incise_haptic_page_head incise_haptic_page_head(void);
 
 /* The settings in place of the device's own. */
 void incise_haptic_set_info(struct incise_haptic *haptic,

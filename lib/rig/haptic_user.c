@@ -12,7 +12,6 @@
 #include "../base/control_character.h"
 #include "../base/vector.h"
 #include "haptic_page.h"
-#include "page.h"
 
 #define PERIOD_SHARE 16 /* of a tick in the mean period */
 #define PERIOD_LEAST_NS 20000
@@ -40,10 +39,10 @@ static struct haptic_user *of_user(struct incise_haptic *haptic)
 	return (struct haptic_user *)haptic;
 }
 
-static INCISE_REALTIME bool read_part(const void *part, void *to, size_t words)
+static INCISE_REALTIME bool read_part(const void *part, void *to, uint32_t bytes)
 {
 	for (int i = 0; i < HAPTIC_PAGE_TRIES; i++)
-		if (incise_page_read(part, to, words))
+		if (incise_haptic_page_get(part, to, bytes))
 			return true;
 	return false;
 }
@@ -77,7 +76,7 @@ static INCISE_REALTIME const char *judge_owner(
 static INCISE_REALTIME int look_at_owner(struct haptic_user *user)
 {
 	struct incise_haptic_page_owner owner;
-	bool whole = read_part(&user->page.map->owner, &owner, HAPTIC_PAGE_WORDS(owner));
+	bool whole = read_part(&user->page.map->owner, &owner, sizeof(owner));
 	int64_t now_ns = incise_clock_now(user->clock);
 	const char *wrong = whole ? judge_owner(&user->owner, &owner, now_ns) : NULL;
 
@@ -122,8 +121,7 @@ static INCISE_REALTIME bool take_sample(struct haptic_user *user,
 	bool velocity = user->device.features & INCISE_HAPTIC_PAGE_VELOCITY;
 	struct incise_haptic_page_sample from;
 
-	if (!read_part(slot, &from, HAPTIC_PAGE_WORDS(from)) ||
-	    from.number != user->taken)
+	if (!read_part(slot, &from, sizeof(from)) || from.number != user->taken)
 		return false;
 	user->refused = !is_sample_good(&from, incise_clock_now(user->clock));
 	if (user->refused)
@@ -193,8 +191,7 @@ static INCISE_REALTIME void write_half(struct haptic_user *user, uint32_t wants,
 	};
 	v3_copy(user->own.force_N, force_N);
 	v3_copy(user->own.torque_N_mm, torque_N_mm);
-	incise_page_write(&user->page.map->user, &user->own,
-			  HAPTIC_PAGE_WORDS(user->own));
+	incise_haptic_page_put(&user->page.map->user, &user->own, sizeof(user->own));
 }
 
 static INCISE_REALTIME int push_user(struct incise_haptic *haptic,

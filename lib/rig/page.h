@@ -5,29 +5,17 @@
  *   writer   seq odd ── fields ── seq even          one at a time per slot
  *   reader   seq even ── copy ── the same seq       else once more
  *
- * Every word is read and written as an atomic, so that a race gives a torn copy, which
- * seq shows, and no undefined behaviour.
+ * The lock and its use of atomics are those of incise/haptic_page.h.
  */
 #ifndef INCISE_PAGE_H
 #define INCISE_PAGE_H
 
-#include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <incise/export.h>
+#include <stdint.h>
 #include "../../driver/uapi/incise_stepper.h"
 
 /*
- * Write all of a slot but its seq, which is the first of its @n words of 4 bytes. Repairs the odd seq of
- * a dead writer.
- */
-void incise_page_write(void *slot, const void *from, size_t n) INCISE_REALTIME;
-
-/* Copy a slot with its seq; false: the copy is torn. */
-bool incise_page_read(const void *slot, void *to, size_t n) INCISE_REALTIME;
-
-/*
- * Write a set-point; mode is INCISE_STEPPER_MODE_….
+ * Write a set-point; mode is INCISE_STEPPER_MODE_…. Repairs the odd seq of a dead owner.
  */
 void incise_page_put_setpoint(struct incise_stepper_setpoint *slot, unsigned int mode,
 			      int64_t target, int64_t t_ns) INCISE_REALTIME;

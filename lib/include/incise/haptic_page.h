@@ -139,4 +139,67 @@ struct incise_haptic_page {
 	struct incise_haptic_page_sample ring[INCISE_HAPTIC_PAGE_RING]; /**< at 1600 */
 };
 
+#if defined(__GNUC__)
+/**
+ * Write all of a part but its sequence lock, which is its first word: by its only writer. The pattern is
+ * H.-J. Boehm's, 'Can seqlocks get along with programming language memory models?', MSPC 2012, figure
+ * 6; a race gives a torn copy, which the lock shows, and no undefined behaviour.
+ */
+static inline void incise_haptic_page_put(void *part, const void *from, uint32_t bytes)
+{
+	uint32_t *words = (uint32_t *)part, word, i;
+	uint32_t seq = __atomic_load_n(words, __ATOMIC_RELAXED) & ~1u;
+
+	__atomic_store_n(words, seq + 1, __ATOMIC_RELAXED);
+	__atomic_thread_fence(__ATOMIC_RELEASE);
+	for (i = 1; i < bytes / sizeof(word); i++) {
+		__builtin_memcpy(&word, (const char *)from + i * sizeof(word),
+				 sizeof(word));
+		__atomic_store_n(words + i, word, __ATOMIC_RELAXED);
+	}
+	__atomic_store_n(words, seq + 2, __ATOMIC_RELEASE);
+}
+
+/** Copy a part with its sequence lock. 1; 0: it is being written, and the copy is torn. */
+static inline int incise_haptic_page_get(const void *part, void *to, uint32_t bytes)
+{
+	const uint32_t *words = (const uint32_t *)part;
+	uint32_t word, i, seq = __atomic_load_n(words, __ATOMIC_ACQUIRE);
+
+	if (seq & 1)
+		return 0;
+	__builtin_memcpy(to, &seq, sizeof(seq));
+	for (i = 1; i < bytes / sizeof(word); i++) {
+		word = __atomic_load_n(words + i, __ATOMIC_RELAXED);
+		__builtin_memcpy((char *)to + i * sizeof(word), &word, sizeof(word));
+	}
+	__atomic_thread_fence(__ATOMIC_ACQUIRE);
+	return __atomic_load_n(words, __ATOMIC_RELAXED) == seq;
+}
+
+/** Write the head of a page whose other parts are complete; its magic comes last. */
+static inline void incise_haptic_page_publish(struct incise_haptic_page *page,
+					      uint32_t pid)
+{
+	const struct incise_haptic_page_part parts[] = {
+		{128, sizeof(page->device), 1, 0},
+		{1152, sizeof(page->owner), 1, 0},
+		{1472, sizeof(page->user), 1, 0},
+		{1600, sizeof(*page->ring), INCISE_HAPTIC_PAGE_RING, 0},
+	};
+
+	page->head.major = INCISE_HAPTIC_PAGE_MAJOR;
+	page->head.minor = INCISE_HAPTIC_PAGE_MINOR;
+	page->head.size = sizeof(*page);
+	page->head.pid = pid;
+	page->head.device = parts[0];
+	page->head.owner = parts[1];
+	page->head.user = parts[2];
+	page->head.ring = parts[3];
+	__atomic_thread_fence(__ATOMIC_RELEASE);
+	__builtin_memcpy(page->head.magic, INCISE_HAPTIC_PAGE_MAGIC,
+			 sizeof(page->head.magic));
+}
+#endif
+
 #endif
