@@ -473,9 +473,9 @@ static void check_calibration(struct doctor *doctor)
 		char *fix = cli_text("incise calibrate %s", name ? name : "");
 
 		/* The names are those of the report, which is released below. */
-		for (size_t k = 0; name && k < 5; k++) {
-			static const char *const names[] = {"force", "depth", "tip",
-							    "delay", "stepper"};
+		for (size_t k = 0; name && k < 6; k++) {
+			static const char *const names[] = {"force", "depth",	"tip",
+							    "delay", "stepper", "frame"};
 
 			if (strcmp(name, names[k]))
 				continue;
