@@ -151,7 +151,10 @@ static void get_info(const struct incise_tracker *tracker,
 		.haptic = &stylus->info,
 	};
 	snprintf(info->name, sizeof(info->name), "%s", stylus->info.name);
-	snprintf(info->note, sizeof(info->note), "%s", stylus->info.note);
+	/* A recording keeps the note: its settings change how a force feels. */
+	snprintf(info->note, sizeof(info->note), "%.190s%s%.100s", stylus->info.filters,
+		 *stylus->info.filters && *stylus->info.note ? "; " : "",
+		 stylus->info.note);
 }
 
 static uint64_t count_lost(const struct incise_tracker *tracker)
