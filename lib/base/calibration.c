@@ -99,52 +99,43 @@ static double *number_at(struct incise_calibration *calibration,
 	return (double *)((char *)calibration + row->offset);
 }
 
-static size_t count_numbers(const struct incise_setting *row)
+static int count_numbers(const struct incise_setting *row)
 {
-	return row->size / sizeof(double);
+	return (int)(row->size / sizeof(double));
 }
 
 void incise_calibration_nominal(struct incise_calibration *calibration)
 {
 	for (int i = 0; i < N_KEYS; i++)
-		for (size_t k = 0; k < count_numbers(&settings[i]); k++)
+		for (int k = 0; k < count_numbers(&settings[i]); k++)
 			number_at(calibration, &settings[i])[k] = NAN;
 	incise_settings_init(settings, calibration);
 }
 
-/* Keys of three numbers; each has a key of its own in the history. */
-static const struct {
-	const char *key, *element[3];
-} vectors[] = {
-	{"tip_mm", {"tip_x_mm", "tip_y_mm", "tip_z_mm"}},
-	{"frame_turn_deg", {"frame_turn_x_deg", "frame_turn_y_deg", "frame_turn_z_deg"}},
-	{"frame_mm", {"frame_x_mm", "frame_y_mm", "frame_z_mm"}},
-};
-
-#define VECTORS (sizeof(vectors) / sizeof(*vectors))
-
-/* The first key of a row in the history. */
-static const char *first_key(const struct incise_setting *row)
+/* Number @k of a row has a key of its own in the history: tip_y_mm of tip_mm. */
+static void name_number(const struct incise_setting *row, int k, char name[40])
 {
-	for (size_t i = 0; i < VECTORS; i++)
-		if (!strcmp(vectors[i].key, row->key))
-			return vectors[i].element[0];
-	return row->key;
+	const char *unit = strrchr(row->key, '_');
+
+	if (count_numbers(row) == 1)
+		snprintf(name, 40, "%s", row->key);
+	else
+		snprintf(name, 40, "%.*s_%c%s", (int)(unit - row->key), row->key, 'x' + k,
+			 unit);
 }
 
 /* A key of the history. */
-static const struct incise_setting *find_key(const char *name, int *element)
+static const struct incise_setting *find_key(const char *key, int *element)
 {
-	for (size_t i = 0; i < 3 * VECTORS; i++)
-		if (!strcmp(vectors[i / 3].element[i % 3], name)) {
-			*element = i % 3;
-			return incise_setting_of(settings, vectors[i / 3].key);
+	char name[40];
+
+	for (int i = 0; i < N_KEYS; i++)
+		for (*element = 0; *element < count_numbers(&settings[i]); ++*element) {
+			name_number(&settings[i], *element, name);
+			if (!strcmp(name, key))
+				return &settings[i];
 		}
-	*element = 0;
-	for (size_t i = 0; i < VECTORS; i++)
-		if (!strcmp(name, vectors[i].key))
-			return NULL;
-	return !strcmp(name, "history") ? NULL : incise_setting_of(settings, name);
+	return NULL;
 }
 
 bool incise_calibration_has_key(const char *key)
@@ -541,11 +532,13 @@ static void put_calibration_text(const char *key, const char *text, FILE *out)
 static void put_key(const struct file_content *file, const struct incise_setting *row,
 		    const double *value, FILE *out)
 {
-	const int n = (int)count_numbers(row);
+	const int n = count_numbers(row);
 	const struct incise_calibration_record *from;
-	const struct incise_calibration_value *last =
-		incise_calibration_last(file->records, file->n, first_key(row), &from);
+	const struct incise_calibration_value *last;
+	char first[40];
 
+	name_number(row, 0, first);
+	last = incise_calibration_last(file->records, file->n, first, &from);
 	fprintf(out, "%s = ", row->key);
 	for (int i = 0; i < n; i++) {
 		fputs(n == 1 ? "" : i ? ", " : "[", out);

@@ -83,15 +83,15 @@ static double sum_residuals(const struct side *from, const struct side *to, int 
 	return sum;
 }
 
-static double sum_mirrored(const struct side *from, const struct side *to, int n)
+static bool fits_mirrored(struct side device, const struct side *scene, int n, double sum)
 {
-	struct side mirror = *from;
 	double q[4];
 
 	for (int i = 0; i < n; i++)
-		mirror.point[i][0] = -mirror.point[i][0];
-	find_turn(&mirror, to, n, q);
-	return sum_residuals(&mirror, to, n, q, NULL);
+		device.point[i][0] = -device.point[i][0];
+	find_turn(&device, scene, n, q);
+	return sum_residuals(&device, scene, n, q, NULL) <
+	       MIRROR_SHARE * MIRROR_SHARE * sum;
 }
 
 /* --- uncertainty ------------------------------------------------------------------------ */
@@ -178,39 +178,35 @@ static int check_shape(const struct side *side, int n, const char *whose,
 {
 	double apart[3];
 
-	for (int i = 0; i < n; i++)
-		for (int k = 0; k < i; k++) {
-			v3_sub(apart, side->point[i], side->point[k]);
-			if (v3_length(apart) < INCISE_FRAME_APART_MM)
-				return incise_error_set(
-					err, EDOM,
-					"points %d and %d are %.2g mm apart in %s, less "
-					"than %g mm; choose points further apart, and "
-					"touch each once",
-					k + 1, i + 1, v3_length(apart), whose,
-					INCISE_FRAME_APART_MM);
-		}
-	if (side->extent[1] < LINE_SHARE * side->extent[2])
-		return incise_error_set(
-			err, EDOM,
-			"the points are nearly on a line in %s: %.2g mm across it and %.2g mm "
-			"along it, rms; choose one further off it",
-			whose, side->extent[1], side->extent[2]);
-	return 0;
+	for (int i = 1; i < n * n; i++) {
+		v3_sub(apart, side->point[i / n], side->point[i % n]);
+		if (i / n < i % n && v3_length(apart) < INCISE_FRAME_APART_MM)
+			return incise_error_set(
+				err, EDOM,
+				"points %d and %d are %.2g mm apart in %s, less than %g mm; "
+				"choose points further apart, and touch each once",
+				i / n + 1, i % n + 1, v3_length(apart), whose,
+				INCISE_FRAME_APART_MM);
+	}
+	if (side->extent[1] >= LINE_SHARE * side->extent[2])
+		return 0;
+	return incise_error_set(
+		err, EDOM,
+		"the points are nearly on a line in %s: %.2g mm across it, %.2g "
+		"mm along it, rms; choose one further off it",
+		whose, side->extent[1], side->extent[2]);
 }
 
-static int judge_frame(const struct incise_frame_fit *fit, double sum, double mirrored,
+static int judge_frame(const struct incise_frame_fit *fit, bool mirrored,
 		       struct incise_error *err)
 {
 	if (fit->rms_mm <= INCISE_FRAME_RMS_MM)
 		return 0;
-	if (!fit->flat && mirrored < MIRROR_SHARE * MIRROR_SHARE * sum)
+	if (mirrored)
 		return incise_error_set(
 			err, EDOM,
-			"the points are mirrored: they fit with the sign of one axis changed "
-			"(%.2g mm rms), but not as they are (%.2g mm); both frames are "
-			"right-handed: correct the signs of the scene's points",
-			sqrt(mirrored / (fit->freedom / 3 + 2)), fit->rms_mm);
+			"the points are mirrored: they fit, but with the sign of an axis "
+			"changed; the scene is right-handed: correct its points");
 	return incise_error_set(
 		err, EDOM,
 		"the points miss each other by %.2g mm rms, more than %g mm, and the touched "
@@ -252,5 +248,5 @@ int incise_calibrate_frame(const struct incise_frame_point *points, int n,
 	v3_rotate(turned, q, device.middle);
 	v3_sub(fit->origin_mm, scene.middle, turned);
 	state_uncertainty(points, n, q, sum, fit);
-	return judge_frame(fit, sum, sum_mirrored(&device, &scene, n), err);
+	return judge_frame(fit, !fit->flat && fits_mirrored(device, &scene, n, sum), err);
 }

@@ -52,7 +52,7 @@ setup() {
 	failed_with "miss each other" "order"
 	awk -F, -v OFS=, 'NR > 1 { $1 *= -1 } { print }' p.csv >mirror.csv
 	run --separate-stderr incise calibrate frame --from mirror.csv
-	failed_with "mirrored" "signs"
+	failed_with "mirrored" "sign of an axis"
 	sed '5s/.*/30,0.5,0,-100,-25,30,0/; 4d' p.csv >line.csv
 	run --separate-stderr incise calibrate frame --from line.csv
 	failed_with "nearly on a line"
@@ -66,5 +66,19 @@ setup() {
 	# a plane is warned of
 	head -n 4 p.csv >flat.csv
 	run -0 --separate-stderr incise calibrate frame --from flat.csv
-	[[ "$stderr" == *"near a plane"*"3 degrees of freedom"* ]]
+	[[ "$stderr" == *"near a plane"*"residuals of three say little"* ]]
+}
+
+# bats test_tags=check
+@test "a handle is read at each press of Enter, and a point that is touched twice is refused" {
+	rig=sim:haptic,clock=simulated,motion=still
+	printf '\n\n\n' >enter
+	run --separate-stderr incise calibrate frame --rig $rig --point 0,0,0 --point 50,0,0 --point 0,50,0 \
+		-o touched.csv <enter
+	[ "$status" -eq 1 ]
+	[[ "$stderr" == *"point 3 of 3: touch (0, 50, 0) mm"*"points 1 and 2 are 0 mm apart"* ]]
+	[ "$(wc -l <touched.csv)" -eq 4 ]
+	grep -q '^50,0,0,0,0,' touched.csv
+	run --separate-stderr incise calibrate frame --rig sim: --point 0,0,0 --point 50,0,0 --point 0,50,0
+	failed_with "no haptic device"
 }

@@ -4,9 +4,8 @@
  * its handle touches.
  */
 #include <math.h>
-#include <poll.h>
+#include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 #include <incise/calibrate_frame.h>
 #include "../cli/handle.h"
 #include "../cli/json.h"
@@ -141,28 +140,17 @@ static void check_frame_options(void *run, int argc, char **argv)
 
 #define MOVED_MM 1.0 /* largest standard deviation of a handle that is held still */
 
-/* Wait for a button, or Enter; after the end of the input for a button only. */
-static void await_press(struct handle *handle)
-{
-	struct pollfd input = {STDIN_FILENO, POLLIN};
-	char line[100];
-
-	for (handle->pressed = false; !handle->pressed; handle_poll(handle)) {
-		if (poll(&input, 1, 0) <= 0)
-			continue;
-		handle->pressed = fgets(line, sizeof(line), stdin);
-		input.fd = handle->pressed ? input.fd : -1;
-	}
-}
-
 static void touch_points(void *run)
 {
 	struct frame *frame = run;
+	struct incise_rig *rig = cli_open_rig(frame->common.rig, INCISE_RIG_HAPTIC);
+	struct incise_error err = {0};
 	struct handle handle;
 
-	handle_open(&handle, frame->common.rig);
-	calibrate_words(frame->common.record.device, "%.63s", handle.info.name);
-	setvbuf(stdin, NULL, _IONBF, 0);
+	if (!incise_rig_haptic(rig))
+		cli_fail("the rig has no haptic device; name one, such as --rig haply:");
+	handle_begin(&handle, rig);
+	calibrate_words(frame->common.record.device, "%s", handle.info.name);
 	for (int i = 0; i < frame->n;) {
 		struct incise_frame_point *point = &frame->point[i];
 		const double *at = point->scene_mm;
@@ -171,8 +159,9 @@ static void touch_points(void *run)
 			"point %d of %d: touch (%g, %g, %g) mm, keep still, and press "
 			"Enter or a button\n",
 			i + 1, frame->n, at[0], at[1], at[2]);
-		await_press(&handle);
-		handle_record(&handle, frame->time_s > 0 ? frame->time_s : 0.3);
+		if (handle_await_press(&handle, &err) ||
+		    handle_record(&handle, frame->time_s > 0 ? frame->time_s : 0.3, &err))
+			cli_fail_with(&err);
 		point->sd_mm = handle_mean(&handle, point->device_mm);
 		if (point->sd_mm <= MOVED_MM)
 			i++;
@@ -180,7 +169,8 @@ static void touch_points(void *run)
 			cli_warn("the handle moved by %.2g mm; touch the point again",
 				 point->sd_mm);
 	}
-	handle_close(&handle);
+	free(handle.samples);
+	incise_rig_close(rig);
 }
 
 /* --- the fit ----------------------------------------------------------------------------- */
@@ -211,9 +201,7 @@ static int fit_frame(void *run, struct incise_error *err)
 		cli_warn(
 			"the points lie near a plane, where a mirrored axis does not show%s; "
 			"touch one more, out of it",
-			fit->freedom > 3 ? ""
-					 : ", and 3 degrees of freedom of residuals say "
-					   "little");
+			frame->n > 3 ? "" : ", and residuals of three say little");
 	return 0;
 }
 
@@ -222,18 +210,12 @@ static int fit_frame(void *run, struct incise_error *err)
 static void print_frame_report(const void *run, FILE *out)
 {
 	const struct frame *frame = run;
-	const struct incise_frame_fit *fit = &frame->fit;
 
 	fputs("Frame of the haptic device in the scene\n\npoint  residual / mm  sd / mm\n",
 	      out);
 	for (int i = 0; i < frame->n; i++)
-		fprintf(out, "%5d  %13.3f  %7.3f\n", i + 1, fit->residual_mm[i],
+		fprintf(out, "%5d  %13.3f  %7.3f\n", i + 1, frame->fit.residual_mm[i],
 			frame->point[i].sd_mm);
-	fprintf(out,
-		"\nu of a touched point along an axis: %.3f mm, the larger of the spread, "
-		"%.3f mm,\nand of what the residuals say, %.3f mm rms with %d degrees of "
-		"freedom\n",
-		fit->u_touch_mm, fit->spread_mm, fit->rms_mm, fit->freedom);
 }
 
 static json_t *make_frame_json(const void *run)

@@ -2,9 +2,11 @@
 /*
  * The handle of a haptic device; see handle.h.
  */
+#include <errno.h>
 #include <math.h>
-#include <stdlib.h>
+#include <poll.h>
 #include <string.h>
+#include <unistd.h>
 #include "../../lib/base/vector.h"
 #include "cli.h"
 #include "handle.h"
@@ -13,41 +15,22 @@
 #define POLL_NS 1000000LL
 #define SILENT_NS 1000000000LL
 
-void handle_open(struct handle *handle, const char *rig)
+void handle_begin(struct handle *handle, struct incise_rig *rig)
 {
-	*handle = (struct handle){.rig = cli_open_rig(rig, INCISE_RIG_HAPTIC)};
-	handle->haptic = incise_rig_haptic(handle->rig);
-	handle->clock = incise_rig_clock(handle->rig);
+	*handle = (struct handle){.haptic = incise_rig_haptic(rig),
+				  .clock = incise_rig_clock(rig)};
 	incise_haptic_info(handle->haptic, &handle->info);
 	handle->seen_ns = incise_clock_now(handle->clock);
 }
 
-void handle_close(struct handle *handle)
+/* Read the samples that have arrived, show life without a force, and wait for some more. */
+static int poll_handle(struct handle *handle, bool keep, struct incise_error *err)
 {
-	free(handle->samples);
-	incise_rig_close(handle->rig);
-}
-
-static void check_alive(const struct handle *handle, int rc, int64_t now_ns)
-{
-	char why[200] = "";
-
-	if (cli_stop)
-		cli_fail("stopped");
-	if (rc >= 0 && now_ns - handle->seen_ns <= SILENT_NS)
-		return;
-	incise_haptic_cause(handle->haptic, why, sizeof(why));
-	cli_fail("the haptic device %s: %s", handle->info.name,
-		 *why	  ? why
-		 : rc < 0 ? strerror(-rc)
-			  : "no sample for 1 s; see whether it is connected and ready");
-}
-
-static void poll_handle(struct handle *handle, bool keep)
-{
+	static const double none[3];
 	struct incise_haptic_sample poses[READ];
 	int64_t now_ns = incise_clock_now(handle->clock);
 	int n = incise_haptic_read(handle->haptic, poses, READ), rc = n;
+	char why[200] = "";
 
 	for (int i = 0; i < n; i++) {
 		handle->pressed |= poses[i].buttons & ~handle->last.buttons;
@@ -61,26 +44,47 @@ static void poll_handle(struct handle *handle, bool keep)
 			(struct handle_sample){poses[i], now_ns - poses[i].t_ns};
 	}
 	if (n >= 0)
-		rc = incise_haptic_push(handle->haptic, handle->force_N, NULL);
-	check_alive(handle, rc, now_ns);
+		rc = incise_haptic_push(handle->haptic, none, NULL);
+	if (rc >= 0 && now_ns - handle->seen_ns > SILENT_NS)
+		rc = -ETIMEDOUT;
+	if (cli_stop)
+		return incise_error_set(err, EINTR, "stopped");
 	incise_clock_wait_until(handle->clock, now_ns + POLL_NS);
+	if (rc >= 0)
+		return 0;
+	incise_haptic_cause(handle->haptic, why, sizeof(why));
+	return incise_error_set(err, -rc, "%s: %s", handle->info.name,
+				*why ? why : strerror(-rc));
 }
 
-void handle_poll(struct handle *handle)
+int handle_await_press(struct handle *handle, struct incise_error *err)
 {
-	poll_handle(handle, false);
+	struct pollfd input = {STDIN_FILENO, POLLIN, 0};
+	char line[100];
+	int rc = 0;
+
+	setvbuf(stdin, NULL, _IONBF, 0);
+	for (handle->pressed = false; !rc && !handle->pressed;) {
+		rc = poll_handle(handle, false, err);
+		if (handle->pressed || poll(&input, 1, 0) <= 0)
+			continue;
+		handle->pressed = fgets(line, sizeof(line), stdin);
+		input.fd = handle->pressed ? input.fd : -1;
+	}
+	return rc;
 }
 
-void handle_record(struct handle *handle, double time_s)
+int handle_record(struct handle *handle, double time_s, struct incise_error *err)
 {
-	int64_t end_ns;
+	/* Samples from before are left out. */
+	int rc = poll_handle(handle, false, err);
+	int64_t end_ns =
+		incise_clock_now(handle->clock) + llround(time_s * INCISE_NS_PER_S);
 
-	/* Not those from before. */
-	poll_handle(handle, false);
 	handle->n = 0;
-	end_ns = incise_clock_now(handle->clock) + llround(time_s * INCISE_NS_PER_S);
-	while (incise_clock_now(handle->clock) < end_ns || handle->n < 2)
-		poll_handle(handle, true);
+	while (!rc && (incise_clock_now(handle->clock) < end_ns || handle->n < 2))
+		rc = poll_handle(handle, true, err);
+	return rc;
 }
 
 double handle_mean(const struct handle *handle, double mean_mm[3])

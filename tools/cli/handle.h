@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * The handle of a rig's haptic device, read by a command that renders nothing. Every failure ends the
- * program, and the device's force with it.
+ * The handle of a rig's haptic device, read by a command that renders nothing.
  */
 #ifndef INCISE_CLI_HANDLE_H
 #define INCISE_CLI_HANDLE_H
@@ -14,26 +13,24 @@ struct handle_sample {
 };
 
 struct handle {
-	struct incise_rig *rig;
 	struct incise_haptic *haptic;
 	struct incise_clock *clock;
 	struct incise_haptic_info info;
 	struct incise_haptic_sample last;
 	int64_t seen_ns;
-	bool pressed;	   /* a button went down since the caller cleared it */
-	double force_N[3]; /* pushed at each poll */
-	struct handle_sample *samples; /* of handle_record() */
+	bool pressed;		       /* a button or Enter, in handle_await_press() */
+	struct handle_sample *samples; /* of handle_record(); free(3) */
 	int n;
 };
 
-void handle_open(struct handle *handle, const char *rig);
-void handle_close(struct handle *handle);
+/* @rig: with its haptic device, which must outlive it. */
+void handle_begin(struct handle *handle, struct incise_rig *rig);
 
-/* Read the samples that have arrived, push, and wait for some more; a device that is silent fails. */
-void handle_poll(struct handle *handle);
+/* Wait for a button, or for Enter; after the end of the input for a button only. 0; errno of the device. */
+int handle_await_press(struct handle *handle, struct incise_error *err);
 
-/* Poll for @time_s, and keep the samples; at least two. */
-void handle_record(struct handle *handle, double time_s);
+/* Keep the samples of the next @time_s, at least two. The same. */
+int handle_record(struct handle *handle, double time_s, struct incise_error *err);
 
 /* Mean of the recorded positions; returns their standard deviation along one axis, rms of the three. */
 double handle_mean(const struct handle *handle, double mean_mm[3]);
