@@ -1,0 +1,461 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * A device of a VRPN server; see vrpn_device.h.
+ */
+#include <endian.h>
+#include <errno.h>
+#include <math.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <stdio.h>
+#include <string.h>
+#include <time.h>
+#include "../../base/monotonic.h"
+#include "vrpn_device.h"
+
+#define SECOND_NS INT64_C(1000000000)
+#define PORT 3883
+#define VERSION "vrpn: ver. 07."
+#define COOKIE 24
+#define FIRST_NS (5 * SECOND_NS) /* for enough poses to know the rate */
+#define LEARN_NS 5e8		 /* of poses */
+#define POSES_LEAST 5
+#define DESCRIBES_SENDER (-1)
+#define DESCRIBES_TYPE (-2)
+#define BUTTONS 32
+#define PLACE_MOST_MM 1e6
+/* Of the square of a quaternion's length: more is no rotation; less is a unit, and left as it is. */
+#define LENGTH_OFF 0.02
+#define LENGTH_UNIT 1e-9
+#define VALUE_OUT_OF_RANGE 0 /* a force error: of a surface, which nobody set here */
+
+static const struct {
+	const char *name;
+	size_t n; /* bytes of its payload; 0: any */
+} types[VRPN_TYPES] = {
+	/* sensor, 0; position; quaternion, w last */
+	[VRPN_POSE] = {"vrpn_Tracker Pos_Quat", 64},
+	/* sensor, 0; velocity; its turn, in so many seconds */
+	[VRPN_VELOCITY] = {"vrpn_Tracker Velocity", 72},
+	/* button, whether it is pressed */
+	[VRPN_BUTTON] = {"vrpn_Button Change", 8},
+	/* how many, then each */
+	[VRPN_BUTTONS] = {"vrpn_Button States", 0},
+	/* code */
+	[VRPN_FORCE_ERROR] = {"vrpn_ForceDevice Force_Error", 4},
+	/* only sent */
+	[VRPN_FORCE_FIELD] = {"vrpn_ForceDevice Force_Field", 0},
+};
+
+static INCISE_REALTIME int64_t get_utc_ns(void)
+{
+	struct timespec now;
+
+	clock_gettime(CLOCK_REALTIME, &now);
+	return now.tv_sec * SECOND_NS + now.tv_nsec;
+}
+
+static INCISE_REALTIME uint32_t get_word(const uint8_t *from)
+{
+	uint32_t word;
+
+	memcpy(&word, from, sizeof(word));
+	return be32toh(word);
+}
+
+static INCISE_REALTIME double get_double(const uint8_t *from)
+{
+	uint64_t bits = (uint64_t)get_word(from) << 32 | get_word(from + 4);
+	double value;
+
+	memcpy(&value, &bits, sizeof(value));
+	return value;
+}
+
+static INCISE_REALTIME size_t pad(size_t n)
+{
+	return (n + 7) / 8 * 8;
+}
+
+static INCISE_REALTIME int fail(struct vrpn_device *device, int code, const char *what)
+{
+	device->gone = incise_error_set(
+		&device->cause, code,
+		"%s %s; see the messages of its server, and start it again", device->name,
+		what);
+	return device->gone;
+}
+
+void vrpn_device_init(struct vrpn_device *device)
+{
+	device->link.fd = device->link.stop = -1;
+	device->sender = -1;
+	for (int i = 0; i < VRPN_TYPES; i++)
+		device->types[i] = -1;
+	device->pose_ns = incise_monotonic_ns();
+}
+
+/* --- what comes ---------------------------------------------------------------------- */
+
+/* The last description of a number, or of a name, is valid. */
+static INCISE_REALTIME void describe(int32_t *number, const char *name, int32_t described,
+				     const uint8_t *payload, size_t n)
+{
+	const char *text = (const char *)payload + 4;
+	size_t length = strlen(name);
+
+	if (n >= 4 + length && !memcmp(text, name, length) &&
+	    (n == 4 + length || !text[length]))
+		*number = described;
+	else if (*number == described)
+		*number = -1;
+}
+
+/* False: the device has another number now, so it may be another one. */
+static INCISE_REALTIME bool take_description(struct vrpn_device *device, int32_t kind,
+					     int32_t number, const uint8_t *payload,
+					     size_t n)
+{
+	int32_t before = device->sender;
+
+	if (kind == DESCRIBES_SENDER && number >= 0)
+		describe(&device->sender, device->device, number, payload, n);
+	for (int i = 0; kind == DESCRIBES_TYPE && number >= 0 && i < VRPN_TYPES; i++)
+		describe(&device->types[i], types[i].name, number, payload, n);
+	return before < 0 || device->sender == before;
+}
+
+static INCISE_REALTIME int64_t find_time(struct vrpn_device *device, int64_t utc_ns)
+{
+	int64_t t_ns = utc_ns - (get_utc_ns() - incise_monotonic_ns());
+
+	if (!utc_ns)
+		return device->arrival_ns;
+	if (device->own_machine && t_ns <= device->arrival_ns &&
+	    device->arrival_ns - t_ns < SECOND_NS)
+		return t_ns;
+	return incise_sender_time(&device->clock, utc_ns, device->arrival_ns);
+}
+
+static INCISE_REALTIME bool place_pose(struct vrpn_pose *pose, const uint8_t *payload)
+{
+	double length2 = 0;
+
+	for (int i = 0; i < 3; i++) {
+		pose->position_mm[i] = 1000 * get_double(payload + 8 + 8 * i);
+		if (!(fabs(pose->position_mm[i]) <= PLACE_MOST_MM))
+			return false;
+	}
+	for (int i = 0; i < 4; i++) {
+		pose->quaternion[i] = get_double(payload + 32 + 8 * ((i + 3) % 4));
+		length2 += pose->quaternion[i] * pose->quaternion[i];
+	}
+	if (!(fabs(length2 - 1) <= LENGTH_OFF))
+		return false;
+	for (int i = 0; i < 4 && fabs(length2 - 1) > LENGTH_UNIT; i++)
+		pose->quaternion[i] /= sqrt(length2);
+	return true;
+}
+
+static INCISE_REALTIME void take_pose(struct vrpn_device *device, const uint8_t *payload,
+				      int64_t utc_ns)
+{
+	uint32_t sensor = get_word(payload);
+	struct vrpn_pose pose = {.velocity_mm_s = {NAN, NAN, NAN}};
+
+	if (sensor >= VRPN_SENSORS || !(device->sensors >> sensor & 1))
+		return;
+	pose.sound = place_pose(&pose, payload);
+	if (!pose.sound)
+		pose = (struct vrpn_pose){.velocity_mm_s = {NAN, NAN, NAN}};
+	pose.sensor = (int)sensor;
+	pose.utc_ns = utc_ns;
+	pose.t_ns = find_time(device, utc_ns);
+	if (pose.t_ns <= device->last.t_ns)
+		pose.t_ns = device->last.t_ns + 1;
+	device->last = pose;
+	device->pose_ns = device->arrival_ns;
+	device->waits = true;
+}
+
+static INCISE_REALTIME void take_velocity(struct vrpn_device *device,
+					  const uint8_t *payload, int64_t utc_ns)
+{
+	struct vrpn_pose *last = &device->last;
+
+	if (!device->waits || get_word(payload) != (uint32_t)last->sensor ||
+	    utc_ns != last->utc_ns)
+		return;
+	device->measures_velocity = true;
+	for (int i = 0; i < 3; i++)
+		last->velocity_mm_s[i] = 1000 * get_double(payload + 8 + 8 * i);
+}
+
+static INCISE_REALTIME void take_button(struct vrpn_device *device, size_t button,
+					uint32_t state)
+{
+	if (button >= BUTTONS)
+		return;
+	if (device->buttons <= (int)button)
+		device->buttons = (int)button + 1;
+	device->pressed &= ~(UINT32_C(1) << button);
+	device->pressed |= (uint32_t)(state != 0) << button;
+}
+
+static INCISE_REALTIME void take_message(struct vrpn_device *device, enum vrpn_type type,
+					 const uint8_t *payload, size_t n, int64_t utc_ns)
+{
+	if (types[type].n && n != types[type].n)
+		return;
+	if (type == VRPN_POSE)
+		take_pose(device, payload, utc_ns);
+	else if (type == VRPN_VELOCITY)
+		take_velocity(device, payload, utc_ns);
+	else if (type == VRPN_BUTTON)
+		take_button(device, get_word(payload), get_word(payload + 4));
+	else if (type == VRPN_FORCE_ERROR && get_word(payload) != VALUE_OUT_OF_RANGE)
+		device->force_error = (int)get_word(payload);
+	for (size_t at = 4; type == VRPN_BUTTONS && at + 4 <= n; at += 4)
+		take_button(device, at / 4 - 1, get_word(payload + at));
+}
+
+/* 1: the cookie is there. Minor versions speak alike. */
+static INCISE_REALTIME int take_cookie(struct vrpn_device *device)
+{
+	size_t n = device->n < strlen(VERSION) ? device->n : strlen(VERSION);
+
+	if (memcmp(device->bytes, VERSION, n))
+		return -EPROTO;
+	device->greeted = device->n >= COOKIE;
+	device->at = device->greeted ? COOKIE : 0;
+	return device->greeted;
+}
+
+/* The type of the next message that is used; -1: a message that is not; -EAGAIN, -EPROTO. */
+static INCISE_REALTIME int find_type(const struct vrpn_device *device)
+{
+	const uint8_t *header = device->bytes + device->at;
+	size_t left = device->n - device->at;
+	int type = VRPN_TYPES - 1;
+
+	if (left < VRPN_HEADER)
+		return -EAGAIN;
+	if (get_word(header) < VRPN_HEADER || get_word(header) > VRPN_MOST)
+		return -EPROTO;
+	if (left < pad(get_word(header)))
+		return -EAGAIN;
+	while (type >= 0 && (device->sender < 0 || device->types[type] < 0 ||
+			     (int32_t)get_word(header + 12) != device->sender ||
+			     (int32_t)get_word(header + 16) != device->types[type]))
+		type--;
+	return type;
+}
+
+int vrpn_device_pose(struct vrpn_device *device, struct vrpn_pose *pose)
+{
+	int type = device->greeted ? 0 : take_cookie(device);
+
+	if (type < 0)
+		return fail(device, EPROTO, "does not speak VRPN 07");
+	if (!device->greeted)
+		return 0;
+	while ((type = find_type(device)) >= -1) {
+		const uint8_t *header = device->bytes + device->at;
+		size_t n = get_word(header) - VRPN_HEADER;
+		int64_t utc_ns = get_word(header + 4) * SECOND_NS +
+				 get_word(header + 8) * INT64_C(1000);
+
+		/* It has all that has come since. */
+		if (type == VRPN_POSE && device->waits)
+			break;
+		device->at += pad(VRPN_HEADER + n);
+		if (type >= 0)
+			take_message(device, (enum vrpn_type)type, header + VRPN_HEADER,
+				     n, utc_ns);
+		else if (!take_description(device, (int32_t)get_word(header + 16),
+					   (int32_t)get_word(header + 12),
+					   header + VRPN_HEADER, n))
+			return fail(device, EPROTO, "got another number");
+	}
+	if (type == -EPROTO)
+		return fail(device, EPROTO, "sent a message that VRPN 07 does not have");
+	if (!device->waits)
+		return 0;
+	*pose = device->last;
+	device->waits = false;
+	return 1;
+}
+
+int vrpn_device_receive(struct vrpn_device *device)
+{
+	size_t room = sizeof(device->bytes) - (device->n -= device->at);
+	ssize_t n = 0;
+
+	memmove(device->bytes, device->bytes + device->at, device->n);
+	device->at = 0;
+	if (device->gone)
+		return device->gone;
+	if (room)
+		n = recv(device->link.fd, device->bytes + device->n, room, 0);
+	if (room && (!n || (n < 0 && errno != EAGAIN && errno != EINTR)))
+		return fail(device, ENODEV, "closed the connection");
+	device->n += n > 0 ? (size_t)n : 0;
+	device->arrival_ns = incise_monotonic_ns();
+	if (device->arrival_ns - device->pose_ns > device->silent_ns)
+		return fail(device, EIO, "sends no poses");
+	return 0;
+}
+
+int vrpn_device_cause(const struct vrpn_device *device, char *text, size_t size)
+{
+	return snprintf(text, size, "%s", device->gone ? device->cause.text : "");
+}
+
+/* --- what is sent -------------------------------------------------------------------- */
+
+static INCISE_REALTIME uint8_t *put_word(uint8_t *to, uint32_t word)
+{
+	word = htobe32(word);
+	memcpy(to, &word, sizeof(word));
+	return to + sizeof(word);
+}
+
+size_t vrpn_pack(uint8_t *to, size_t n, int32_t sender, int32_t type)
+{
+	int64_t utc_ns = get_utc_ns();
+
+	memset(to, 0, VRPN_HEADER + pad(n));
+	to = put_word(to, (uint32_t)(VRPN_HEADER + n));
+	to = put_word(to, (uint32_t)(utc_ns / SECOND_NS));
+	to = put_word(to, (uint32_t)(utc_ns % SECOND_NS / 1000));
+	to = put_word(to, (uint32_t)sender);
+	put_word(to, (uint32_t)type);
+	return VRPN_HEADER + pad(n);
+}
+
+/* The name behind a number 0 of this side. */
+static size_t pack_name(uint8_t *to, int32_t kind, const char *name)
+{
+	size_t n = strlen(name) + 1;
+	size_t size = vrpn_pack(to, 4 + n, 0, kind);
+
+	put_word(to + VRPN_HEADER, (uint32_t)n);
+	memcpy(to + VRPN_HEADER + 4, name, n);
+	return size;
+}
+
+int vrpn_device_send(struct vrpn_device *device, const uint8_t *bytes, size_t n)
+{
+	if (device->gone || send(device->link.fd, bytes, n, MSG_NOSIGNAL) == (ssize_t)n)
+		return device->gone;
+	return fail(device, EIO, "takes nothing any more");
+}
+
+/* --- opening ------------------------------------------------------------------------- */
+
+static int parse_device(struct vrpn_device *device, const char *arguments,
+			const char *where, struct incise_error *err)
+{
+	int n = (int)strcspn(arguments, "@");
+	const char *rest = "";
+
+	if (!n || n >= VRPN_NAME || !arguments[n] ||
+	    server_link_parse(&device->link, arguments + n + 1, PORT, &rest) || *rest)
+		return incise_error_set(
+			err, EINVAL,
+			"%s: \"%.80s\": expected vrpn:NAME@HOST:PORT, such as "
+			"vrpn:Phantom0@localhost; correct it",
+			where, arguments);
+	snprintf(device->device, sizeof(device->device), "%.*s", n, arguments);
+	snprintf(device->name, sizeof(device->name), "VRPN %.28s at %.28s",
+		 device->device, device->link.host);
+	return 0;
+}
+
+/* Whether the server has the address of this end. The port of IPv6 is in the same place. */
+static bool is_own_machine(const struct server_link *link)
+{
+	struct sockaddr_storage own = {0};
+	socklen_t n = sizeof(own);
+
+	if (getsockname(link->fd, (struct sockaddr *)&own, &n))
+		return false;
+	((struct sockaddr_in *)&own)->sin_port =
+		((const struct sockaddr_in *)&link->address)->sin_port;
+	return !memcmp(&own, &link->address, n);
+}
+
+/* Receive until the rate is known, or it is clear that it will not be. */
+static void learn_poses(struct vrpn_device *device)
+{
+	int64_t until_ns = incise_monotonic_ns() + FIRST_NS, first_ns = 0, age_ns = 0;
+	double span_ns = 0;
+	struct vrpn_pose pose;
+	int n = 0;
+
+	while (incise_monotonic_ns() < until_ns &&
+	       (n < POSES_LEAST || span_ns < LEARN_NS)) {
+		server_link_wait(&device->link, device->link.fd, POLLIN, 100);
+		if (vrpn_device_receive(device))
+			return;
+		while (vrpn_device_pose(device, &pose) == 1) {
+			if (!n++)
+				first_ns = pose.t_ns;
+			span_ns = (double)(pose.t_ns - first_ns);
+			age_ns += device->arrival_ns - pose.t_ns;
+		}
+	}
+	if (n < POSES_LEAST || span_ns < LEARN_NS)
+		return;
+	device->rate_hz = (n - 1) * 1e9 / span_ns;
+	device->latency_ns = age_ns / n;
+}
+
+static int explain_absence(const struct vrpn_device *device, bool forces,
+			   const char *where, struct incise_error *err)
+{
+	if (device->gone)
+		return incise_error_set(err, -device->gone, "%s: %s", where,
+					device->cause.text);
+	if (device->sender < 0)
+		return incise_error_set(
+			err, ENODEV,
+			"%s: its server has no device \"%s\"; correct the name", where,
+			device->device);
+	if (!(device->rate_hz > 0))
+		return incise_error_set(
+			err, EIO,
+			"%s: %s sends no poses; switch it on, and see the "
+			"messages of its server",
+			where, device->name);
+	/* Before names are sent, which a server takes for its own. */
+	if (forces && device->types[VRPN_FORCE_FIELD] < 0)
+		return incise_error_set(err, ENODEV,
+					"%s: %s takes no force; use it as `tracker`",
+					where, device->name);
+	return 0;
+}
+
+int vrpn_device_open(struct vrpn_device *device,
+		     const struct incise_backend_request *request, bool forces,
+		     struct incise_error *err)
+{
+	uint8_t bytes[2 * (VRPN_HEADER + VRPN_NAME + 4)] = VERSION "38  0";
+	size_t n;
+	int rc;
+
+	vrpn_device_init(device);
+	rc = parse_device(device, request->arguments, request->where, err);
+	rc = rc ? rc : server_link_find(&device->link, "VRPN", request->where, err);
+	if (rc)
+		return rc;
+	device->own_machine = is_own_machine(&device->link);
+	vrpn_device_send(device, bytes, COOKIE);
+	learn_poses(device);
+	rc = explain_absence(device, forces, request->where, err);
+	if (rc || !forces)
+		return rc;
+	n = pack_name(bytes, DESCRIBES_SENDER, device->device);
+	n += pack_name(bytes + n, DESCRIBES_TYPE, types[VRPN_FORCE_FIELD].name);
+	return vrpn_device_send(device, bytes, n);
+}

@@ -1,0 +1,103 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * A device of a VRPN server, "NAME@HOST[:PORT]", from the bytes of one socket, which may be anything.
+ * VRPN 07 by TCP: big-endian, metres.
+ *
+ *     cookie, 24 bytes, each way    then messages
+ *     ┌──────────────────┬───────┐  ┌────────┬───┬────┬────────┬──────┬──────┬─────────┬─────────┐
+ *     │"vrpn: ver. 07.38"│"  0"  │  │ length │ s │ µs │ sender │ type │ any  │ payload │ to 8 n  │
+ *     └──────────────────┴───────┘  │ 4      │ 4 │ 4  │ 4      │ 4    │ 4    │         │ padding │
+ *                                   └────────┴───┴────┴────────┴──────┴──────┴─────────┴─────────┘
+ *                                    24 + payload, without the padding
+ *
+ * Each side numbers senders (devices) and types, and describes them in messages of types -1 and -2
+ * with the number in place of the sender. What is not described, or not used here, is passed over.
+ * Neither side offers UDP, so all goes by TCP.
+ *
+ * Time: on this machine the server's timestamps are of CLOCK_REALTIME, and exact; sender_clock.h maps
+ * those of another machine, without the least delay of the network, which nobody here can know. A
+ * timestamp after its arrival, or a second before, is of another clock, wherever the server seems to be.
+ */
+#ifndef INCISE_VRPN_DEVICE_H
+#define INCISE_VRPN_DEVICE_H
+
+#include <incise/backend.h>
+#include "../../rig/sender_clock.h"
+#include "../../rig/server_link.h"
+
+#define VRPN_HEADER 24
+#define VRPN_SENSORS 32
+#define VRPN_NAME 100	/* longest name, with its zero */
+#define VRPN_MOST 65536 /* bytes of a message; VRPN's own limit is 64000 */
+
+enum vrpn_type {
+	VRPN_POSE,
+	VRPN_VELOCITY,
+	VRPN_BUTTON,
+	VRPN_BUTTONS,
+	VRPN_FORCE_ERROR,
+	VRPN_FORCE_FIELD,
+};
+#define VRPN_TYPES 6
+
+struct vrpn_pose {
+	int64_t t_ns, utc_ns;
+	int sensor;
+	bool sound; /* finite, within 1 km, a rotation; else position and quaternion are 0 */
+	double position_mm[3], velocity_mm_s[3]; /* NaN: none came along */
+	double quaternion[4];			 /* unit, w first */
+};
+
+struct vrpn_device {
+	struct server_link link;
+	char device[VRPN_NAME], name[64]; /* as the server has it; for people */
+	uint8_t bytes[2 * VRPN_MOST];
+	size_t at, n; /* bytes that are used, and that are there */
+	bool greeted; /* the cookie is through */
+	/* Numbers of the server; -1: not described. */
+	int32_t sender, types[VRPN_TYPES];
+	struct vrpn_pose last; /* waits for its velocity */
+	bool waits;
+	bool own_machine;
+	struct incise_sender_clock clock;
+	int64_t arrival_ns, pose_ns; /* of what was received last, and of the last pose */
+	int64_t silent_ns;	     /* after so long without a pose it has failed */
+	uint32_t sensors;	     /* that are used, as bits */
+	uint32_t pressed;
+	int buttons;	 /* number */
+	int force_error; /* of the device, by its server; 0: none */
+	/* Found out as it is opened: poses a second, of all of these, and mean age at arrival. */
+	double rate_hz;
+	int64_t latency_ns;
+	bool measures_velocity;
+	int gone; /* negative errno, for good: then cause is set */
+	struct incise_error cause;
+};
+
+/* Of zeros, but for silent_ns and sensors: without a connection. */
+void vrpn_device_init(struct vrpn_device *device);
+
+/*
+ * Connect, and receive poses of device->sensors for half a second. @forces: it is to take them; here,
+ * number 0 is the device, and that of force fields. 0 or -errno with a message; close the link.
+ */
+int vrpn_device_open(struct vrpn_device *device,
+		     const struct incise_backend_request *request, bool forces,
+		     struct incise_error *err);
+
+/* Receive what is there, without waiting. 0 or device->gone. */
+int vrpn_device_receive(struct vrpn_device *device) INCISE_REALTIME;
+
+/* The next pose from what was received. 1; 0: there is none; or device->gone. */
+int vrpn_device_pose(struct vrpn_device *device, struct vrpn_pose *pose) INCISE_REALTIME;
+
+/* Send, or fail. 0 or device->gone. */
+int vrpn_device_send(struct vrpn_device *device, const uint8_t *bytes,
+		     size_t n) INCISE_REALTIME;
+
+/* Pack a header for a payload of @n bytes, which starts as zeros. Returns the size of both. */
+size_t vrpn_pack(uint8_t *to, size_t n, int32_t sender, int32_t type) INCISE_REALTIME;
+
+int vrpn_device_cause(const struct vrpn_device *device, char *text, size_t size);
+
+#endif
