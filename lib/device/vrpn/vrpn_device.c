@@ -18,7 +18,7 @@
 #define VERSION "vrpn: ver. 07."
 #define COOKIE 24
 #define FIRST_NS (5 * SECOND_NS) /* for enough poses to know the rate */
-#define LEARN_NS 5e8		 /* of poses */
+#define LEARN_NS (SECOND_NS / 2) /* of poses */
 #define POSES_LEAST 5
 #define DESCRIBES_SENDER (-1)
 #define DESCRIBES_TYPE (-2)
@@ -79,10 +79,10 @@ static INCISE_REALTIME size_t pad(size_t n)
 
 static INCISE_REALTIME int fail(struct vrpn_device *device, int code, const char *what)
 {
-	device->gone = incise_error_set(
-		&device->cause, code,
-		"%s %s; see the messages of its server, and start it again", device->name,
-		what);
+	device->gone =
+		incise_error_set(&device->cause, code,
+				 "%s %s; see its server's messages, and start both again",
+				 device->name, what);
 	return device->gone;
 }
 
@@ -367,7 +367,7 @@ static int parse_device(struct vrpn_device *device, const char *arguments,
 			"vrpn:Phantom0@localhost; correct it",
 			where, arguments);
 	snprintf(device->device, sizeof(device->device), "%.*s", n, arguments);
-	snprintf(device->name, sizeof(device->name), "VRPN %.28s at %.28s",
+	snprintf(device->name, sizeof(device->name), "VRPN %.24s at %.27s",
 		 device->device, device->link.host);
 	return 0;
 }
@@ -385,49 +385,45 @@ static bool is_own_machine(const struct server_link *link)
 	return !memcmp(&own, &link->address, n);
 }
 
-/* Receive until the rate is known, or it is clear that it will not be. */
+/* Receive until the rate is known, by the sender's clock, or it is clear that it will not be. */
 static void learn_poses(struct vrpn_device *device)
 {
 	int64_t until_ns = incise_monotonic_ns() + FIRST_NS, first_ns = 0, age_ns = 0;
-	double span_ns = 0;
 	struct vrpn_pose pose;
 	int n = 0;
 
-	while (incise_monotonic_ns() < until_ns &&
-	       (n < POSES_LEAST || span_ns < LEARN_NS)) {
+	while (!(device->rate_hz > 0) && incise_monotonic_ns() < until_ns) {
 		server_link_wait(&device->link, device->link.fd, POLLIN, 100);
 		if (vrpn_device_receive(device))
 			return;
 		while (vrpn_device_pose(device, &pose) == 1) {
+			int64_t at_ns = pose.utc_ns ? pose.utc_ns : pose.t_ns;
+
 			if (!n++)
-				first_ns = pose.t_ns;
-			span_ns = (double)(pose.t_ns - first_ns);
+				first_ns = at_ns;
 			age_ns += device->arrival_ns - pose.t_ns;
+			if (n >= POSES_LEAST && at_ns - first_ns >= LEARN_NS)
+				device->rate_hz =
+					(n - 1) * 1e9 / (double)(at_ns - first_ns);
 		}
 	}
-	if (n < POSES_LEAST || span_ns < LEARN_NS)
-		return;
-	device->rate_hz = (n - 1) * 1e9 / span_ns;
-	device->latency_ns = age_ns / n;
+	if (device->rate_hz > 0)
+		device->latency_ns = age_ns / n;
+	else
+		fail(device, EIO, "sends no poses");
 }
 
 static int explain_absence(const struct vrpn_device *device, bool forces,
 			   const char *where, struct incise_error *err)
 {
+	if (device->greeted && device->sender < 0)
+		return incise_error_set(
+			err, ENODEV,
+			"%s: %s: its server has no device of that name; correct the name",
+			where, device->name);
 	if (device->gone)
 		return incise_error_set(err, -device->gone, "%s: %s", where,
 					device->cause.text);
-	if (device->sender < 0)
-		return incise_error_set(
-			err, ENODEV,
-			"%s: its server has no device \"%s\"; correct the name", where,
-			device->device);
-	if (!(device->rate_hz > 0))
-		return incise_error_set(
-			err, EIO,
-			"%s: %s sends no poses; switch it on, and see the "
-			"messages of its server",
-			where, device->name);
 	/* Before names are sent, which a server takes for its own. */
 	if (forces && device->types[VRPN_FORCE_FIELD] < 0)
 		return incise_error_set(err, ENODEV,
