@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * A haptic device of VRPN's own classes: its tracker moves on a circle, its button changes each
- * 100 ms, and each force field that it gets becomes its force report and a line. For recordings
- * and the benchmark of tests/vrpn; README.md there says how it is built.
+ * 100 ms, and each force field that it gets becomes its force report and a line. See README.md.
  *
  *   server PORT HZ tracker|force
  */

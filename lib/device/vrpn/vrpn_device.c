@@ -24,7 +24,7 @@
 #define DESCRIBES_TYPE (-2)
 #define BUTTONS 32
 #define PLACE_MOST_MM 1e6
-/* Of the square of a quaternion's length: more is no rotation; less is a unit, and left as it is. */
+/* The square of a quaternion's length: further off is no rotation; nearer is a unit, left as it is. */
 #define LENGTH_OFF 0.02
 #define LENGTH_UNIT 1e-9
 #define VALUE_OUT_OF_RANGE 0 /* a force error: of a surface, which nobody set here */
@@ -47,7 +47,7 @@ static const struct {
 	[VRPN_FORCE_FIELD] = {"vrpn_ForceDevice Force_Field", 0},
 };
 
-static INCISE_REALTIME int64_t get_utc_ns(void)
+static int64_t get_utc_ns(void)
 {
 	struct timespec now;
 
@@ -55,7 +55,7 @@ static INCISE_REALTIME int64_t get_utc_ns(void)
 	return now.tv_sec * SECOND_NS + now.tv_nsec;
 }
 
-static INCISE_REALTIME uint32_t get_word(const uint8_t *from)
+static uint32_t get_word(const uint8_t *from)
 {
 	uint32_t word;
 
@@ -63,7 +63,7 @@ static INCISE_REALTIME uint32_t get_word(const uint8_t *from)
 	return be32toh(word);
 }
 
-static INCISE_REALTIME double get_double(const uint8_t *from)
+static double get_double(const uint8_t *from)
 {
 	uint64_t bits = (uint64_t)get_word(from) << 32 | get_word(from + 4);
 	double value;
@@ -72,12 +72,12 @@ static INCISE_REALTIME double get_double(const uint8_t *from)
 	return value;
 }
 
-static INCISE_REALTIME size_t pad(size_t n)
+static size_t pad(size_t n)
 {
 	return (n + 7) / 8 * 8;
 }
 
-static INCISE_REALTIME int fail(struct vrpn_device *device, int code, const char *what)
+static int fail(struct vrpn_device *device, int code, const char *what)
 {
 	device->gone =
 		incise_error_set(&device->cause, code,
@@ -92,14 +92,13 @@ void vrpn_device_init(struct vrpn_device *device)
 	device->sender = -1;
 	for (int i = 0; i < VRPN_TYPES; i++)
 		device->types[i] = -1;
-	device->pose_ns = incise_monotonic_ns();
 }
 
 /* --- what comes ---------------------------------------------------------------------- */
 
 /* The last description of a number, or of a name, is valid. */
-static INCISE_REALTIME void describe(int32_t *number, const char *name, int32_t described,
-				     const uint8_t *payload, size_t n)
+static void describe(int32_t *number, const char *name, int32_t described,
+		     const uint8_t *payload, size_t n)
 {
 	const char *text = (const char *)payload + 4;
 	size_t length = strlen(name);
@@ -112,9 +111,8 @@ static INCISE_REALTIME void describe(int32_t *number, const char *name, int32_t 
 }
 
 /* False: the device has another number now, so it may be another one. */
-static INCISE_REALTIME bool take_description(struct vrpn_device *device, int32_t kind,
-					     int32_t number, const uint8_t *payload,
-					     size_t n)
+static bool take_description(struct vrpn_device *device, int32_t kind, int32_t number,
+			     const uint8_t *payload, size_t n)
 {
 	int32_t before = device->sender;
 
@@ -125,7 +123,7 @@ static INCISE_REALTIME bool take_description(struct vrpn_device *device, int32_t
 	return before < 0 || device->sender == before;
 }
 
-static INCISE_REALTIME int64_t find_time(struct vrpn_device *device, int64_t utc_ns)
+static int64_t find_time(struct vrpn_device *device, int64_t utc_ns)
 {
 	int64_t t_ns = utc_ns - (get_utc_ns() - incise_monotonic_ns());
 
@@ -137,7 +135,7 @@ static INCISE_REALTIME int64_t find_time(struct vrpn_device *device, int64_t utc
 	return incise_sender_time(&device->clock, utc_ns, device->arrival_ns);
 }
 
-static INCISE_REALTIME bool place_pose(struct vrpn_pose *pose, const uint8_t *payload)
+static bool place_pose(struct vrpn_pose *pose, const uint8_t *payload)
 {
 	double length2 = 0;
 
@@ -157,29 +155,28 @@ static INCISE_REALTIME bool place_pose(struct vrpn_pose *pose, const uint8_t *pa
 	return true;
 }
 
-static INCISE_REALTIME void take_pose(struct vrpn_device *device, const uint8_t *payload,
-				      int64_t utc_ns)
+static void take_pose(struct vrpn_device *device, const uint8_t *payload, int64_t utc_ns)
 {
 	uint32_t sensor = get_word(payload);
-	struct vrpn_pose pose = {.velocity_mm_s = {NAN, NAN, NAN}};
+	struct vrpn_pose pose = {.sensor = (int)sensor,
+				 .t_ns = find_time(device, utc_ns),
+				 .utc_ns = utc_ns,
+				 .velocity_mm_s = {NAN, NAN, NAN}};
 
 	if (sensor >= VRPN_SENSORS || !(device->sensors >> sensor & 1))
 		return;
 	pose.sound = place_pose(&pose, payload);
-	if (!pose.sound)
-		pose = (struct vrpn_pose){.velocity_mm_s = {NAN, NAN, NAN}};
-	pose.sensor = (int)sensor;
-	pose.utc_ns = utc_ns;
-	pose.t_ns = find_time(device, utc_ns);
+	/* Sensors of one frame have one timestamp. */
 	if (pose.t_ns <= device->last.t_ns)
 		pose.t_ns = device->last.t_ns + 1;
 	device->last = pose;
-	device->pose_ns = device->arrival_ns;
 	device->waits = true;
+	if (pose.sound)
+		device->pose_ns = device->arrival_ns;
 }
 
-static INCISE_REALTIME void take_velocity(struct vrpn_device *device,
-					  const uint8_t *payload, int64_t utc_ns)
+static void take_velocity(struct vrpn_device *device, const uint8_t *payload,
+			  int64_t utc_ns)
 {
 	struct vrpn_pose *last = &device->last;
 
@@ -191,8 +188,7 @@ static INCISE_REALTIME void take_velocity(struct vrpn_device *device,
 		last->velocity_mm_s[i] = 1000 * get_double(payload + 8 + 8 * i);
 }
 
-static INCISE_REALTIME void take_button(struct vrpn_device *device, size_t button,
-					uint32_t state)
+static void take_button(struct vrpn_device *device, size_t button, uint32_t state)
 {
 	if (button >= BUTTONS)
 		return;
@@ -202,8 +198,8 @@ static INCISE_REALTIME void take_button(struct vrpn_device *device, size_t butto
 	device->pressed |= (uint32_t)(state != 0) << button;
 }
 
-static INCISE_REALTIME void take_message(struct vrpn_device *device, enum vrpn_type type,
-					 const uint8_t *payload, size_t n, int64_t utc_ns)
+static void take_message(struct vrpn_device *device, enum vrpn_type type,
+			 const uint8_t *payload, size_t n, int64_t utc_ns)
 {
 	if (types[type].n && n != types[type].n)
 		return;
@@ -220,7 +216,7 @@ static INCISE_REALTIME void take_message(struct vrpn_device *device, enum vrpn_t
 }
 
 /* 1: the cookie is there. Minor versions speak alike. */
-static INCISE_REALTIME int take_cookie(struct vrpn_device *device)
+static int take_cookie(struct vrpn_device *device)
 {
 	size_t n = device->n < strlen(VERSION) ? device->n : strlen(VERSION);
 
@@ -232,7 +228,7 @@ static INCISE_REALTIME int take_cookie(struct vrpn_device *device)
 }
 
 /* The type of the next message that is used; -1: a message that is not; -EAGAIN, -EPROTO. */
-static INCISE_REALTIME int find_type(const struct vrpn_device *device)
+static int find_type(const struct vrpn_device *device)
 {
 	const uint8_t *header = device->bytes + device->at;
 	size_t left = device->n - device->at;
@@ -313,7 +309,7 @@ int vrpn_device_cause(const struct vrpn_device *device, char *text, size_t size)
 
 /* --- what is sent -------------------------------------------------------------------- */
 
-static INCISE_REALTIME uint8_t *put_word(uint8_t *to, uint32_t word)
+static uint8_t *put_word(uint8_t *to, uint32_t word)
 {
 	word = htobe32(word);
 	memcpy(to, &word, sizeof(word));
@@ -346,9 +342,9 @@ static size_t pack_name(uint8_t *to, int32_t kind, const char *name)
 
 int vrpn_device_send(struct vrpn_device *device, const uint8_t *bytes, size_t n)
 {
-	if (device->gone || send(device->link.fd, bytes, n, MSG_NOSIGNAL) == (ssize_t)n)
-		return device->gone;
-	return fail(device, EIO, "takes nothing any more");
+	if (send(device->link.fd, bytes, n, MSG_NOSIGNAL) != (ssize_t)n && !device->gone)
+		fail(device, EIO, "takes nothing any more");
+	return device->gone;
 }
 
 /* --- opening ------------------------------------------------------------------------- */
@@ -392,6 +388,7 @@ static void learn_poses(struct vrpn_device *device)
 	struct vrpn_pose pose;
 	int n = 0;
 
+	device->pose_ns = until_ns;
 	while (!(device->rate_hz > 0) && incise_monotonic_ns() < until_ns) {
 		server_link_wait(&device->link, device->link.fd, POLLIN, 100);
 		if (vrpn_device_receive(device))

@@ -43,7 +43,7 @@ enum vrpn_type {
 struct vrpn_pose {
 	int64_t t_ns, utc_ns;
 	int sensor;
-	bool sound; /* finite, within 1 km, a rotation; else position and quaternion are 0 */
+	bool sound;				 /* finite, within 1 km, a rotation */
 	double position_mm[3], velocity_mm_s[3]; /* NaN: none came along */
 	double quaternion[4];			 /* unit, w first */
 };
@@ -60,8 +60,8 @@ struct vrpn_device {
 	bool waits;
 	bool own_machine;
 	struct incise_sender_clock clock;
-	int64_t arrival_ns, pose_ns; /* of what was received last, and of the last pose */
-	int64_t silent_ns;	     /* after so long without a pose it has failed */
+	int64_t arrival_ns, pose_ns; /* of what came last, and of the last sound pose */
+	int64_t silent_ns;	     /* after so long without one it has failed */
 	uint32_t sensors;	     /* that are used, as bits */
 	uint32_t pressed;
 	int buttons;	 /* number */
@@ -74,7 +74,7 @@ struct vrpn_device {
 	struct incise_error cause;
 };
 
-/* Of zeros, but for silent_ns and sensors: without a connection. */
+/* Start from zeros, but for silent_ns and sensors, without a connection. */
 void vrpn_device_init(struct vrpn_device *device);
 
 /*
@@ -86,17 +86,16 @@ int vrpn_device_open(struct vrpn_device *device,
 		     struct incise_error *err);
 
 /* Receive what is there, without waiting. 0 or device->gone. */
-int vrpn_device_receive(struct vrpn_device *device) INCISE_REALTIME;
+int vrpn_device_receive(struct vrpn_device *device);
 
 /* The next pose from what was received. 1; 0: there is none; or device->gone. */
-int vrpn_device_pose(struct vrpn_device *device, struct vrpn_pose *pose) INCISE_REALTIME;
+int vrpn_device_pose(struct vrpn_device *device, struct vrpn_pose *pose);
 
-/* Send, or fail. 0 or device->gone. */
-int vrpn_device_send(struct vrpn_device *device, const uint8_t *bytes,
-		     size_t n) INCISE_REALTIME;
+/* Send, or fail; it is sent after a failure, too. 0 or device->gone. */
+int vrpn_device_send(struct vrpn_device *device, const uint8_t *bytes, size_t n);
 
 /* Pack a header for a payload of @n bytes, which starts as zeros. Returns the size of both. */
-size_t vrpn_pack(uint8_t *to, size_t n, int32_t sender, int32_t type) INCISE_REALTIME;
+size_t vrpn_pack(uint8_t *to, size_t n, int32_t sender, int32_t type);
 
 int vrpn_device_cause(const struct vrpn_device *device, char *text, size_t size);
 

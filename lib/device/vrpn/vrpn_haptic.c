@@ -5,13 +5,11 @@
  *
  *     force = F + J (x - x0) where |x - x0| <= radius; else none.  Here J = 0, x0 is the last position.
  *
- * VRPN has no command for a force alone, and no deadman: a server keeps the last field. Those of
- * its own end it so, by the source of 07.38: that of the Phantom and of DirectX joysticks when the last of all
- * its clients has disconnected, that of the Falcon never. A process that dies disconnects; a
- * cable that is pulled does not.
- *
- * The Falcon's takes 0.1 of the radius after each field, and 10 ms for most of a new force, so the
- * radius is ten times a large workspace's.
+ * VRPN has no command for a force alone, and no deadman: a server keeps the last field. By the source
+ * of 07.38 those of Phantoms and of DirectX joysticks end it when the last of all their clients has
+ * disconnected, that of the Falcon never. A process that dies disconnects; a cable that is pulled
+ * does not. The Falcon's server also takes 0.1 of the radius while fields come, and 10 ms for two
+ * thirds of a new force; so the radius is ten times that of a workspace.
  */
 #include <endian.h>
 #include <errno.h>
@@ -85,7 +83,7 @@ static int haptic_wait(struct incise_haptic *haptic, int64_t most_ns)
 	return ppoll(&on, 1, &most, NULL) < 0 ? -errno : 0;
 }
 
-static INCISE_REALTIME uint8_t *put_single(uint8_t *to, double value)
+static uint8_t *put_single(uint8_t *to, double value)
 {
 	float single = (float)value;
 	uint32_t bits;
@@ -97,8 +95,7 @@ static INCISE_REALTIME uint8_t *put_single(uint8_t *to, double value)
 }
 
 /* Origin, force, Jacobian, radius. */
-static INCISE_REALTIME int send_field(struct vrpn_haptic *h, const double force_N[3],
-				      double radius_m)
+static int send_field(struct vrpn_haptic *h, const double force_N[3], double radius_m)
 {
 	uint8_t bytes[VRPN_HEADER + FIELD], *to = bytes + VRPN_HEADER;
 
@@ -114,8 +111,10 @@ static INCISE_REALTIME int send_field(struct vrpn_haptic *h, const double force_
 static int haptic_push(struct incise_haptic *haptic, const double force_N[3],
 		       const double torque_N_mm[3])
 {
+	struct vrpn_haptic *h = vrpn_haptic_of(haptic);
+
 	(void)torque_N_mm;
-	return send_field(vrpn_haptic_of(haptic), force_N, RADIUS_M);
+	return h->device.gone ? h->device.gone : send_field(h, force_N, RADIUS_M);
 }
 
 static void haptic_info(const struct incise_haptic *haptic,
@@ -146,8 +145,8 @@ static uint64_t haptic_lost(const struct incise_haptic *haptic)
 }
 
 /*
- * Until the server has read the last force: a connection that is closed while poses wait on it is
- * reset, and a reset may overtake the force.
+ * No force, after a failure, too. It waits until the server has read that: a connection that is closed
+ * while poses wait on it is reset, and a reset may overtake the force.
  */
 static void haptic_close(struct incise_haptic *haptic)
 {

@@ -9,33 +9,20 @@
 #include <string.h>
 #include "../../base/vector.h"
 #include "../../rig/backends.h"
-#include "../../rig/pace.h"
 #include "../../rig/tracker_feed.h"
 #include "vrpn_device.h"
-
-#define SILENT_NS INT64_C(10000000000)
-#define SLIP 2 /* periods, as a program that sends by sleeping slips */
 
 struct vrpn_tracker {
 	struct incise_tracker tracker; /* first */
 	struct vrpn_device device;
 	struct incise_tracker_setup setup;
-	struct incise_pace pace;
 	struct tracker_repeat repeat[VRPN_SENSORS];
-	uint64_t seq, lost;
+	uint64_t seq;
 };
 
 static struct vrpn_tracker *vrpn_tracker_of(const struct incise_tracker *tracker)
 {
 	return (struct vrpn_tracker *)tracker;
-}
-
-static void lose(struct vrpn_tracker *t, uint64_t n)
-{
-	if (n <= SLIP)
-		return;
-	t->seq += n;
-	t->lost += n;
 }
 
 static void place_tool(struct vrpn_tracker *t, const struct vrpn_pose *pose,
@@ -67,7 +54,6 @@ static void take_pose(struct vrpn_tracker *t, const struct vrpn_pose *pose,
 		sample->after_ns = (uint32_t)(arrival_ns - pose->t_ns);
 	if (pose->sound)
 		place_tool(t, pose, sample);
-	lose(t, incise_pace_add(&t->pace, pose->t_ns, arrival_ns));
 	sample->seq = t->seq++;
 }
 
@@ -96,14 +82,16 @@ static void tracker_info(const struct incise_tracker *tracker,
 		.tube_station = t->setup.tube_station,
 		.external_sync = true, /* the sender decides when */
 		.network = true,
-		.lost_unsure = t->pace.unsure,
+		.lost_unsure = true,
 	};
 	snprintf(info->name, sizeof(info->name), "%s", t->device.name);
 }
 
+/* TCP loses nothing, and poses that a server leaves out have no numbers. */
 static uint64_t tracker_lost(const struct incise_tracker *tracker)
 {
-	return vrpn_tracker_of(tracker)->lost;
+	(void)tracker;
+	return 0;
 }
 
 static void tracker_close(struct incise_tracker *tracker)
@@ -140,17 +128,16 @@ static void *tracker_open(const struct incise_backend_request *request,
 	}
 	t->tracker.ops = &ops;
 	t->setup = request->tracker ? *request->tracker : usual;
-	t->device.silent_ns = SILENT_NS;
+	/* It sends nothing of a tool that it does not see. */
+	t->device.silent_ns = INT64_MAX;
 	for (int i = 0; i < t->setup.n_stations; i++)
 		t->device.sensors |= UINT32_C(1) << (t->setup.stations[i] - 1);
 	rc = vrpn_device_open(&t->device, request, false, err);
-	if (rc) {
-		tracker_close(&t->tracker);
-		errno = -rc;
-		return NULL;
-	}
-	incise_pace_init(&t->pace, t->device.rate_hz, INCISE_PACE_OFF, 1);
-	return &t->tracker;
+	if (!rc)
+		return &t->tracker;
+	tracker_close(&t->tracker);
+	errno = -rc;
+	return NULL;
 }
 
 const struct incise_backend incise_tracker_vrpn = {

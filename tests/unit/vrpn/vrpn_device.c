@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/vrpn: what VRPN's own classes, version 07.38, sent and accepted. tests/vrpn/recorded.*
+ * lib/device/vrpn: what VRPN's own classes, version 07.38, sent and accepted. tests/fuzz/vrpn_device/recorded.*
  * are the bytes of a connection of tests/vrpn/server.cc to the backend `haptic`, both ways; the
  * server printed each force of them.
  */
@@ -39,8 +39,8 @@ static size_t load(const char *path, uint8_t *to)
 
 static int load_recorded(void **state)
 {
-	server_n = load("tests/vrpn/recorded.server", server);
-	client_n = load("tests/vrpn/recorded.client", client);
+	server_n = load("tests/fuzz/vrpn_device/recorded.server", server);
+	client_n = load("tests/fuzz/vrpn_device/recorded.client", client);
 	return 0;
 }
 
@@ -243,8 +243,12 @@ TEST(poses_that_are_none_are_not_sound, connect_pair, close_pair)
 		send_pose(1, 2, bad[i]);
 		assert_int_equal(count_poses(&pose), 1);
 		assert_false(pose.sound);
-		assert_true(pose.position_mm[0] == 0 && pose.quaternion[0] == 0);
 	}
+	/* However many come. */
+	device.silent_ns = 1;
+	assert_int_equal(vrpn_device_receive(&device), -EIO);
+	device.silent_ns = INT64_MAX;
+	device.gone = 0;
 	send_pose(1, 2, long_one);
 	assert_int_equal(count_poses(&pose), 1);
 	assert_true(pose.sound && pose.quaternion[0] == 1);
@@ -304,6 +308,7 @@ TEST(times_of_this_machine_are_exact, connect_pair, close_pair)
 struct peer {
 	int listener;
 	sem_t go;
+	bool nonsense; /* in place of the last frame */
 	char arguments[64];
 	uint8_t got[SERVER_MAX];
 	size_t n;
@@ -324,7 +329,10 @@ static void *run_peer(void *argument)
 
 	serve_bytes(fd, server, LAST_FRAME);
 	sem_wait(&peer->go);
-	serve_bytes(fd, server + LAST_FRAME, server_n - LAST_FRAME);
+	if (peer->nonsense)
+		serve_bytes(fd, (const uint8_t[24]){0}, 24);
+	else
+		serve_bytes(fd, server + LAST_FRAME, server_n - LAST_FRAME);
 	while (peer->n <= NAMES + 2 * FIELD &&
 	       (n = recv(fd, peer->got + peer->n, sizeof(peer->got) - peer->n, 0)) > 0)
 		peer->n += (size_t)n;
@@ -349,7 +357,8 @@ static void start_peer(struct peer *peer, pthread_t *thread, const char *name)
 	assert_int_equal(pthread_create(thread, NULL, run_peer, peer), 0);
 }
 
-static struct incise_haptic *open_haptic(struct peer *peer, pthread_t *thread)
+static struct incise_haptic *open_haptic(struct peer *peer, pthread_t *thread,
+					 bool nonsense)
 {
 	struct incise_backend_request request = {.where = "rig.conf:1: haptic"};
 	struct incise_haptic *haptic;
@@ -358,6 +367,7 @@ static struct incise_haptic *open_haptic(struct peer *peer, pthread_t *thread)
 	request.arguments = peer->arguments;
 	haptic = incise_haptic_vrpn.open(&request, &err);
 	succeeds(haptic);
+	peer->nonsense = nonsense;
 	sem_post(&peer->go);
 	return haptic;
 }
@@ -394,7 +404,7 @@ TEST(a_force_goes_out_as_vrpn_accepted_it)
 	struct peer peer;
 	pthread_t thread;
 
-	haptic = open_haptic(&peer, &thread);
+	haptic = open_haptic(&peer, &thread, false);
 	haptic->ops->info(haptic, &info);
 	assert_true(info.rate_hz > 11.9 && info.rate_hz < 12.1 && info.measures_velocity);
 	assert_int_equal(info.buttons, 2);
@@ -421,7 +431,7 @@ TEST(a_server_that_is_gone_leaves_a_cause)
 	char text[200];
 	int n;
 
-	haptic = open_haptic(&peer, &thread);
+	haptic = open_haptic(&peer, &thread, false);
 	assert_int_equal(haptic->ops->cause(haptic, text, sizeof(text)), 0);
 	for (int i = 0; i < 3; i++)
 		haptic->ops->push(haptic, none, none);
@@ -434,6 +444,28 @@ TEST(a_server_that_is_gone_leaves_a_cause)
 	assert_int_equal(haptic->ops->push(haptic, none, none), n);
 	haptic->ops->close(haptic);
 	close(peer.listener);
+}
+
+TEST(a_failure_ends_in_no_force)
+{
+	static const double some[3] = {1, 2, 3}, none[3];
+	struct incise_haptic_sample sample;
+	struct incise_haptic *haptic;
+	struct peer peer;
+	pthread_t thread;
+	int n;
+
+	haptic = open_haptic(&peer, &thread, true);
+	while (!(n = haptic->ops->read(haptic, &sample, 1)))
+		haptic->ops->wait(haptic, 1000000000);
+	assert_int_equal(n, -EPROTO);
+	assert_int_equal(haptic->ops->push(haptic, some, none), -EPROTO);
+	haptic->ops->close(haptic);
+	pthread_join(thread, NULL);
+	close(peer.listener);
+	assert_int_equal(peer.n, NAMES + FIELD);
+	for (size_t i = 24; i < FIELD; i++)
+		assert_int_equal(peer.got[NAMES + i], 0);
 }
 
 TEST(sensors_are_stations_of_a_tracker)
