@@ -23,15 +23,15 @@ static void check(struct vrpn_device *device, int64_t *last_ns)
 		double length = 0;
 
 		for (int i = 0; i < 4; i++)
-			length += pose.quaternion[i] * pose.quaternion[i];
+			length += pose.sample.quaternion[i] * pose.sample.quaternion[i];
 		for (int i = 0; i < 3; i++)
-			if (pose.sound && !(fabs(pose.position_mm[i]) <= 1e6))
+			if (pose.sound && !(fabs(pose.sample.position_mm[i]) <= 1e6))
 				wrong("a position that is none");
 		if (pose.sound && !(fabs(length - 1) < 1e-8))
 			wrong("a quaternion that is none");
-		if (pose.sensor != 0 || pose.t_ns <= *last_ns)
+		if (pose.sensor != 0 || pose.sample.t_ns <= *last_ns)
 			wrong("not in order, or of another sensor");
-		*last_ns = pose.t_ns;
+		*last_ns = pose.sample.t_ns;
 	}
 }
 
@@ -45,10 +45,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 
 	memset(&device, 0, offsetof(struct vrpn_device, bytes));
 	memset(&device.at, 0, sizeof(device) - offsetof(struct vrpn_device, at));
-	device.sensors = 1;
-	vrpn_device_init(&device);
+	vrpn_device_init(&device, 1, INT64_MAX);
 	snprintf(device.device, sizeof(device.device), "Tool");
-	device.last.t_ns = INT64_MIN;
+	device.last.sample.t_ns = INT64_MIN;
 	/* As a connection gives them, without one. */
 	for (size_t at = 0; at < size; at += part) {
 		size_t n = part < size - at ? part : size - at;

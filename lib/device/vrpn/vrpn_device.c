@@ -8,6 +8,7 @@
 #include <netinet/in.h>
 #include <poll.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <time.h>
 #include "../../base/monotonic.h"
@@ -17,6 +18,8 @@
 #define PORT 3883
 #define VERSION "vrpn: ver. 07."
 #define COOKIE 24
+#define HEADER 24
+#define FIELD 64		 /* bytes of the payload of a force field */
 #define FIRST_NS (5 * SECOND_NS) /* for enough poses to know the rate */
 #define LEARN_NS (SECOND_NS / 2) /* of poses */
 #define POSES_LEAST 5
@@ -86,9 +89,11 @@ static int fail(struct vrpn_device *device, int code, const char *what)
 	return device->gone;
 }
 
-void vrpn_device_init(struct vrpn_device *device)
+void vrpn_device_init(struct vrpn_device *device, uint32_t sensors, int64_t silent_ns)
 {
 	device->link.fd = device->link.stop = -1;
+	device->sensors = sensors;
+	device->silent_ns = silent_ns;
 	device->sender = -1;
 	for (int i = 0; i < VRPN_TYPES; i++)
 		device->types[i] = -1;
@@ -135,44 +140,51 @@ static int64_t find_time(struct vrpn_device *device, int64_t utc_ns)
 	return incise_sender_time(&device->clock, utc_ns, device->arrival_ns);
 }
 
-static bool place_pose(struct vrpn_pose *pose, const uint8_t *payload)
+static bool place_pose(struct incise_haptic_sample *sample, const uint8_t *payload)
 {
-	double length2 = 0;
+	double *q = sample->quaternion, length2 = 0;
 
 	for (int i = 0; i < 3; i++) {
-		pose->position_mm[i] = 1000 * get_double(payload + 8 + 8 * i);
-		if (!(fabs(pose->position_mm[i]) <= PLACE_MOST_MM))
+		sample->position_mm[i] = 1000 * get_double(payload + 8 + 8 * i);
+		if (!(fabs(sample->position_mm[i]) <= PLACE_MOST_MM))
 			return false;
 	}
 	for (int i = 0; i < 4; i++) {
-		pose->quaternion[i] = get_double(payload + 32 + 8 * ((i + 3) % 4));
-		length2 += pose->quaternion[i] * pose->quaternion[i];
+		q[i] = get_double(payload + 32 + 8 * ((i + 3) % 4));
+		length2 += q[i] * q[i];
 	}
 	if (!(fabs(length2 - 1) <= LENGTH_OFF))
 		return false;
 	for (int i = 0; i < 4 && fabs(length2 - 1) > LENGTH_UNIT; i++)
-		pose->quaternion[i] /= sqrt(length2);
+		q[i] /= sqrt(length2);
 	return true;
 }
 
 static void take_pose(struct vrpn_device *device, const uint8_t *payload, int64_t utc_ns)
 {
 	uint32_t sensor = get_word(payload);
-	struct vrpn_pose pose = {.sensor = (int)sensor,
-				 .t_ns = find_time(device, utc_ns),
-				 .utc_ns = utc_ns,
-				 .velocity_mm_s = {NAN, NAN, NAN}};
+	struct vrpn_pose pose = {
+		.sample = {.t_ns = find_time(device, utc_ns),
+			   .seq = device->last.sample.seq + 1,
+			   .velocity_mm_s = {NAN, NAN, NAN}},
+		.utc_ns = utc_ns,
+		.sensor = (int)sensor,
+	};
 
 	if (sensor >= VRPN_SENSORS || !(device->sensors >> sensor & 1))
 		return;
-	pose.sound = place_pose(&pose, payload);
 	/* Sensors of one frame have one timestamp. */
-	if (pose.t_ns <= device->last.t_ns)
-		pose.t_ns = device->last.t_ns + 1;
+	if (pose.sample.t_ns <= device->last.sample.t_ns)
+		pose.sample.t_ns = device->last.sample.t_ns + 1;
+	pose.sound = place_pose(&pose.sample, payload);
+	if (pose.sound) {
+		device->sound_ns = device->arrival_ns;
+		for (int i = 0; i < 3; i++)
+			device->origin_m[i] = pose.sample.position_mm[i] / 1000;
+	}
+	device->lost += !pose.sound;
 	device->last = pose;
 	device->waits = true;
-	if (pose.sound)
-		device->pose_ns = device->arrival_ns;
 }
 
 static void take_velocity(struct vrpn_device *device, const uint8_t *payload,
@@ -180,12 +192,11 @@ static void take_velocity(struct vrpn_device *device, const uint8_t *payload,
 {
 	struct vrpn_pose *last = &device->last;
 
-	if (!device->waits || get_word(payload) != (uint32_t)last->sensor ||
-	    utc_ns != last->utc_ns)
+	if (get_word(payload) != (uint32_t)last->sensor || utc_ns != last->utc_ns)
 		return;
 	device->measures_velocity = true;
 	for (int i = 0; i < 3; i++)
-		last->velocity_mm_s[i] = 1000 * get_double(payload + 8 + 8 * i);
+		last->sample.velocity_mm_s[i] = 1000 * get_double(payload + 8 + 8 * i);
 }
 
 static void take_button(struct vrpn_device *device, size_t button, uint32_t state)
@@ -234,9 +245,9 @@ static int find_type(const struct vrpn_device *device)
 	size_t left = device->n - device->at;
 	int type = VRPN_TYPES - 1;
 
-	if (left < VRPN_HEADER)
+	if (left < HEADER)
 		return -EAGAIN;
-	if (get_word(header) < VRPN_HEADER || get_word(header) > VRPN_MOST)
+	if (get_word(header) < HEADER || get_word(header) > VRPN_MOST)
 		return -EPROTO;
 	if (left < pad(get_word(header)))
 		return -EAGAIN;
@@ -257,20 +268,20 @@ int vrpn_device_pose(struct vrpn_device *device, struct vrpn_pose *pose)
 		return 0;
 	while ((type = find_type(device)) >= -1) {
 		const uint8_t *header = device->bytes + device->at;
-		size_t n = get_word(header) - VRPN_HEADER;
+		size_t n = get_word(header) - HEADER;
 		int64_t utc_ns = get_word(header + 4) * SECOND_NS +
 				 get_word(header + 8) * INT64_C(1000);
 
 		/* It has all that has come since. */
 		if (type == VRPN_POSE && device->waits)
 			break;
-		device->at += pad(VRPN_HEADER + n);
+		device->at += pad(HEADER + n);
 		if (type >= 0)
-			take_message(device, (enum vrpn_type)type, header + VRPN_HEADER,
-				     n, utc_ns);
+			take_message(device, (enum vrpn_type)type, header + HEADER, n,
+				     utc_ns);
 		else if (!take_description(device, (int32_t)get_word(header + 16),
 					   (int32_t)get_word(header + 12),
-					   header + VRPN_HEADER, n))
+					   header + HEADER, n))
 			return fail(device, EPROTO, "got another number");
 	}
 	if (type == -EPROTO)
@@ -278,6 +289,8 @@ int vrpn_device_pose(struct vrpn_device *device, struct vrpn_pose *pose)
 	if (!device->waits)
 		return 0;
 	*pose = device->last;
+	pose->sample.buttons = device->pressed;
+	pose->sample.flags = device->force_error ? INCISE_HAPTIC_PROTECTED : 0;
 	device->waits = false;
 	return 1;
 }
@@ -297,7 +310,7 @@ int vrpn_device_receive(struct vrpn_device *device)
 		return fail(device, ENODEV, "closed the connection");
 	device->n += n > 0 ? (size_t)n : 0;
 	device->arrival_ns = incise_monotonic_ns();
-	if (device->arrival_ns - device->pose_ns > device->silent_ns)
+	if (device->arrival_ns - device->sound_ns > device->silent_ns)
 		return fail(device, EIO, "sends no poses");
 	return 0;
 }
@@ -316,35 +329,59 @@ static uint8_t *put_word(uint8_t *to, uint32_t word)
 	return to + sizeof(word);
 }
 
-size_t vrpn_pack(uint8_t *to, size_t n, int32_t sender, int32_t type)
+static size_t pack_header(uint8_t *to, size_t n, int32_t sender, int32_t type)
 {
 	int64_t utc_ns = get_utc_ns();
 
-	memset(to, 0, VRPN_HEADER + pad(n));
-	to = put_word(to, (uint32_t)(VRPN_HEADER + n));
+	memset(to, 0, HEADER + pad(n));
+	to = put_word(to, (uint32_t)(HEADER + n));
 	to = put_word(to, (uint32_t)(utc_ns / SECOND_NS));
 	to = put_word(to, (uint32_t)(utc_ns % SECOND_NS / 1000));
 	to = put_word(to, (uint32_t)sender);
 	put_word(to, (uint32_t)type);
-	return VRPN_HEADER + pad(n);
+	return HEADER + pad(n);
 }
 
 /* The name behind a number 0 of this side. */
 static size_t pack_name(uint8_t *to, int32_t kind, const char *name)
 {
 	size_t n = strlen(name) + 1;
-	size_t size = vrpn_pack(to, 4 + n, 0, kind);
+	size_t size = pack_header(to, 4 + n, 0, kind);
 
-	put_word(to + VRPN_HEADER, (uint32_t)n);
-	memcpy(to + VRPN_HEADER + 4, name, n);
+	put_word(to + HEADER, (uint32_t)n);
+	memcpy(to + HEADER + 4, name, n);
 	return size;
 }
 
-int vrpn_device_send(struct vrpn_device *device, const uint8_t *bytes, size_t n)
+static int send_bytes(struct vrpn_device *device, const uint8_t *bytes, size_t n)
 {
 	if (send(device->link.fd, bytes, n, MSG_NOSIGNAL) != (ssize_t)n && !device->gone)
 		fail(device, EIO, "takes nothing any more");
 	return device->gone;
+}
+
+static uint8_t *put_single(uint8_t *to, double value)
+{
+	float single = (float)value;
+	uint32_t bits;
+
+	memcpy(&bits, &single, sizeof(bits));
+	return put_word(to, bits);
+}
+
+/* Origin, force, Jacobian, radius. */
+int vrpn_device_force(struct vrpn_device *device, const double force_N[3],
+		      double radius_m)
+{
+	uint8_t bytes[HEADER + FIELD], *to = bytes + HEADER;
+
+	pack_header(bytes, FIELD, 0, 0);
+	for (int i = 0; i < 3; i++)
+		to = put_single(to, device->origin_m[i]);
+	for (int i = 0; i < 3; i++)
+		to = put_single(to, force_N[i]);
+	put_single(bytes + HEADER + FIELD - 4, radius_m);
+	return send_bytes(device, bytes, sizeof(bytes));
 }
 
 /* --- opening ------------------------------------------------------------------------- */
@@ -388,26 +425,30 @@ static void learn_poses(struct vrpn_device *device)
 	struct vrpn_pose pose;
 	int n = 0;
 
-	device->pose_ns = until_ns;
+	device->sound_ns = until_ns;
 	while (!(device->rate_hz > 0) && incise_monotonic_ns() < until_ns) {
 		server_link_wait(&device->link, device->link.fd, POLLIN, 100);
 		if (vrpn_device_receive(device))
 			return;
 		while (vrpn_device_pose(device, &pose) == 1) {
-			int64_t at_ns = pose.utc_ns ? pose.utc_ns : pose.t_ns;
+			int64_t at_ns = pose.utc_ns ? pose.utc_ns : pose.sample.t_ns;
 
 			if (!n++)
 				first_ns = at_ns;
-			age_ns += device->arrival_ns - pose.t_ns;
+			age_ns += device->arrival_ns - pose.sample.t_ns;
 			if (n >= POSES_LEAST && at_ns - first_ns >= LEARN_NS)
 				device->rate_hz =
 					(n - 1) * 1e9 / (double)(at_ns - first_ns);
 		}
 	}
-	if (device->rate_hz > 0)
-		device->latency_ns = age_ns / n;
-	else
+	if (!(device->rate_hz > 0)) {
 		fail(device, EIO, "sends no poses");
+		return;
+	}
+	device->latency_ns = age_ns / n;
+	/* The next one is the first. */
+	device->last.sample.seq = UINT64_MAX;
+	device->lost = 0;
 }
 
 static int explain_absence(const struct vrpn_device *device, bool forces,
@@ -429,26 +470,51 @@ static int explain_absence(const struct vrpn_device *device, bool forces,
 	return 0;
 }
 
-int vrpn_device_open(struct vrpn_device *device,
-		     const struct incise_backend_request *request, bool forces,
-		     struct incise_error *err)
+static int open_device(struct vrpn_device *device,
+		       const struct incise_backend_request *request, bool forces,
+		       struct incise_error *err)
 {
-	uint8_t bytes[2 * (VRPN_HEADER + VRPN_NAME + 4)] = VERSION "38  0";
+	uint8_t bytes[2 * (HEADER + VRPN_NAME + 4)] = VERSION "38  0";
 	size_t n;
-	int rc;
+	int rc = parse_device(device, request->arguments, request->where, err);
 
-	vrpn_device_init(device);
-	rc = parse_device(device, request->arguments, request->where, err);
 	rc = rc ? rc : server_link_find(&device->link, "VRPN", request->where, err);
 	if (rc)
 		return rc;
 	device->own_machine = is_own_machine(&device->link);
-	vrpn_device_send(device, bytes, COOKIE);
+	send_bytes(device, bytes, COOKIE);
 	learn_poses(device);
 	rc = explain_absence(device, forces, request->where, err);
 	if (rc || !forces)
 		return rc;
 	n = pack_name(bytes, DESCRIBES_SENDER, device->device);
 	n += pack_name(bytes + n, DESCRIBES_TYPE, types[VRPN_FORCE_FIELD].name);
-	return vrpn_device_send(device, bytes, n);
+	return send_bytes(device, bytes, n);
+}
+
+void vrpn_device_free(struct vrpn_device *device)
+{
+	server_link_close(&device->link);
+	free(device);
+}
+
+struct vrpn_device *vrpn_device_new(const struct incise_backend_request *request,
+				    uint32_t sensors, int64_t silent_ns, bool forces,
+				    struct incise_error *err)
+{
+	struct vrpn_device *device = calloc(1, sizeof(*device));
+	int rc;
+
+	if (!device) {
+		incise_error_set(err, ENOMEM, "%s: out of memory; end other programs",
+				 request->where);
+		return NULL;
+	}
+	vrpn_device_init(device, sensors, silent_ns);
+	rc = open_device(device, request, forces, err);
+	if (!rc)
+		return device;
+	vrpn_device_free(device);
+	errno = -rc;
+	return NULL;
 }

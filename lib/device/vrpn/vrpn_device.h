@@ -24,8 +24,8 @@
 #include <incise/backend.h>
 #include "../../rig/sender_clock.h"
 #include "../../rig/server_link.h"
+#include "../../rig/tracker_feed.h"
 
-#define VRPN_HEADER 24
 #define VRPN_SENSORS 32
 #define VRPN_NAME 100	/* longest name, with its zero */
 #define VRPN_MOST 65536 /* bytes of a message; VRPN's own limit is 64000 */
@@ -41,14 +41,17 @@ enum vrpn_type {
 #define VRPN_TYPES 6
 
 struct vrpn_pose {
-	int64_t t_ns, utc_ns;
+	struct incise_haptic_sample sample; /* seq counts those of all sensors */
+	int64_t utc_ns;
 	int sensor;
-	bool sound;				 /* finite, within 1 km, a rotation */
-	double position_mm[3], velocity_mm_s[3]; /* NaN: none came along */
-	double quaternion[4];			 /* unit, w first */
+	bool sound; /* finite, within 1 km, a rotation */
 };
 
 struct vrpn_device {
+	union {
+		struct incise_haptic haptic;
+		struct incise_tracker tracker;
+	} face; /* first */
 	struct server_link link;
 	char device[VRPN_NAME], name[64]; /* as the server has it; for people */
 	uint8_t bytes[2 * VRPN_MOST];
@@ -60,9 +63,11 @@ struct vrpn_device {
 	bool waits;
 	bool own_machine;
 	struct incise_sender_clock clock;
-	int64_t arrival_ns, pose_ns; /* of what came last, and of the last sound pose */
-	int64_t silent_ns;	     /* after so long without one it has failed */
-	uint32_t sensors;	     /* that are used, as bits */
+	int64_t arrival_ns, sound_ns; /* of what came last, and of the last sound pose */
+	int64_t silent_ns;	      /* after so long without one it has failed */
+	uint32_t sensors;	      /* that are used, as bits */
+	double origin_m[3];	      /* the last sound position */
+	uint64_t lost;		      /* poses that are not sound */
 	uint32_t pressed;
 	int buttons;	 /* number */
 	int force_error; /* of the device, by its server; 0: none */
@@ -72,18 +77,22 @@ struct vrpn_device {
 	bool measures_velocity;
 	int gone; /* negative errno, for good: then cause is set */
 	struct incise_error cause;
+	/* Of a tracker. */
+	struct incise_tracker_setup setup;
+	struct tracker_repeat repeat[VRPN_SENSORS];
 };
 
-/* Start from zeros, but for silent_ns and sensors, without a connection. */
-void vrpn_device_init(struct vrpn_device *device);
+/* Start from zeros, without a connection. */
+void vrpn_device_init(struct vrpn_device *device, uint32_t sensors, int64_t silent_ns);
 
 /*
- * Connect, and receive poses of device->sensors for half a second. @forces: it is to take them; here,
- * number 0 is the device, and that of force fields. 0 or -errno with a message; close the link.
+ * Connect, and receive poses of some sensors for half a second. @forces: it is to take them. NULL
+ * with errno and a message.
  */
-int vrpn_device_open(struct vrpn_device *device,
-		     const struct incise_backend_request *request, bool forces,
-		     struct incise_error *err);
+struct vrpn_device *vrpn_device_new(const struct incise_backend_request *request,
+				    uint32_t sensors, int64_t silent_ns, bool forces,
+				    struct incise_error *err);
+void vrpn_device_free(struct vrpn_device *device);
 
 /* Receive what is there, without waiting. 0 or device->gone. */
 int vrpn_device_receive(struct vrpn_device *device);
@@ -91,11 +100,9 @@ int vrpn_device_receive(struct vrpn_device *device);
 /* The next pose from what was received. 1; 0: there is none; or device->gone. */
 int vrpn_device_pose(struct vrpn_device *device, struct vrpn_pose *pose);
 
-/* Send, or fail; it is sent after a failure, too. 0 or device->gone. */
-int vrpn_device_send(struct vrpn_device *device, const uint8_t *bytes, size_t n);
-
-/* Pack a header for a payload of @n bytes, which starts as zeros. Returns the size of both. */
-size_t vrpn_pack(uint8_t *to, size_t n, int32_t sender, int32_t type);
+/* The same force within @radius_m of the last sound pose; after a failure, too. 0 or device->gone. */
+int vrpn_device_force(struct vrpn_device *device, const double force_N[3],
+		      double radius_m);
 
 int vrpn_device_cause(const struct vrpn_device *device, char *text, size_t size);
 

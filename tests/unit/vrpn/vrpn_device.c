@@ -49,9 +49,7 @@ GROUP(load_recorded, NULL);
 static int connect_pair(void **state)
 {
 	memset(&device, 0, sizeof(device));
-	device.sensors = 1;
-	device.silent_ns = INT64_MAX;
-	vrpn_device_init(&device);
+	vrpn_device_init(&device, 1, INT64_MAX);
 	snprintf(device.device, sizeof(device.device), "Tool");
 	assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0, ends), 0);
 	device.link.fd = ends[0];
@@ -117,16 +115,16 @@ TEST(each_pose_is_right_to_the_last_bit, connect_pair, close_pair)
 	int n = replay(server_n, poses, 32);
 
 	assert_int_equal(n, 15);
-	check_numbers(poses[0].position_mm, first, 3);
-	check_numbers(poses[0].quaternion, first + 3, 4);
-	check_numbers(poses[14].position_mm, last, 3);
-	check_numbers(poses[14].quaternion, last + 3, 4);
-	check_numbers(poses[14].velocity_mm_s, velocity, 3);
+	check_numbers(poses[0].sample.position_mm, first, 3);
+	check_numbers(poses[0].sample.quaternion, first + 3, 4);
+	check_numbers(poses[14].sample.position_mm, last, 3);
+	check_numbers(poses[14].sample.quaternion, last + 3, 4);
+	check_numbers(poses[14].sample.velocity_mm_s, velocity, 3);
 	assert_int_equal(poses[0].utc_ns, 1796050357456037000);
 	/* The formula of the server, whose functions may differ in the last bits. */
 	for (int i = 0; i < n; i++)
 		for (int k = 0; k < 3; k++)
-			assert_true(fabs(poses[i].position_mm[k] -
+			assert_true(fabs(poses[i].sample.position_mm[k] -
 					 (50 * sin((11 + i) / 12.0 + k) + k)) < 1e-9);
 	assert_int_equal(device.buttons, 2);
 }
@@ -144,12 +142,14 @@ TEST(parts_of_any_size_give_the_same, connect_pair, close_pair)
 		/* A pose that is given before its velocity came has none. */
 		assert_int_equal(replay(parts[p], poses, 32), n);
 		for (int i = 0; i < n; i++) {
-			check_numbers(poses[i].position_mm, whole[i].position_mm, 3);
-			check_numbers(poses[i].quaternion, whole[i].quaternion, 4);
-			if (isfinite(poses[i].velocity_mm_s[0]))
-				check_numbers(poses[i].velocity_mm_s,
-					      whole[i].velocity_mm_s, 3);
-			given += isfinite(poses[i].velocity_mm_s[0]);
+			check_numbers(poses[i].sample.position_mm,
+				      whole[i].sample.position_mm, 3);
+			check_numbers(poses[i].sample.quaternion,
+				      whole[i].sample.quaternion, 4);
+			if (isfinite(poses[i].sample.velocity_mm_s[0]))
+				check_numbers(poses[i].sample.velocity_mm_s,
+					      whole[i].sample.velocity_mm_s, 3);
+			given += isfinite(poses[i].sample.velocity_mm_s[0]);
 		}
 		assert_true(given == n || parts[p] < 200 || given > 0);
 	}
@@ -158,12 +158,19 @@ TEST(parts_of_any_size_give_the_same, connect_pair, close_pair)
 /* A message of our own: a description, or one of numbers. */
 static void send_message(int32_t sender, int32_t type, const void *payload, size_t n)
 {
-	uint8_t bytes[512];
-	size_t size = vrpn_pack(bytes, n, sender, type);
+	struct timespec now;
+	uint8_t bytes[512] = {0};
+	uint32_t words[5];
 
-	if (n)
-		memcpy(bytes + 24, payload, n);
-	assert_int_equal(put(bytes, size), 0);
+	clock_gettime(CLOCK_REALTIME, &now);
+	words[0] = htobe32((uint32_t)(24 + n));
+	words[1] = htobe32((uint32_t)now.tv_sec);
+	words[2] = htobe32((uint32_t)(now.tv_nsec / 1000));
+	words[3] = htobe32((uint32_t)sender);
+	words[4] = htobe32((uint32_t)type);
+	memcpy(bytes, words, sizeof(words));
+	memcpy(bytes + 24, payload, n);
+	assert_int_equal(put(bytes, 24 + (n + 7) / 8 * 8), 0);
 }
 
 static void describe(int32_t kind, int32_t number, const char *name)
@@ -214,7 +221,7 @@ TEST(names_may_come_late_and_twice, connect_pair, close_pair)
 	assert_int_equal(count_poses(&pose), 0);
 	send_pose(5, 9, here);
 	assert_int_equal(count_poses(&pose), 1);
-	assert_true(pose.sound && pose.position_mm[2] == 1000 * 0.3);
+	assert_true(pose.sound && pose.sample.position_mm[2] == 1000 * 0.3);
 	/* The number is that of another type now. */
 	describe(-2, 9, "vrpn_Analog Channel");
 	send_pose(5, 9, here);
@@ -251,7 +258,7 @@ TEST(poses_that_are_none_are_not_sound, connect_pair, close_pair)
 	device.gone = 0;
 	send_pose(1, 2, long_one);
 	assert_int_equal(count_poses(&pose), 1);
-	assert_true(pose.sound && pose.quaternion[0] == 1);
+	assert_true(pose.sound && pose.sample.quaternion[0] == 1);
 	/* Half a pose, and one too long. */
 	send_message(1, 2, bad, 32);
 	send_message(1, 2, bad, 72);
@@ -300,7 +307,8 @@ TEST(times_of_this_machine_are_exact, connect_pair, close_pair)
 	after_ns = incise_monotonic_ns();
 	assert_int_equal(count_poses(&pose), 1);
 	/* Timestamps are in whole microseconds, rounded down. */
-	assert_true(pose.t_ns >= before_ns - 2000 && pose.t_ns <= after_ns + 1000);
+	assert_true(pose.sample.t_ns >= before_ns - 2000 &&
+		    pose.sample.t_ns <= after_ns + 1000);
 }
 
 /* --- the backends -------------------------------------------------------------------- */
@@ -410,6 +418,7 @@ TEST(a_force_goes_out_as_vrpn_accepted_it)
 	assert_int_equal(info.buttons, 2);
 	assert_true(info.deadman_s == 0 && strstr(info.note, "keeps the last force"));
 	sample = read_sample(haptic);
+	assert_int_equal(sample.seq, 0);
 	force_N[2] = -0.1 * sample.position_mm[2];
 	assert_int_equal(haptic->ops->push(haptic, force_N, (double[3]){0}), 0);
 	haptic->ops->close(haptic);
@@ -464,7 +473,8 @@ TEST(a_failure_ends_in_no_force)
 	pthread_join(thread, NULL);
 	close(peer.listener);
 	assert_int_equal(peer.n, NAMES + FIELD);
-	for (size_t i = 24; i < FIELD; i++)
+	/* Behind the origin: force, Jacobian and radius. */
+	for (size_t i = 24 + 12; i < FIELD; i++)
 		assert_int_equal(peer.got[NAMES + i], 0);
 }
 
