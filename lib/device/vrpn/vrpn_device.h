@@ -22,6 +22,7 @@
 #define INCISE_VRPN_DEVICE_H
 
 #include <incise/backend.h>
+#include "../../rig/pace.h"
 #include "../../rig/sender_clock.h"
 #include "../../rig/server_link.h"
 #include "../../rig/tracker_feed.h"
@@ -80,6 +81,8 @@ struct vrpn_device {
 	/* Of a tracker. */
 	struct incise_tracker_setup setup;
 	struct tracker_repeat repeat[VRPN_SENSORS];
+	struct incise_pace pace;
+	uint64_t missing;
 };
 
 /* Start from zeros, without a connection. */

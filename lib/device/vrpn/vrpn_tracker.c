@@ -9,6 +9,8 @@
 #include "../../rig/backends.h"
 #include "vrpn_device.h"
 
+#define SLIP 2 /* periods */
+
 static struct vrpn_device *device_of(const struct incise_tracker *tracker)
 {
 	return (struct vrpn_device *)tracker;
@@ -34,6 +36,7 @@ static void take_pose(struct vrpn_device *device, const struct vrpn_pose *pose,
 		      struct incise_tracker_sample *sample)
 {
 	int64_t after_ns = device->arrival_ns - pose->sample.t_ns;
+	uint64_t missing;
 
 	*sample = (struct incise_tracker_sample){
 		.t_ns = pose->sample.t_ns,
@@ -45,6 +48,10 @@ static void take_pose(struct vrpn_device *device, const struct vrpn_pose *pose,
 		.after_ns = after_ns > 0 ? (uint32_t)after_ns : 0};
 	if (pose->sound)
 		place_tool(device, pose, sample);
+	missing = incise_pace_add(&device->pace, sample->t_ns, device->arrival_ns);
+	/* Those that a server leaves out have no numbers; one that sends by sleeping slips. */
+	device->missing += missing > SLIP ? missing : 0;
+	sample->seq += device->missing;
 }
 
 static int tracker_read(struct incise_tracker *tracker,
@@ -72,16 +79,14 @@ static void tracker_info(const struct incise_tracker *tracker,
 		.tube_station = device->setup.tube_station,
 		.external_sync = true, /* the sender decides when */
 		.network = true,
-		.lost_unsure = true,
+		.lost_unsure = device->pace.unsure,
 	};
 	snprintf(info->name, sizeof(info->name), "%s", device->name);
 }
 
-/* TCP loses nothing, and poses that a server leaves out have no numbers. */
 static uint64_t tracker_lost(const struct incise_tracker *tracker)
 {
-	(void)tracker;
-	return 0;
+	return device_of(tracker)->missing;
 }
 
 static void tracker_close(struct incise_tracker *tracker)
@@ -120,6 +125,7 @@ static void *tracker_open(const struct incise_backend_request *request,
 		return NULL;
 	device->face.tracker.ops = &ops;
 	device->setup = *setup;
+	incise_pace_init(&device->pace, device->rate_hz, INCISE_PACE_OFF, 1);
 	return device;
 }
 
