@@ -23,6 +23,7 @@
 #define FIRST_NS (5 * SECOND_NS) /* for enough poses to know the rate */
 #define LEARN_NS (SECOND_NS / 2) /* of poses */
 #define POSES_LEAST 5
+#define RATE_LEAST 1.0 /* Hz */
 #define DESCRIBES_SENDER (-1)
 #define DESCRIBES_TYPE (-2)
 #define BUTTONS 32
@@ -441,7 +442,7 @@ static void learn_poses(struct vrpn_device *device)
 					(n - 1) * 1e9 / (double)(at_ns - first_ns);
 		}
 	}
-	if (!(device->rate_hz > 0)) {
+	if (!(device->rate_hz >= RATE_LEAST)) {
 		fail(device, EIO, "sends no poses");
 		return;
 	}
@@ -462,7 +463,6 @@ static int explain_absence(const struct vrpn_device *device, bool forces,
 	if (device->gone)
 		return incise_error_set(err, -device->gone, "%s: %s", where,
 					device->cause.text);
-	/* Before names are sent, which a server takes for its own. */
 	if (forces && device->types[VRPN_FORCE_FIELD] < 0)
 		return incise_error_set(err, ENODEV,
 					"%s: %s takes no force; use it as `tracker`",
@@ -470,26 +470,32 @@ static int explain_absence(const struct vrpn_device *device, bool forces,
 	return 0;
 }
 
+/* Ahead of this, what the server describes is its own; it repeats names that it gets. */
+static void send_names(struct vrpn_device *device)
+{
+	uint8_t bytes[2 * (HEADER + VRPN_NAME + 4)];
+	size_t n = pack_name(bytes, DESCRIBES_SENDER, device->device);
+
+	n += pack_name(bytes + n, DESCRIBES_TYPE, types[VRPN_FORCE_FIELD].name);
+	send_bytes(device, bytes, n);
+}
+
 static int open_device(struct vrpn_device *device,
 		       const struct incise_backend_request *request, bool forces,
 		       struct incise_error *err)
 {
-	uint8_t bytes[2 * (HEADER + VRPN_NAME + 4)] = VERSION "38  0";
-	size_t n;
+	static const uint8_t cookie[COOKIE] = VERSION "38  0";
 	int rc = parse_device(device, request->arguments, request->where, err);
 
 	rc = rc ? rc : server_link_find(&device->link, "VRPN", request->where, err);
 	if (rc)
 		return rc;
 	device->own_machine = is_own_machine(&device->link);
-	send_bytes(device, bytes, COOKIE);
+	send_bytes(device, cookie, COOKIE);
 	learn_poses(device);
-	rc = explain_absence(device, forces, request->where, err);
-	if (rc || !forces)
-		return rc;
-	n = pack_name(bytes, DESCRIBES_SENDER, device->device);
-	n += pack_name(bytes + n, DESCRIBES_TYPE, types[VRPN_FORCE_FIELD].name);
-	return send_bytes(device, bytes, n);
+	if (forces && !device->gone && device->types[VRPN_FORCE_FIELD] >= 0)
+		send_names(device);
+	return explain_absence(device, forces, request->where, err);
 }
 
 void vrpn_device_free(struct vrpn_device *device)
