@@ -19,9 +19,9 @@
 #define VERSION "vrpn: ver. 07."
 #define COOKIE 24
 #define HEADER 24
-#define FIELD 64		 /* bytes of the payload of a force field */
-#define FIRST_NS (5 * SECOND_NS) /* for enough poses to know the rate */
-#define LEARN_NS (SECOND_NS / 2) /* of poses */
+#define FIELD 64		     /* bytes of the payload of a force field */
+#define FIRST_NS (5 * SECOND_NS)     /* for enough poses to know the rate */
+#define LEARN_NS (SECOND_NS * 2 / 5) /* a window of poses */
 #define POSES_LEAST 5
 #define RATE_LEAST 1.0 /* Hz */
 #define DESCRIBES_SENDER (-1)
@@ -419,34 +419,52 @@ static bool is_own_machine(const struct server_link *link)
 	return !memcmp(&own, &link->address, n);
 }
 
-/* Receive until the rate is known, by the sender's clock, or it is clear that it will not be. */
-static void learn_poses(struct vrpn_device *device)
+/* Poses of which the rate is learnt, by the sender's clock. */
+struct learnt {
+	int64_t first_ns, age_ns;
+	int n, in_window;
+	bool steady; /* as before within a tenth: none of both windows was a queue */
+};
+
+static void learn_pose(struct vrpn_device *device, const struct vrpn_pose *pose,
+		       struct learnt *learnt)
 {
-	int64_t until_ns = incise_monotonic_ns() + FIRST_NS, first_ns = 0, age_ns = 0;
+	int64_t at_ns = pose->utc_ns ? pose->utc_ns : pose->sample.t_ns;
+	double hz;
+
+	learnt->n++;
+	learnt->age_ns += device->arrival_ns - pose->sample.t_ns;
+	if (!learnt->in_window++)
+		learnt->first_ns = at_ns;
+	if (learnt->in_window < POSES_LEAST || at_ns - learnt->first_ns < LEARN_NS)
+		return;
+	hz = (learnt->in_window - 1) * 1e9 / (double)(at_ns - learnt->first_ns);
+	learnt->steady = fabs(hz - device->rate_hz) < hz / 10;
+	device->rate_hz = hz;
+	learnt->first_ns = at_ns;
+	learnt->in_window = 1;
+}
+
+/* Receive until the rate is known, or it is clear that it will not be. */
+static void learn_device(struct vrpn_device *device)
+{
+	int64_t until_ns = incise_monotonic_ns() + FIRST_NS;
+	struct learnt learnt = {0};
 	struct vrpn_pose pose;
-	int n = 0;
 
 	device->sound_ns = until_ns;
-	while (!(device->rate_hz > 0) && incise_monotonic_ns() < until_ns) {
+	while (!learnt.steady && incise_monotonic_ns() < until_ns) {
 		server_link_wait(&device->link, device->link.fd, POLLIN, 100);
 		if (vrpn_device_receive(device))
 			return;
-		while (vrpn_device_pose(device, &pose) == 1) {
-			int64_t at_ns = pose.utc_ns ? pose.utc_ns : pose.sample.t_ns;
-
-			if (!n++)
-				first_ns = at_ns;
-			age_ns += device->arrival_ns - pose.sample.t_ns;
-			if (n >= POSES_LEAST && at_ns - first_ns >= LEARN_NS)
-				device->rate_hz =
-					(n - 1) * 1e9 / (double)(at_ns - first_ns);
-		}
+		while (vrpn_device_pose(device, &pose) == 1)
+			learn_pose(device, &pose, &learnt);
 	}
 	if (!(device->rate_hz >= RATE_LEAST)) {
 		fail(device, EIO, "sends no poses");
 		return;
 	}
-	device->latency_ns = age_ns / n;
+	device->latency_ns = learnt.age_ns / learnt.n;
 	/* The next one is the first. */
 	device->last.sample.seq = UINT64_MAX;
 	device->lost = 0;
@@ -492,7 +510,7 @@ static int open_device(struct vrpn_device *device,
 		return rc;
 	device->own_machine = is_own_machine(&device->link);
 	send_bytes(device, cookie, COOKIE);
-	learn_poses(device);
+	learn_device(device);
 	if (forces && !device->gone && device->types[VRPN_FORCE_FIELD] >= 0)
 		send_names(device);
 	return explain_absence(device, forces, request->where, err);

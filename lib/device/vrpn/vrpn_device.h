@@ -89,7 +89,7 @@ struct vrpn_device {
 void vrpn_device_init(struct vrpn_device *device, uint32_t sensors, int64_t silent_ns);
 
 /*
- * Connect, and receive poses of some sensors for half a second. @forces: it is to take them. NULL
+ * Connect, and receive poses of some sensors until their rate is known. @forces: it is to take them. NULL
  * with errno and a message.
  */
 struct vrpn_device *vrpn_device_new(const struct incise_backend_request *request,
