@@ -78,7 +78,7 @@ struct vrpn_device {
 	bool measures_velocity;
 	int gone; /* negative errno, for good: then cause is set */
 	struct incise_error cause;
-	/* Of a tracker. */
+	/* A tracker has these. */
 	struct incise_tracker_setup setup;
 	struct tracker_repeat repeat[VRPN_SENSORS];
 	struct incise_pace pace;

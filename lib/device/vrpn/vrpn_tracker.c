@@ -49,7 +49,7 @@ static void take_pose(struct vrpn_device *device, const struct vrpn_pose *pose,
 	if (pose->sound)
 		place_tool(device, pose, sample);
 	missing = incise_pace_add(&device->pace, sample->t_ns, device->arrival_ns);
-	/* Those that a server leaves out have no numbers; one that sends by sleeping slips. */
+	/* Poses that a server leaves out have no numbers; one that sends by sleeping slips. */
 	device->missing += missing > SLIP ? missing : 0;
 	sample->seq += device->missing;
 }
