@@ -166,6 +166,12 @@ static json_t *stability_json(const struct incise_plan_stability *s)
 		d->period_s, "delay_ticks", d->delay_ticks);
 }
 
+/* A stage that writes to a device; the timed plan has no rig. */
+static bool is_of_device(const char *stage)
+{
+	return !strcmp(stage, "actuate") || !strcmp(stage, "push");
+}
+
 /* The rig's actuators. */
 static json_t *axes_json(struct incise_rig *rig, const struct incise_plan_stability *s)
 {
@@ -222,12 +228,11 @@ static void report_plan_json(const struct plan_job *job, const struct incise_pla
 
 	for (int i = 0; (name = incise_plan_stage(plan, i)); i++) {
 		json_array_append_new(kept, json_string(name));
-		/* The timed plan has no rig. */
 		json_array_append_new(stages,
 				      json_pack("{ss so}", "stage", name, "ns",
-						strcmp(name, "actuate")
-							? json_number(cost->stage[i])
-							: json_null()));
+						is_of_device(name)
+							? json_null()
+							: json_number(cost->stage[i])));
 	}
 	for (int i = 0; (name = incise_plan_left_out(plan, i, &why)); i++)
 		json_array_append_new(left,
@@ -240,7 +245,9 @@ static void report_plan_json(const struct plan_job *job, const struct incise_pla
 		json_number(cost->p99), "tick_p999_ns", json_number(cost->p999),
 		"memory_bytes", (json_int_t)incise_plan_memory(plan), "bound_N",
 		json_number(incise_plan_bound(plan, REACH_MM)), "devices",
-		job->rig ? json_pack("[ss]", "tracker", "stepper") : json_array(),
+		!job->rig		 ? json_array()
+		: incise_rig_haptic(rig) ? json_pack("[s]", "haptic")
+					 : json_pack("[ss]", "tracker", "stepper"),
 		"untouched_devices",
 		job->rig ? json_pack("[ss]", "force", "camera")
 			 : json_pack("[ssss]", "tracker", "stepper", "force", "camera"),
@@ -404,7 +411,7 @@ static void report_plan_text(const struct plan_job *job, const struct incise_pla
 		       job->scene.path);
 	printf("%.1f KiB\n\nkept\n", (double)incise_plan_memory(plan) / 1024);
 	for (int i = 0; (name = incise_plan_stage(plan, i)); i++)
-		if (!strcmp(name, "actuate"))
+		if (is_of_device(name))
 			printf("  %-10s    - (the device's)\n", name);
 		else if (cost->ticks)
 			printf("  %-10s %4.0f ns\n", name, cost->stage[i]);
@@ -417,7 +424,9 @@ static void report_plan_text(const struct plan_job *job, const struct incise_pla
 	if (*size)
 		printf("surface     %s\n", size);
 	printf("devices     %s; not touched: %s\n",
-	       job->rig ? "tracker, stepper" : "none without --rig",
+	       !job->rig		? "none without --rig"
+	       : incise_rig_haptic(rig) ? "haptic"
+					: "tracker, stepper",
 	       job->rig ? "force, camera" : "tracker, stepper, force, camera");
 	printf("libraries   not mapped: ");
 	for (size_t i = 0; i < json_array_size(absent); i++)

@@ -50,6 +50,7 @@ static const struct {
 	{"stepper", "show the state of the actuator and move it by hand", "Administer"},
 	{"bench", "measure error, run time and stability", "Advanced"},
 	{"compile", "convert a model or a scene to fixed point with a certified error"},
+	{"device", "own a haptic device, so that it gives no force when its user ends"},
 	{"feed", "load a scene into the kernel and send it the poses"},
 	{"join", "put recordings of several machines on one timeline"},
 	{"merge", "make one model of the factors of several laboratories or machines"},

@@ -23,14 +23,15 @@ struct loop_run {
 	struct incise_loop_stats *stats;
 	int64_t period_ns, due_ns, end_ns;
 	bool fading;
-	int64_t fade_end_ns;   /* latest end of the fade that stops it */
-	int64_t lag_ns;	       /* of this tick */
-	uint64_t skipped;      /* before this tick */
-	unsigned int in_row;   /* consecutive overruns */
-	unsigned int flags;    /* of the last tick */
-	char pose_flag;	       /* of poses, as last reported */
-	enum incise_tool tool; /* of the last tick */
-	int64_t stale_ns;      /* time of the first tick without a fresh pose */
+	int64_t fade_end_ns;	    /* latest end of the fade that stops it */
+	int64_t lag_ns;		    /* of this tick */
+	uint64_t skipped;	    /* before this tick */
+	unsigned int in_row;	    /* consecutive overruns */
+	unsigned int flags;	    /* of the last tick */
+	char pose_flag;		    /* of poses, as last reported */
+	enum incise_tool tool;	    /* of the last tick */
+	enum incise_haptic_off off; /* as last reported */
+	int64_t stale_ns;	    /* time of the first tick without a fresh pose */
 };
 
 static void count_loop(uint64_t *histogram, int64_t value)
@@ -96,6 +97,10 @@ static void report_changes(struct loop_run *run, const struct incise_tick *tick)
 	/* At the first tick nothing has changed. */
 	if (tick->tool != run->tool && run->stats->ticks > 1)
 		send_event(run, INCISE_LOOP_TOOL, tick->t_ns, tick->tool);
+	if (incise_plan_off(run->plan) != run->off) {
+		run->off = incise_plan_off(run->plan);
+		send_event(run, INCISE_LOOP_HAPTIC, tick->t_ns, run->off);
+	}
 	run->tool = tick->tool;
 	run->flags = tick->flags;
 }

@@ -105,8 +105,23 @@ static bool applies(const struct rig_list *rig, const char *group)
 	for (int kind = KIND_TRACKER; kind <= KIND_CAMERA; kind++)
 		if (!strcmp(group, of_kind[kind]) && is_real(device_of(rig, kind)))
 			return true;
-	return member(rig->root, group) || !strcmp(group, "surface") ||
+	return member(rig->root, group) ||
+	       (!strcmp(group, "haptic_setup") && member(rig->root, "haptic")) ||
+	       !strcmp(group, "surface") ||
 	       (!strcmp(group, "vision") && rig->plan->has_vision);
+}
+
+/* A text at the top level; without it, its key. */
+static void text_key(struct rig_list *rig, const char *key)
+{
+	const config_setting_t *setting = member(rig->root, key);
+	char text[SETTING_TEXT_MAX] = "";
+
+	if (setting)
+		incise_setting_quoted(config_setting_get_string(setting), text,
+				      sizeof(text));
+	incise_settings_put(&rig->list, incise_setting_of(incise_rig_settings, key),
+			    setting, "", key, text);
 }
 
 static void all(struct rig_list *rig)
@@ -118,20 +133,15 @@ static void all(struct rig_list *rig)
 	incise_settings_put(&rig->list, row, member(rig->root, row->key), "", row->key,
 			    clock);
 	devices(rig);
+	text_key(rig, "haptic");
 	for (; row->key; row++)
 		if (row->kind == SETTING_IS_GROUP && applies(rig, row->key))
 			incise_settings_list(&rig->list, row->rows, rig->plan,
 					     member(rig->root, row->key), row->key);
 	for (int i = 0; i < rig->plan->n_actuators; i++)
 		actuator(rig, i);
-	row = incise_setting_of(incise_rig_settings, "sign_key");
-	if (*rig->plan->sign_key) {
-		char text[SETTING_TEXT_MAX];
-
-		incise_setting_text(row, rig->plan, text, sizeof(text));
-		incise_settings_put(&rig->list, row, member(rig->root, row->key), "",
-				    row->key, text);
-	}
+	if (*rig->plan->sign_key)
+		text_key(rig, "sign_key");
 	if (rig->plan->sim || member(rig->root, "sim"))
 		incise_settings_list(&rig->list, incise_sim_settings, &rig->plan->config,
 				     member(rig->root, "sim"), "sim");

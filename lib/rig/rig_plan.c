@@ -629,6 +629,32 @@ static int keep_haptic(struct incise_rig_plan *plan, const char *device,
 					  strerror(ENOMEM));
 }
 
+/* Numbers that must fit each other, and a turn that must be one, which is made unit here. */
+static int check_haptic(struct incise_haptic_setup *haptic, const config_setting_t *root,
+			const char *path, struct incise_error *err)
+{
+	const config_setting_t *group = config_setting_get_member(root, "haptic_setup");
+	double size = sqrt(haptic->turn[0] * haptic->turn[0] +
+			   v3_dot(haptic->turn + 1, haptic->turn + 1));
+
+	if (!(fabs(size - 1) < 1e-3))
+		return incise_conf_error(group, "turn", path, err,
+					 "a unit quaternion [w, x, y, z]");
+	for (int i = 0; i < 4; i++)
+		haptic->turn[i] /= size;
+	for (int i = 0; i < 3; i++)
+		if (haptic->high_mm[i] < haptic->low_mm[i])
+			return incise_conf_error(group, "high_mm", path, err,
+						 "no number below that of low_mm");
+	if (haptic->n_motor_directions != 3 * haptic->n_motors ||
+	    haptic->n_motor_torques != haptic->n_motors)
+		return incise_conf_error(
+			group, "motor_direction", path, err,
+			"for each motor three numbers, and one each in motor_mm_turn and "
+			"motor_torque_N_mm");
+	return 0;
+}
+
 static int plan_haptic(struct incise_rig_plan *plan, const config_setting_t *root,
 		       const char *path, struct incise_error *err)
 {
@@ -670,6 +696,8 @@ static int plan_root(struct incise_rig_plan *plan, const config_setting_t *root,
 		plan->devices &= ~INCISE_RIG_CAMERA;
 	if (!rc)
 		rc = check_tube_station(&plan->tracker, root, path, err);
+	if (!rc)
+		rc = check_haptic(&plan->haptic, root, path, err);
 	if (!rc)
 		rc = plan_haptic(plan, root, path, err);
 	for (int kind = 0; kind < KIND_STEPPER && !rc; kind++)
@@ -774,10 +802,16 @@ static int plan_haptic_alone(struct incise_rig_plan *plan, const char *spec,
 	const char *words = spec + strlen(SIM_HAPTIC);
 	char device[300];
 
-	if (!takes_haptic(plan))
-		return 0;
-	plan->devices |= INCISE_RIG_HAPTIC;
 	snprintf(plan->haptic_where, sizeof(plan->haptic_where), "%.200s", spec);
+	if (plan->devices & INCISE_RIG_IF_NAMED)
+		plan->devices &= ~INCISE_RIG_CAMERA;
+	if (plan->devices & (INCISE_RIG_FORCE | INCISE_RIG_CAMERA))
+		return incise_error_set(err, ENODEV,
+					"%s: a haptic device alone has no %s; write a "
+					"rig.conf that names one",
+					plan->haptic_where,
+					plan->devices & INCISE_RIG_FORCE ? "force channel"
+									 : "camera");
 	if (strncmp(spec, SIM_HAPTIC, strlen(SIM_HAPTIC)))
 		return keep_haptic(plan, spec, err);
 	/* sim:haptic,clock=simulated,KEY=VALUE */

@@ -12,7 +12,7 @@
 
 #define SAMPLES 32
 #define PLACE_MOST_MM 1e6
-/* Of the workspace along each axis, about its middle, where a force may begin. */
+/* A force may begin in so much of the workspace along each axis, about its middle. */
 #define MIDDLE 0.5
 /* An age is late beyond the assumed one by a quarter and half a millisecond, as a mean of so many ticks. */
 #define LATE_SHARE 1.25
@@ -30,10 +30,10 @@ struct incise_stylus {
 	double held_mm
 		[3]; /* in the scene, where the tool was as the clutch was pressed */
 	bool clutched;
-	enum incise_stylus_off off;
+	enum incise_haptic_off off;
 	int64_t latency_ns; /* assumed */
 	double age_ns;	    /* mean of the last ticks */
-	struct incise_stylus_ages ages;
+	struct incise_haptic_ages ages;
 	double age_sum_ms, age_sum2_ms2;
 };
 
@@ -110,7 +110,6 @@ static INCISE_REALTIME void take_sample(struct incise_stylus *stylus,
 		.button = from->buttons,
 		.quaternion = {1},
 	};
-	stylus->ages.samples++;
 	if (!is_plain(from)) {
 		to->status = '~';
 		return;
@@ -149,9 +148,13 @@ static void get_info(const struct incise_tracker *tracker,
 		.latency_ns = stylus->latency_ns,
 		.stations = 1,
 		.scalpel_station = 1,
+		.haptic = &stylus->info,
 	};
 	snprintf(info->name, sizeof(info->name), "%s", stylus->info.name);
-	snprintf(info->note, sizeof(info->note), "%s", stylus->info.note);
+	/* A recording keeps the note: its settings change how a force feels. */
+	snprintf(info->note, sizeof(info->note), "%.190s%s%.100s", stylus->info.filters,
+		 *stylus->info.filters && *stylus->info.note ? "; " : "",
+		 stylus->info.note);
 }
 
 static uint64_t count_lost(const struct incise_tracker *tracker)
@@ -203,7 +206,7 @@ static INCISE_REALTIME int64_t assumed_ns(const struct incise_stylus *stylus)
 
 static INCISE_REALTIME void count_age(struct incise_stylus *stylus, int64_t now_ns)
 {
-	struct incise_stylus_ages *ages = &stylus->ages;
+	struct incise_haptic_ages *ages = &stylus->ages;
 	double age_ns = (double)(now_ns - stylus->last.t_ns);
 
 	stylus->age_ns += (age_ns - stylus->age_ns) / AGE_TICKS;
@@ -214,7 +217,7 @@ static INCISE_REALTIME void count_age(struct incise_stylus *stylus, int64_t now_
 }
 
 /* The reason to be off now, wherever the handle is. */
-static INCISE_REALTIME enum incise_stylus_off find_reason(
+static INCISE_REALTIME enum incise_haptic_off find_reason(
 	const struct incise_stylus *stylus)
 {
 	const struct incise_haptic_sample *last = &stylus->last;
@@ -222,41 +225,41 @@ static INCISE_REALTIME enum incise_stylus_off find_reason(
 	if (!stylus->seen ||
 	    last->flags & (INCISE_HAPTIC_NOT_READY | INCISE_HAPTIC_PROTECTED |
 			   INCISE_HAPTIC_CHANGED))
-		return INCISE_STYLUS_NOT_READY;
+		return INCISE_HAPTIC_UNREADY;
 	if (stylus->clutched)
-		return INCISE_STYLUS_CLUTCH;
+		return INCISE_HAPTIC_CLUTCH;
 	if (stylus->setup.enable && !is_pressed(last, stylus->setup.enable))
-		return INCISE_STYLUS_ENABLE;
+		return INCISE_HAPTIC_ENABLE;
 	if (stylus->age_ns > LATE_SHARE * (double)assumed_ns(stylus) + LATE_NS)
-		return INCISE_STYLUS_LATE;
-	return INCISE_STYLUS_ON;
+		return INCISE_HAPTIC_LATE;
+	return INCISE_HAPTIC_ON;
 }
 
-enum incise_stylus_off incise_stylus_off(struct incise_stylus *stylus, int64_t now_ns)
+enum incise_haptic_off incise_stylus_off(struct incise_stylus *stylus, int64_t now_ns)
 {
-	enum incise_stylus_off reason;
+	enum incise_haptic_off reason;
 
 	if (stylus->seen)
 		count_age(stylus, now_ns);
 	reason = find_reason(stylus);
-	if (reason != INCISE_STYLUS_ON)
+	if (reason != INCISE_HAPTIC_ON)
 		stylus->off = reason;
-	else if (stylus->off != INCISE_STYLUS_ON)
+	else if (stylus->off != INCISE_HAPTIC_ON)
 		stylus->off =
-			is_in_middle(stylus) ? INCISE_STYLUS_ON : INCISE_STYLUS_OUTSIDE;
+			is_in_middle(stylus) ? INCISE_HAPTIC_ON : INCISE_HAPTIC_OUTSIDE;
 	return stylus->off;
 }
 
-const char *incise_stylus_off_text(enum incise_stylus_off off)
+const char *incise_haptic_off_text(enum incise_haptic_off off)
 {
 	static const char *const texts[] = {
-		[INCISE_STYLUS_ON] = "on",
-		[INCISE_STYLUS_OUTSIDE] =
-			"move the handle to the middle of its workspace to start",
-		[INCISE_STYLUS_CLUTCH] = "the clutch is pressed",
-		[INCISE_STYLUS_ENABLE] = "press the enabling button",
-		[INCISE_STYLUS_NOT_READY] = "the device is not ready",
-		[INCISE_STYLUS_LATE] = "poses are older than the plan assumed",
+		[INCISE_HAPTIC_ON] = "on",
+		[INCISE_HAPTIC_OUTSIDE] =
+			"off: move the handle to the middle of its workspace",
+		[INCISE_HAPTIC_CLUTCH] = "off: the clutch is pressed",
+		[INCISE_HAPTIC_ENABLE] = "off: press the enabling button",
+		[INCISE_HAPTIC_UNREADY] = "off: the device is not ready",
+		[INCISE_HAPTIC_LATE] = "off: poses are older than the plan assumes",
 	};
 
 	return texts[off];
@@ -285,7 +288,7 @@ struct incise_stylus *incise_stylus_new(struct incise_haptic *haptic,
 	stylus->tracker.ops = &poses;
 	stylus->haptic = haptic;
 	incise_haptic_info(haptic, &stylus->info);
-	stylus->off = INCISE_STYLUS_OUTSIDE;
+	stylus->off = INCISE_HAPTIC_OUTSIDE;
 	stylus->latency_ns = stylus->info.latency_ns;
 	stylus->age_ns = (double)assumed_ns(stylus);
 	incise_stylus_place(stylus, setup->turn, setup->origin_mm);
@@ -307,12 +310,6 @@ const struct incise_haptic_setup *incise_stylus_setup(const struct incise_stylus
 	return &stylus->setup;
 }
 
-void incise_stylus_info(const struct incise_stylus *stylus,
-			struct incise_haptic_info *info)
-{
-	*info = stylus->info;
-}
-
 void incise_stylus_place(struct incise_stylus *stylus, const double turn[4],
 			 const double origin_mm[3])
 {
@@ -323,10 +320,12 @@ void incise_stylus_place(struct incise_stylus *stylus, const double turn[4],
 void incise_stylus_assume(struct incise_stylus *stylus, int64_t latency_ns)
 {
 	stylus->latency_ns = latency_ns;
+	stylus->ages = (struct incise_haptic_ages){0};
+	stylus->age_sum_ms = stylus->age_sum2_ms2 = 0;
 }
 
 void incise_stylus_ages(const struct incise_stylus *stylus,
-			struct incise_stylus_ages *ages)
+			struct incise_haptic_ages *ages)
 {
 	*ages = stylus->ages;
 	ages->lost = incise_haptic_lost(stylus->haptic);

@@ -17,23 +17,6 @@
 
 struct incise_stylus;
 
-/* The reason why a stylus is off. */
-enum incise_stylus_off {
-	INCISE_STYLUS_ON,
-	INCISE_STYLUS_OUTSIDE, /* not in the workspace's middle since the last stop */
-	INCISE_STYLUS_CLUTCH,
-	INCISE_STYLUS_ENABLE,
-	INCISE_STYLUS_NOT_READY, /* the device says so */
-	INCISE_STYLUS_LATE,	 /* poses are older than assumed */
-};
-
-/* Ages of the poses at the ticks that used them, since it was opened. */
-struct incise_stylus_ages {
-	uint64_t samples, lost, ticks;
-	double assumed_ms;		    /* by the device's latency and period */
-	double mean_ms, most_ms, jitter_ms; /* its standard deviation */
-};
-
 /* NULL: no memory. @haptic must outlive it. */
 struct incise_stylus *incise_stylus_new(struct incise_haptic *haptic,
 					const struct incise_haptic_setup *setup);
@@ -47,12 +30,9 @@ int incise_stylus_push(struct incise_stylus *stylus,
 		       const double force_N[3]) INCISE_REALTIME;
 
 /* The state after the last poses at time @now_ns. */
-enum incise_stylus_off incise_stylus_off(struct incise_stylus *stylus,
+enum incise_haptic_off incise_stylus_off(struct incise_stylus *stylus,
 					 int64_t now_ns) INCISE_REALTIME;
-const char *incise_stylus_off_text(enum incise_stylus_off off);
 
-void incise_stylus_info(const struct incise_stylus *stylus,
-			struct incise_haptic_info *info);
 const struct incise_haptic_setup *incise_stylus_setup(const struct incise_stylus *stylus);
 
 /* Another latency than the device's nominal one, for plans to come. */
@@ -63,7 +43,7 @@ void incise_stylus_place(struct incise_stylus *stylus, const double turn[4],
 			 const double origin_mm[3]);
 
 void incise_stylus_ages(const struct incise_stylus *stylus,
-			struct incise_stylus_ages *ages);
+			struct incise_haptic_ages *ages);
 
 /* The stylus of a rig with a haptic device, or NULL. */
 struct incise_stylus *incise_rig_stylus(struct incise_rig *rig);

@@ -94,7 +94,7 @@ static int take_rig(struct incise_plan *plan, struct incise_rig *rig,
 		incise_rig_surface(rig, place.point_mm, place.normal);
 		incise_axes_take(&plan->axes, rig);
 		plan->stylus = incise_rig_stylus(rig);
-		plan->off = plan->stylus ? INCISE_STYLUS_OUTSIDE : INCISE_STYLUS_ON;
+		plan->off = plan->stylus ? INCISE_HAPTIC_OUTSIDE : INCISE_HAPTIC_ON;
 	}
 	plan->surface = plan->scene->surface;
 	if (!plan->surface)
@@ -233,28 +233,24 @@ static int equip(struct incise_plan *plan, struct incise_error *err)
 }
 
 /* The scene asks no more of a haptic device than it gives, and nothing is scaled silently. */
-static int check_stylus(const struct incise_plan *plan, struct incise_error *err)
+static int check_haptic(const struct incise_plan *plan,
+			const struct incise_haptic_info *haptic, struct incise_error *err)
 {
-	struct incise_haptic_info info;
-
-	if (!plan->stylus)
+	if (!haptic)
 		return 0;
-	incise_stylus_info(plan->stylus, &info);
-	if (!(info.mass_kg > 0) || !(info.peak_N > 0))
+	if (!(haptic->mass_kg > 0) || !(haptic->peak_N > 0))
 		return incise_error_set(
 			err, EDOM,
-			"%s: %s does not say its %s, without which stability is not known; "
-			"set haptic_setup.%s in rig.conf",
-			plan->scene->path, info.name,
-			info.mass_kg > 0 ? "largest force" : "mass",
-			info.mass_kg > 0 ? "peak_N" : "mass_kg");
-	if (plan->scene->limits.force_N <= info.peak_N)
+			"%s: the %s of %s is not known; set haptic_setup.%s in rig.conf",
+			plan->scene->path, haptic->mass_kg > 0 ? "largest force" : "mass",
+			haptic->name, haptic->mass_kg > 0 ? "peak_N" : "mass_kg");
+	if (plan->scene->limits.force_N <= haptic->peak_N)
 		return 0;
-	return incise_error_set(
-		err, EDOM,
-		"%s: limits.force_N is %g N, but %s gives at most %g N; set it to that or "
-		"less",
-		plan->scene->path, plan->scene->limits.force_N, info.name, info.peak_N);
+	return incise_error_set(err, EDOM,
+				"%s: limits.force_N is %g N, but %s gives at most %g N; "
+				"set it to that or less",
+				plan->scene->path, plan->scene->limits.force_N,
+				haptic->name, haptic->peak_N);
 }
 
 /* A pose that is used for the last time is its latency and a period old. */
@@ -302,7 +298,7 @@ static struct incise_plan *new_plan(const struct incise_scene *scene,
 	rc = take_rig(plan, rig, &tracker, *place, err);
 	take_stations(plan, &tracker);
 	if (!rc)
-		rc = check_stylus(plan, err);
+		rc = check_haptic(plan, tracker.haptic, err);
 	if (!rc)
 		rc = check_age(plan, &tracker, err);
 	if (!rc)

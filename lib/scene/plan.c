@@ -114,7 +114,7 @@ void incise_plan_poses(const struct incise_plan *plan, struct incise_pose_counts
 	*counts = plan->poses.counts;
 }
 
-enum incise_stylus_off incise_plan_off(const struct incise_plan *plan)
+enum incise_haptic_off incise_plan_off(const struct incise_plan *plan)
 {
 	return plan->off;
 }

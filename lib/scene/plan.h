@@ -152,7 +152,7 @@ struct incise_plan {
 	struct incise_axes axes;	  /* without axes nothing is rendered … */
 	struct incise_stylus *stylus;	  /* … but by a haptic device; or NULL */
 	double early_s; /* its force acts so much before stability.late_ticks have passed */
-	enum incise_stylus_off off; /* of it, at the last tick; then the force fades */
+	enum incise_haptic_off off; /* of it, at the last tick; then the force fades */
 	struct incise_plan_kernel kernel;
 };
 
@@ -226,7 +226,7 @@ void incise_plan_fade(struct incise_plan *plan, bool fading) INCISE_REALTIME;
 bool incise_plan_faded(const struct incise_plan *plan) INCISE_REALTIME;
 
 /* The reason why the rig's haptic device takes no force. Real-time safe. */
-enum incise_stylus_off incise_plan_off(const struct incise_plan *plan) INCISE_REALTIME;
+enum incise_haptic_off incise_plan_off(const struct incise_plan *plan) INCISE_REALTIME;
 
 /* The flag of the scalpel's newest pose; ' ' or 0: no flag. Real-time safe. */
 char incise_plan_pose_flag(const struct incise_plan *plan) INCISE_REALTIME;

@@ -179,7 +179,7 @@ static void set_plan(struct search *s, const struct incise_plan *plan,
 	own->poses.tube_station = 0;
 	own->axes.n = 0;
 	own->stylus = NULL;
-	own->off = INCISE_STYLUS_ON;
+	own->off = INCISE_HAPTIC_ON;
 	own->poses.fed = s->fed;
 	own->poses.n_fed = 0;
 	/* The scene says how late all of the loop is, poses and all. */

@@ -63,7 +63,7 @@ static void take_stages(struct incise_plan *plan, struct incise_tracker_sample *
 /* A haptic device that is off takes no force: the plan fades its own, and lets it return. */
 static INCISE_REALTIME void watch_stylus(struct incise_plan *plan, int64_t now_ns)
 {
-	enum incise_stylus_off off = incise_stylus_off(plan->stylus, now_ns);
+	enum incise_haptic_off off = incise_stylus_off(plan->stylus, now_ns);
 
 	if (off == plan->off)
 		return;

@@ -227,7 +227,7 @@ static void set_delay(struct incise_plan *plan, const struct incise_tracker_info
 	double ticks = ceil(late_s / device->period_s - 1e-9);
 
 	/* A haptic device says its own. */
-	plan->stability.own_delay = plan->scene->device.delay_ticks >= 0 && !plan->stylus;
+	plan->stability.own_delay = plan->scene->device.delay_ticks >= 0 && !tracker->haptic;
 	device->delay_ticks = plan->stability.own_delay ? plan->scene->device.delay_ticks
 							: (int)fmin(ticks, INT_MAX);
 }
@@ -385,7 +385,7 @@ int incise_plan_survey(struct incise_plan *plan,
 {
 	struct incise_plan_stability *s = &plan->stability;
 	const struct incise_scene *scene = plan->scene;
-	struct incise_haptic_info info;
+	const struct incise_haptic_info *haptic = tracker->haptic;
 
 	s->device = (struct incise_haptic_device){
 		.mass_kg = scene->device.mass_kg,
@@ -394,17 +394,16 @@ int incise_plan_survey(struct incise_plan *plan,
 		.encoder_mm = scene->device.encoder_mm,
 		.period_s = 1 / scene->rate_hz,
 	};
-	if (plan->stylus) {
-		incise_stylus_info(plan->stylus, &info);
-		s->device.mass_kg = info.mass_kg;
-		s->device.damping_N_s_mm = info.damping_N_s_mm;
-		s->device.coulomb_N = info.coulomb_N;
-		s->device.encoder_mm = info.encoder_mm;
+	/* A haptic device says its own. */
+	if (haptic) {
+		s->device.mass_kg = haptic->mass_kg;
+		s->device.damping_N_s_mm = haptic->damping_N_s_mm;
+		s->device.coulomb_N = haptic->coulomb_N;
+		s->device.encoder_mm = haptic->encoder_mm;
 	}
 	set_delay(plan, tracker);
 	s->certified = true;
-	if (set_lateness(plan, err) ||
-	    (plan->stylus && set_own_lateness(plan, &info, err)))
+	if (set_lateness(plan, err) || (haptic && set_own_lateness(plan, haptic, err)))
 		return -EDOM;
 	if ((plan->model || plan->fixed) && survey_model(plan))
 		return incise_error_set(err, ENOMEM, "no memory for a plan");

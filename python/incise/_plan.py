@@ -49,6 +49,7 @@ SampleStruct, TrackerStruct, TickStruct, DeviceStruct = _library.structs("""
         bool network;
         char note[300];
         bool lost_unsure;
+        const void *haptic;
     };
     struct incise_tick {
         int64_t t_ns;

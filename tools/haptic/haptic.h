@@ -10,6 +10,7 @@
 #include <incise/rig.h>
 #include <incise/state.h>
 #include "../cli/calibration.h"
+#include "../cli/json.h"
 #include "../cli/scene_argument.h"
 #include "../session/log.h"
 #include "feeder.h"
@@ -57,6 +58,16 @@ struct self_test {
  */
 int haptic_self_test(const struct incise_scene *scene, struct incise_tracker *tracker,
 		     struct self_test *test, struct incise_error *err);
+
+/*
+ * Say what there is to know of the rig's haptic device, and measure the age of its poses; where the plan
+ * assumes younger ones it is made again, or the program ends. Without such a device nothing happens.
+ */
+void haptic_begin_device(struct haptic *haptic);
+
+/* The device and the ages of its poses, for a report; null, or no line, without one. */
+json_t *haptic_device_json(const struct haptic *haptic);
+void haptic_device_line(const struct haptic *haptic);
 
 /* From here on SIGHUP reads the scene again, if this process has no terminal that closes. */
 void haptic_catch_reload(void);

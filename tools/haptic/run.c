@@ -258,6 +258,7 @@ static void set_up_run(struct haptic_job *job)
 		cli_note("surface: %s", size);
 	free(size);
 	test_scene(haptic);
+	haptic_begin_device(haptic);
 	if (haptic->mode == HAPTIC_FEED &&
 	    incise_plan_feed_kernel(haptic->plan, haptic->rig, &err))
 		cli_fail_with(&err);
@@ -408,7 +409,7 @@ static int count_axes(struct incise_rig *rig)
 
 	while (incise_rig_axis(rig, n, NULL))
 		n++;
-	return n;
+	return incise_rig_haptic(rig) ? 3 : n;
 }
 
 static bool is_real(const struct haptic *haptic)
@@ -512,7 +513,7 @@ static void report_run_json(const struct haptic *haptic)
 		json_array_append_new(stages,
 				      json_string(incise_plan_stage(haptic->plan, i)));
 	json_print(json_pack(
-		"{sI sI sI sf so so sI sI sI sI so so sf so so so so so ss so so so so so}",
+		"{sI sI sI sf so so sI sI sI sI so so sf so so so so so ss so so so so so so}",
 		"ticks", (json_int_t)s->ticks, "skipped", (json_int_t)s->skipped,
 		"overruns", (json_int_t)s->overruns, "rate_hz", haptic->loop.rate_hz,
 		"lateness_us", real ? loop_lateness_json(s) : json_null(), "tick_ns",
@@ -530,7 +531,8 @@ static void report_run_json(const struct haptic *haptic)
 		"stages", stages, "stopped_by",
 		cli_stop ? json_string(strsignal(cli_stop)) : json_null(), "kernel",
 		kernel_json(haptic), "calibration",
-		calibration_json(&haptic->calibration)));
+		calibration_json(&haptic->calibration), "haptic",
+		haptic_device_json(haptic)));
 }
 
 /* Directions that can be felt, and the part of the force that cannot. */
@@ -595,6 +597,7 @@ static void report_run_text(const struct haptic *haptic)
 	       (unsigned long long)ticks_with(s, INCISE_TICK_TRAVEL),
 	       (unsigned long long)ticks_with(s, INCISE_TICK_STARTING));
 	kernel_line(haptic);
+	haptic_device_line(haptic);
 	for (int i = 0; (stepper = incise_rig_axis(haptic->rig, i, NULL)); i++)
 		stepper_counters_line(stepper);
 }

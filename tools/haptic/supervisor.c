@@ -592,6 +592,12 @@ static void handle_events(struct supervisor *s)
 				cli_note("the hand holds the %s",
 					 loop_tool_names[(int)events[i].value]);
 				break;
+			case INCISE_LOOP_HAPTIC:
+				cli_note(
+					"force %s",
+					incise_haptic_off_text(
+						(enum incise_haptic_off)events[i].value));
+				break;
 			case INCISE_LOOP_PLAN:
 				break;
 			}

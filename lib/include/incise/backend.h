@@ -92,7 +92,7 @@ struct incise_haptic_ops {
 /** A haptic device: the first member of its backend's struct. */
 struct incise_haptic {
 	const struct incise_haptic_ops *ops;
-	/* Of the library, set after open(). */
+	/* The library sets these after open(). */
 	struct incise_haptic_info info; /**< with the settings of the rig */
 	void *module;
 };

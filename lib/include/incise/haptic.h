@@ -98,6 +98,27 @@ struct incise_haptic_setup {
 	int n_motor_directions, n_motors, n_motor_torques;  /**< numbers given in each */
 };
 
+/** The reason why a rig's device takes no force. */
+enum incise_haptic_off {
+	INCISE_HAPTIC_ON,
+	/** The handle has not been in the middle of the workspace since the last stop. */
+	INCISE_HAPTIC_OUTSIDE,
+	INCISE_HAPTIC_CLUTCH,  /**< its button is pressed */
+	INCISE_HAPTIC_ENABLE,  /**< its button is not pressed */
+	INCISE_HAPTIC_UNREADY, /**< by the flags of the last sample */
+	INCISE_HAPTIC_LATE,    /**< samples are older than the plan assumed */
+};
+
+/** The same in words: "on", or "off: …" with what to do. */
+INCISE_API const char *incise_haptic_off_text(enum incise_haptic_off off);
+
+/** Ages of a rig's samples at the ticks of a plan. */
+struct incise_haptic_ages {
+	uint64_t ticks, lost;
+	double assumed_ms;		    /**< by the plan: latency and period */
+	double mean_ms, most_ms, jitter_ms; /**< jitter: standard deviation */
+};
+
 struct incise_haptic;
 
 /**

@@ -80,6 +80,7 @@ enum incise_loop_event_kind {
 	INCISE_LOOP_PLAN,	/**< the offered plan is active */
 	INCISE_LOOP_FLAGGED,	/**< flags of poses changed: value is the character */
 	INCISE_LOOP_TOOL,	/**< the tool changed: value is enum incise_tool */
+	INCISE_LOOP_HAPTIC, /**< the device takes a force or none: enum incise_haptic_off */
 };
 
 /** An event for the log. */

@@ -105,6 +105,22 @@ INCISE_API struct incise_stepper *incise_rig_axis(struct incise_rig *rig, int i,
 /** The haptic device, or NULL; owned by the rig. Its poses are the rig's tracker, too. */
 INCISE_API struct incise_haptic *incise_rig_haptic(struct incise_rig *rig);
 
+/**
+ * Place the frame of the rig's haptic device in the scene, in place of rig.conf.
+ *
+ * @param turn from the device's frame, unit, w first
+ * @param origin_mm of the device, in the scene
+ */
+INCISE_API void incise_rig_haptic_place(struct incise_rig *rig, const double turn[4],
+					const double origin_mm[3]);
+
+/** Assume another latency than the device's nominal one, for plans that are made later. */
+INCISE_API void incise_rig_haptic_assume(struct incise_rig *rig, int64_t latency_ns);
+
+/** Get the ages of the samples of the rig's haptic device, since the last call of assume. */
+INCISE_API void incise_rig_haptic_ages(const struct incise_rig *rig,
+				       struct incise_haptic_ages *ages);
+
 /** The simulated rig of the `sim:` devices, or NULL; owned by the rig. */
 INCISE_API struct incise_sim *incise_rig_sim(struct incise_rig *rig);
 

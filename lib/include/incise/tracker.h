@@ -10,6 +10,7 @@
 #include <stdint.h>
 #include <incise/error.h>
 #include <incise/export.h>
+#include <incise/haptic.h>
 
 INCISE_BEGIN_DECLS
 
@@ -68,6 +69,11 @@ struct incise_tracker_info {
 	char note[300];	      /**< a setting that its user should check; empty: none */
 	/** Records come in blocks or chunks, so that the count of losses may lack some. */
 	bool lost_unsure;
+	/**
+	 * The haptic device whose poses these are, and that takes the force; NULL: none. Valid as long as
+	 * the tracker.
+	 */
+	const struct incise_haptic_info *haptic;
 };
 
 /** Counts of poses and of their flags. */

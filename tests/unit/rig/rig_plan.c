@@ -201,6 +201,49 @@ TEST(real_steppers_are_refused_with_a_line)
 	}
 }
 
+/* --- a haptic device --- */
+
+TEST(a_haptic_device_is_tracker_and_stepper)
+{
+	const unsigned int both = INCISE_RIG_TRACKER | INCISE_RIG_STEPPER;
+	struct temp_file file = temp_file_new(
+		"rig.conf",
+		"haptic = \"haply:\"; force = \"iio:a\";\n"
+		"haptic_setup = { mass_kg = 0.2; turn = [0.6004, 0.0, 0.8, 0.0]; };");
+	static const struct {
+		const char *spec, *device;
+		bool simulated;
+	} alone[] = {
+		{"haply:10.0.0.1:10001/049D", "haply:10.0.0.1:10001/049D", false},
+		{"sim:haptic", "sim:", false},
+		{"sim:haptic,clock=simulated,mass_kg=0.1", "sim:mass_kg=0.1", true},
+	};
+	struct incise_rig_plan plan;
+
+	succeeds(!incise_rig_plan_read(&plan, file.path, both, &err));
+	assert_string_equal(plan.haptic_device, "haply:");
+	assert_false(plan.devices & both);
+	assert_float_equal(plan.haptic.turn[0] * plan.haptic.turn[0] +
+				   plan.haptic.turn[2] * plan.haptic.turn[2],
+			   1, 1e-12);
+	incise_rig_plan_free(&plan);
+	/* Who needs neither leaves it alone. */
+	succeeds(!incise_rig_plan_read(&plan, file.path, INCISE_RIG_FORCE, &err));
+	assert_null(plan.haptic_device);
+	incise_rig_plan_free(&plan);
+	temp_file_free(&file);
+	for (size_t i = 0; i < sizeof(alone) / sizeof(*alone); i++) {
+		succeeds(!incise_rig_plan_read(&plan, alone[i].spec, both, &err));
+		assert_string_equal(plan.haptic_device, alone[i].device);
+		assert_int_equal(plan.simulated, alone[i].simulated);
+		incise_rig_plan_free(&plan);
+	}
+	assert_int_equal(incise_rig_plan_read(&plan, "haply:", INCISE_RIG_FORCE, &err),
+			 -ENODEV);
+	assert_non_null(strstr(err.text, "haply:: a haptic device alone has no force"));
+	incise_rig_plan_free(&plan);
+}
+
 /* --- several actuators --- */
 
 #define MOTOR "spring_N_mm = 2.0; travel_mm = 9.0; lead_mm = 2.0; "
@@ -486,6 +529,13 @@ TEST(what_is_wrong_is_said)
 		{"vision = { saturation = [9, 8]; };", "vision.saturation:"},
 		{"vision = { value = [1, 0]; };", "vision.value:"},
 		{"vision = { roi = [0, 0, 15, 480]; };", "vision.roi"},
+		{"haptic = \"haply\";", "rig.conf:1: haptic:"},
+		{"haptic = \"haply:\"; tracker = \"sim:\";", "no tracker and no stepper"},
+		{"haptic_setup = { turn = [1.0, 1.0, 0.0, 0.0]; };", "haptic_setup.turn"},
+		{"haptic_setup = { low_mm = [1, 0, 0]; };", "haptic_setup.high_mm"},
+		{"haptic_setup = { motor_mm_turn = [1]; };",
+		 "haptic_setup.motor_direction"},
+		{"haptic_setup = { clutch = 33; };", "haptic_setup.clutch"},
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {

@@ -7,6 +7,7 @@
 #include <incise/fixed.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/base/vector.h"
+#include "../../../lib/scene/scene.h"
 #include "../../../lib/tissue/tick.h"
 #include <time.h>
 #include "../message.h"
@@ -516,6 +517,46 @@ TEST(test_fed_tracker)
 		assert_int_equal(errno, EINVAL);
 		assert_int_equal(err.code, EINVAL);
 	}
+	fed_end(&usual);
+}
+
+/* A scene is checked on the haptic device that gives the poses, not on its own; and asks no more than it has. */
+TEST(test_fed_haptic)
+{
+	struct incise_haptic_info device = {.name = "omega",
+					    .peak_N = 12,
+					    .mass_kg = 0.3,
+					    .damping_N_s_mm = 0.02,
+					    .force_latency_ns = 1500000};
+	struct incise_tracker_info poses = {.name = "omega",
+					    .rate_hz = 1000,
+					    .latency_ns = 500000,
+					    .haptic = &device};
+	struct fed usual = fed_start("scenes/neck.scene", true);
+	struct incise_plan_stability s;
+	struct incise_plan *plan;
+
+	usual.scene->device.delay_ticks = 3;
+	plan = incise_plan_new_fed(usual.scene, &poses, &err);
+	succeeds(plan);
+	incise_plan_stability(plan, &s);
+	assert_true(s.device.mass_kg == 0.3 && s.device.damping_N_s_mm == 0.02);
+	assert_int_equal(s.device.delay_ticks, 2);
+	assert_int_equal(s.late_ticks, 2);
+	assert_false(s.own_delay);
+	incise_plan_free(plan);
+	usual.scene->tissue.gain = 1e4;
+	assert_null(incise_plan_new_fed(usual.scene, &poses, &err));
+	assert_non_null(strstr(err.text, "on a device of 0.3 kg and 0.02 N s/mm"));
+	device.force_latency_ns = 20000000;
+	assert_error(incise_plan_new_fed(usual.scene, &poses, &err), EDOM, &err,
+		     "its force is 20 ticks late");
+	device.peak_N = 1;
+	assert_error(incise_plan_new_fed(usual.scene, &poses, &err), EDOM, &err,
+		     "but omega gives at most 1 N");
+	device.mass_kg = 0;
+	assert_error(incise_plan_new_fed(usual.scene, &poses, &err), EDOM, &err,
+		     "the mass of omega is not known; set haptic_setup.mass_kg");
 	fed_end(&usual);
 }
 
