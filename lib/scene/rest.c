@@ -51,6 +51,12 @@ static const struct incise_hand_impedance holds[] = {
 };
 
 /*
+ * A hand's mass on a haptic device that is held across: one that is light and strongly damped may swing with some of
+ * them, though neither bare nor in a firm hand.
+ */
+static const double fingers_kg[] = {0.03, 0.06, 0.12, 0.25, 0.5};
+
+/*
  * Ways to lean, with equal steps up to this share of the scene's largest force.
  *
  * Runs of all scenes: at the top, in the deepest valley and on the sharpest crest, free in all directions, in no
@@ -228,6 +234,7 @@ static void describe_device(const struct incise_plan *plan,
 		.latency_s = (double)tracker->latency_ns / INCISE_NS_PER_S,
 		.late_ticks = plan->stability.late_ticks,
 		.early_s = plan->early_s,
+		.touched = tracker->haptic,
 		.slew_N_s = INFINITY,
 		.force_N = plan->scene->limits.force_N,
 		.continuous_N = plan->scene->limits.force_N,
@@ -784,6 +791,25 @@ static bool is_same(const struct incise_force_map *a, const struct incise_force_
 	return off <= 1e-4 * most;
 }
 
+/* The margin of the device, and of a haptic one with fingers on it. */
+static double find_margin(const struct search *s, const struct incise_pose_loop *loop,
+			  const struct rest_run *run, const struct incise_force_map *map,
+			  double most, struct incise_swing *swing)
+{
+	bool fingers = s->device.touched && s->way.held == INCISE_HELD_ACROSS;
+
+	most = incise_pose_loop_margin(loop, run->device, map, most, swing);
+	for (int i = 0; fingers && i < N(fingers_kg); i++) {
+		struct incise_plant device[3];
+
+		memcpy(device, run->device, sizeof(device));
+		for (int k = 0; k < 3; k++)
+			device[k].mass_kg += fingers_kg[i];
+		most = incise_pose_loop_margin(loop, device, map, most, swing);
+	}
+	return most;
+}
+
 /*
  * Where a run came to rest, the loop as a linear one. It must not swing; where only the averaged normal makes it,
  * and the account of work may end it, it is kicked that way, and must come to rest again. Returns whether it does.
@@ -824,8 +850,7 @@ static bool judge_linear(struct search *s, const struct rest_run *run, double de
 		if (side && is_same(&map, &before))
 			break;
 		before = map;
-		here.margin =
-			incise_pose_loop_margin(&loop, run->device, &map, most, &swing);
+		here.margin = find_margin(s, &loop, run, &map, most, &swing);
 		for (int i = 0; i < 3; i++) {
 			kicked.device[i].position_mm += KICK_MM * swing.along[i];
 			v3_add(here.along, here.along, swing.along[i], s->axis[i]);

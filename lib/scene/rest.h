@@ -70,6 +70,7 @@ struct incise_device {
 	double latency_s;      /* … and how old one is when it comes */
 	int late_ticks;	       /* until a force acts … */
 	double early_s;	       /* … less this part of the last of them */
+	bool touched;	       /* a haptic device: fingers hold it */
 	double slew_N_s;       /* the fastest that its force changes; infinite: at once */
 	double force_N;	       /* the largest … */
 	double continuous_N;   /* … and one that it keeps for ever */

@@ -40,10 +40,12 @@ static const struct {
 	{"none", "hand_kg=0,hand_N_mm=0,hand_N_s_mm=0"},
 	{"damped", "hand_kg=0.05,hand_N_mm=0.1,hand_N_s_mm=0.005"},
 	{"firm", ""},
-	{"of a bare mass",
-	 "hand_kg=0.05,hand_N_mm=0,hand_N_s_mm=0"}, /* of all cases only */
+	/* of all cases only */
+	{"of 0.05 kg", "hand_kg=0.05,hand_N_mm=0,hand_N_s_mm=0"},
+	{"of 0.1 kg", "hand_kg=0.1,hand_N_mm=0,hand_N_s_mm=0"},
+	{"of 0.25 kg", "hand_kg=0.25,hand_N_mm=0,hand_N_s_mm=0"},
 };
-#define HANDS (cases_are_all() ? 4 : 3)
+#define HANDS (cases_are_all() ? 6 : 3)
 
 /* A touch with a hard lean, a drop with a light one; at other phases of samples and ticks. */
 static const struct {
@@ -207,7 +209,7 @@ static struct device draw_device(uint64_t seed)
 	struct device d;
 
 	d.mass_kg = sized(&seed, 0.02, 0.5);
-	d.damping_N_s_mm = sized(&seed, 0.001, 0.02);
+	d.damping_N_s_mm = sized(&seed, 0.001, 0.05);
 	d.rate_hz = rates_hz[below(&seed, 7)];
 	d.tick_hz = fmin(d.rate_hz * of[below(&seed, 5)], 5000);
 	d.latency_ms = round_to(sized(&seed, 0.1, 4), 0.02);
