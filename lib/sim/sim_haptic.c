@@ -225,7 +225,7 @@ static INCISE_REALTIME double measure(const struct sim_haptic *sim, int i, doubl
 }
 
 /* The sample at @t_ns of the script, within a step after the device's. */
-static INCISE_REALTIME void take_sample(struct sim_haptic *sim, int64_t t_ns)
+static INCISE_REALTIME void acquire_sample(struct sim_haptic *sim, int64_t t_ns)
 {
 	struct incise_haptic_sample to = {
 		.t_ns = sim->start_ns + t_ns, .seq = sim->n, .quaternion = {1}};
@@ -247,12 +247,12 @@ static INCISE_REALTIME void take_sample(struct sim_haptic *sim, int64_t t_ns)
 	sim->n++;
 }
 
-static INCISE_REALTIME void take_samples(struct sim_haptic *sim, int64_t before_ns)
+static INCISE_REALTIME void acquire_samples(struct sim_haptic *sim, int64_t before_ns)
 {
 	int64_t t_ns;
 
 	while ((t_ns = incise_sim_time(sim->n, sim->config.rate_hz)) < before_ns)
-		take_sample(sim, t_ns);
+		acquire_sample(sim, t_ns);
 }
 
 /* Advance to the clock's time. Returns that. */
@@ -263,12 +263,12 @@ static INCISE_REALTIME int64_t advance(struct sim_haptic *sim)
 
 	for (; sim->t_ns + STEP_NS <= now_ns; sim->t_ns += STEP_NS) {
 		take_pushes(sim);
-		take_samples(sim, sim->t_ns + STEP_NS);
+		acquire_samples(sim, sim->t_ns + STEP_NS);
 		place_hand(&sim->config, (double)sim->t_ns * NS, place_mm);
 		for (int i = 0; i < 3; i++)
 			move_axis(sim, i, place_mm[i]);
 	}
-	take_samples(sim, now_ns + 1);
+	acquire_samples(sim, now_ns + 1);
 	return now_ns;
 }
 
