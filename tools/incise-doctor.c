@@ -14,15 +14,19 @@
 #include <sys/statvfs.h>
 #include <sys/utsname.h>
 #include <unistd.h>
+#include <incise/infile.h>
 #include <incise/realtime.h>
 #include <incise/recorder.h>
 #include <incise/rig.h>
 #include <incise/scan.h>
+#include "bench/machine.h"
 #include "cli/calibration.h"
 #include "cli/child.h"
 #include "cli/cli.h"
 #include "cli/features.h"
+#include "cli/file.h"
 #include "cli/json.h"
+#include "doctor/protocol.h"
 
 #define CHECKS_MAX 120
 #define MINUTES_LEAST 10 /* of recording, below which the disk is a warning */
@@ -51,6 +55,12 @@ struct doctor {
 	struct incise_camera_info camera;
 	bool has_rig, has_tracker, has_force, has_camera;
 	double recording_min; /* that the disk holds; NAN: not known */
+
+	const char *report;
+	bool asked;	      /* for the protocol */
+	bool has_haptic;      /* the rig names a haptic device */
+	bool haptic_measured; /* then: */
+	struct protocol protocol;
 };
 
 static const struct cli_option option_table[] = {
@@ -59,18 +69,26 @@ static const struct cli_option option_table[] = {
 	 "calibration to check (default: ./calibration.conf, else "
 	 "/etc/incise/calibration.conf)",
 	 CLI_INPUT(struct doctor, calibration)},
+	{0, "protocol", NULL,
+	 "measure the haptic device for 10 s while its handle rests, as the first steps of the "
+	 "protocol in doc/devices.md",
+	 CLI_FLAG(struct doctor, asked)},
+	{0, "report", "FILE.json",
+	 "write one file to send: the checks, this machine, rig.conf and the haptic device",
+	 CLI_OUTPUT(struct doctor, report), .extensions = ".json"},
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct doctor, json)},
 	{0},
 };
 
 static const struct cli_command command = {
 	.name = "doctor",
-	.synopsis = "[--rig RIG] [-c FILE] [--json]",
+	.synopsis = "[--rig RIG] [-c FILE] [--report FILE.json] [--json]",
 	.summary =
 		"Check this machine and its rig, and print the command that mends each "
 		"finding.",
 	.options = option_table,
-	.notes = "Actuators are only watched: nothing moves.",
+	.notes =
+		"Actuators are only watched, and a haptic device gives no force: nothing moves.",
 	.success = "no problem",
 	.failure = "at least one problem",
 };
@@ -200,6 +218,49 @@ static void check_modules(struct doctor *doctor)
 		    "this incise was built without " LEFT_OUT);
 }
 
+#define GLANCE_S 1.0
+#define REST_S 10.0
+
+static void add_haptic(struct doctor *doctor, struct incise_rig *rig)
+{
+	struct protocol *protocol = &doctor->protocol;
+	struct incise_error err = {0};
+	struct handle handle;
+	const char *failed;
+	int rc = 0;
+
+	handle_begin(&handle, rig);
+	if (doctor->asked) {
+		fprintf(stderr, "lay the handle down so that nothing moves it, and press "
+				"Enter or a button\n");
+		rc = handle_await_press(&handle, &err);
+	}
+	if (!rc)
+		rc = handle_record(&handle, doctor->asked ? REST_S : GLANCE_S, &err);
+	if (rc) {
+		add(doctor, "devices", "samples", PROBLEM, "incise help rig.conf", "%s",
+		    err.text);
+		return;
+	}
+	protocol_measure(protocol, &handle, doctor->asked);
+	doctor->haptic_measured = true;
+	failed = protocol_failed(protocol);
+	add(doctor, "devices", "samples", failed ? WARNING : OK, "incise help doctor",
+	    "%s: %.0f Hz, %.2f ms old (99 %%: %.2f, at most %.2f), %.2g %% lost%s%s",
+	    handle.info.name, protocol->rate_hz, protocol->age_median_ms,
+	    protocol->value[AGE], protocol->value[AGE_MOST], protocol->value[LOST],
+	    failed ? "; above its mark: " : "", failed ? failed : "");
+	add(doctor, "devices", "state",
+	    handle.last.flags & INCISE_HAPTIC_NOT_READY ? WARNING : OK,
+	    "incise help rig.conf", "%s; buttons: %d, pressed: %#x",
+	    handle.last.flags ? "it reports a fault, or is not ready" : "ready",
+	    handle.info.buttons, handle.last.buttons);
+	if (*handle.info.filters || *handle.info.note)
+		add(doctor, "devices", "settings", OK, NULL, "its own: %s%s%s",
+		    handle.info.filters, *handle.info.note ? "; " : "", handle.info.note);
+	free(handle.samples);
+}
+
 static void add_opened(struct doctor *doctor, const char *name, struct incise_rig *rig)
 {
 	if (incise_rig_tracker(rig)) {
@@ -219,6 +280,8 @@ static void add_opened(struct doctor *doctor, const char *name, struct incise_ri
 	doctor->has_force |= !!incise_rig_force(rig);
 	doctor->has_camera |= !!incise_rig_camera(rig);
 	add(doctor, "devices", name, OK, NULL, "opens");
+	if (incise_rig_haptic(rig))
+		add_haptic(doctor, rig);
 }
 
 /* Try one kind of device. A rig need not name each. */
@@ -228,12 +291,20 @@ static void check_device(struct doctor *doctor, const char *rig, const char *nam
 	struct incise_error err = {0};
 	struct incise_rig *open = incise_rig_open(rig, devices, &err);
 
-	if (open && devices & INCISE_RIG_CAMERA && !incise_rig_camera(open))
+	bool none =
+		open ? (devices & INCISE_RIG_CAMERA && !incise_rig_camera(open)) ||
+				(devices & INCISE_RIG_HAPTIC && !incise_rig_haptic(open))
+		     : err.code == ENODEV &&
+				(strstr(err.text, "missing, but required") ||
+				 strstr(err.text, "a haptic device alone has no"));
+
+	doctor->has_haptic |= devices & INCISE_RIG_HAPTIC && !none;
+	if (none && devices & INCISE_RIG_HAPTIC)
+		; /* as of most rigs */
+	else if (none)
 		add(doctor, "devices", name, OK, NULL, "the rig names none");
 	else if (open)
 		add_opened(doctor, name, open);
-	else if (err.code == ENODEV && strstr(err.text, "missing, but required"))
-		add(doctor, "devices", name, OK, NULL, "the rig names none");
 	else if (err.code == EBUSY)
 		add(doctor, "devices", name, WARNING, "incise status", "%s", err.text);
 	else
@@ -272,6 +343,7 @@ static void check_rig(struct doctor *doctor)
 		const char *name;
 		unsigned int devices;
 	} kinds[] = {
+		{"haptic", INCISE_RIG_HAPTIC},
 		{"tracker", INCISE_RIG_TRACKER},
 		{"force", INCISE_RIG_FORCE},
 		{"camera", INCISE_RIG_CAMERA | INCISE_RIG_IF_NAMED},
@@ -297,23 +369,28 @@ static void check_rig(struct doctor *doctor)
 	add(doctor, "devices", "rig", OK, NULL, "%s", rig);
 	incise_rig_close(open);
 	for (size_t i = 0; i < sizeof(kinds) / sizeof(*kinds); i++)
-		check_device(doctor, rig, kinds[i].name, kinds[i].devices);
+		/* A haptic device is tracker and stepper, too. */
+		if (!doctor->has_haptic ||
+		    !(kinds[i].devices & (INCISE_RIG_TRACKER | INCISE_RIG_STEPPER)))
+			check_device(doctor, rig, kinds[i].name, kinds[i].devices);
 }
 
 /* --- what is attached, whether the rig names it or not --- */
 
 static int add_attached(void *context, const struct incise_scan_device *device)
 {
-	static const char *const kinds[] = {"tracker", "force", "camera", "stepper"};
+	static const char *const kinds[] = {"tracker", "force", "camera", "haptic",
+					    "stepper"};
 	bool denied = strstr(device->what, strerror(EACCES));
 	size_t kind = 0;
 
-	while (kind < 3 && strcmp(kinds[kind], device->kind))
+	while (kind < 4 && strcmp(kinds[kind], device->kind))
 		kind++;
 	add(context, "attached", kinds[kind], device->usable ? OK : WARNING,
 	    denied ? "sudo usermod -aG incise $USER    # takes effect at the next login"
 		   : "incise info devices",
-	    "%s: %s", device->device, device->what);
+	    kind == 3 && device->usable ? "haptic = \"%s\";    # %s" : "%s: %s",
+	    device->device, device->what);
 	return 0;
 }
 
@@ -473,9 +550,9 @@ static void check_calibration(struct doctor *doctor)
 		char *fix = cli_text("incise calibrate %s", name ? name : "");
 
 		/* The names are those of the report, which is released below. */
-		for (size_t k = 0; name && k < 5; k++) {
-			static const char *const names[] = {"force", "depth", "tip",
-							    "delay", "stepper"};
+		for (size_t k = 0; name && k < 6; k++) {
+			static const char *const names[] = {"force", "depth",	"tip",
+							    "delay", "stepper", "frame"};
 
 			if (strcmp(name, names[k]))
 				continue;
@@ -554,7 +631,7 @@ static void print(const struct doctor *doctor)
 	       cli_count(count_doctor(doctor, WARNING), "warning"));
 }
 
-static void print_doctor_json(const struct doctor *doctor)
+static json_t *make_doctor_json(const struct doctor *doctor)
 {
 	json_t *checks = json_array();
 
@@ -570,10 +647,52 @@ static void print_doctor_json(const struct doctor *doctor)
 							? json_null()
 							: json_text(check->fix)));
 	}
-	json_print(json_pack("{s:o, s:i, s:i, s:o}", "checks", checks, "problems",
-			     count_doctor(doctor, PROBLEM), "warnings",
-			     count_doctor(doctor, WARNING), "recording_min",
-			     json_number(doctor->recording_min)));
+	return json_pack(
+		"{s:o, s:i, s:i, s:o, s:o}", "checks", checks, "problems",
+		count_doctor(doctor, PROBLEM), "warnings", count_doctor(doctor, WARNING),
+		"recording_min", json_number(doctor->recording_min), "haptic",
+		doctor->haptic_measured ? protocol_json(&doctor->protocol) : json_null());
+}
+
+/* Without the names of this host and of its user's folder. */
+static void put_hidden(const char *text, FILE *out)
+{
+	struct utsname name = {0};
+	const char *secrets[] = {getenv("HOME"), name.nodename};
+
+	uname(&name);
+	while (*text) {
+		size_t length = 0;
+
+		for (int i = 0; i < 2 && !length; i++)
+			if (secrets[i] && strlen(secrets[i]) > 2)
+				length = strncmp(text, secrets[i], strlen(secrets[i]))
+						 ? 0
+						 : strlen(secrets[i]);
+		fprintf(out, "%.*s", length ? 3 : 1, length ? "***" : text);
+		text += length ? length : 1;
+	}
+}
+
+static void write_report(const struct doctor *doctor)
+{
+	static const struct incise_infile_kind conf = {.name = "a rig.conf",
+						       .size_max = 1 << 20};
+	const char *spec = doctor->rig ? doctor->rig : "";
+	json_t *report = json_with_schema(make_doctor_json(doctor), NULL);
+	struct incise_outfile *file;
+	FILE *out = whole_file_begin(doctor->report, &file);
+	size_t size;
+	char *rig = incise_infile_read(spec, &conf, &size, NULL), *text;
+
+	json_object_set_new(report, "machine", machine_json());
+	json_object_set_new(report, "rig", json_text_or_null(rig ? rig : spec));
+	text = json_dumps(report, JSON_INDENT(2) | JSON_REAL_PRECISION(12));
+	put_hidden(text ? text : "", out);
+	whole_file_end(file);
+	json_decref(report);
+	free(text);
+	free(rig);
 }
 
 int main(int argc, char **argv)
@@ -592,8 +711,10 @@ int main(int argc, char **argv)
 	check_display(&doctor);
 	check_calibration(&doctor);
 	check_disk(&doctor);
+	if (doctor.report)
+		write_report(&doctor);
 	if (doctor.json)
-		print_doctor_json(&doctor);
+		json_print(make_doctor_json(&doctor));
 	else
 		print(&doctor);
 	cli_finish();

@@ -23,6 +23,7 @@
 #include "c_locale.h"
 #include "crc32c.h"
 #include "settings.h"
+#include "vector.h"
 
 #define SETTINGS_OF struct incise_calibration
 #define DELAY(key, initial, help) \
@@ -71,6 +72,12 @@ const struct incise_setting incise_calibration_settings[] = {
 		       "force at which the actuator starts to move"),
 	SETTING_NUMBER(stepper_steps_s, stepper_steps_s, "1/s", 0, 1e7, "(none)",
 		       "largest rate without lost steps, microsteps per second"),
+	SETTING_NUMBER(
+		frame_turn_deg, frame_turn_deg, "degrees", -180, 180, "(none)",
+		"turn of a haptic device's frame into the scene's: its axis, in the scene, times the "
+		"angle; else that of haptic_setup in rig.conf"),
+	SETTING_VECTOR(frame_mm, frame_mm, "mm", "(none)",
+		       "origin of that frame in the scene"),
 	SETTING_OWN(history, "", "(none)", "list of all calibrations, oldest first"),
 	{0},
 };
@@ -92,25 +99,43 @@ static double *number_at(struct incise_calibration *calibration,
 	return (double *)((char *)calibration + row->offset);
 }
 
+static int count_numbers(const struct incise_setting *row)
+{
+	return (int)(row->size / sizeof(double));
+}
+
 void incise_calibration_nominal(struct incise_calibration *calibration)
 {
 	for (int i = 0; i < N_KEYS; i++)
-		*number_at(calibration, &settings[i]) = NAN;
+		for (int k = 0; k < count_numbers(&settings[i]); k++)
+			number_at(calibration, &settings[i])[k] = NAN;
 	incise_settings_init(settings, calibration);
 }
 
-/* A key of the history; of the elements of tip_mm each has its own. */
-static const struct incise_setting *find_key(const char *name, int *element)
+/* Number @k of a row has a key of its own in the history: tip_y_mm of tip_mm. */
+static void name_number(const struct incise_setting *row, int k, char name[40])
 {
-	static const char *const tip[] = {"tip_x_mm", "tip_y_mm", "tip_z_mm"};
+	const char *unit = strrchr(row->key, '_');
 
-	for (*element = 2; *element >= 0; --*element)
-		if (!strcmp(tip[*element], name))
-			return incise_setting_of(settings, "tip_mm");
-	*element = 0;
-	return !strcmp(name, "tip_mm") || !strcmp(name, "history")
-		       ? NULL
-		       : incise_setting_of(settings, name);
+	if (count_numbers(row) == 1)
+		snprintf(name, 40, "%s", row->key);
+	else
+		snprintf(name, 40, "%.*s_%c%s", (int)(unit - row->key), row->key, 'x' + k,
+			 unit);
+}
+
+/* A key of the history. */
+static const struct incise_setting *find_key(const char *key, int *element)
+{
+	char name[40];
+
+	for (int i = 0; i < N_KEYS; i++)
+		for (*element = 0; *element < count_numbers(&settings[i]); ++*element) {
+			name_number(&settings[i], *element, name);
+			if (!strcmp(name, key))
+				return &settings[i];
+		}
+	return NULL;
 }
 
 bool incise_calibration_has_key(const char *key)
@@ -126,6 +151,21 @@ double incise_calibration_get(const struct incise_calibration *calibration,
 	const struct incise_setting *row = find_key(name, &element);
 
 	return row ? number_at(&copy, row)[element] : NAN;
+}
+
+bool incise_calibration_frame(const struct incise_calibration *calibration,
+			      double turn[4], double origin_mm[3])
+{
+	const double *deg = calibration->frame_turn_deg;
+	double size_deg = v3_length(deg), half = size_deg * M_PI / 360;
+
+	if (!v3_finite(deg) || !v3_finite(calibration->frame_mm))
+		return false;
+	turn[0] = cos(half);
+	for (int k = 0; k < 3; k++)
+		turn[1 + k] = size_deg > 0 ? sin(half) * deg[k] / size_deg : 0;
+	v3_copy(origin_mm, calibration->frame_mm);
+	return true;
 }
 
 /* --- reading --- */
@@ -492,11 +532,13 @@ static void put_calibration_text(const char *key, const char *text, FILE *out)
 static void put_key(const struct file_content *file, const struct incise_setting *row,
 		    const double *value, FILE *out)
 {
-	const int n = (int)(row->size / sizeof(double));
+	const int n = count_numbers(row);
 	const struct incise_calibration_record *from;
-	const struct incise_calibration_value *last = incise_calibration_last(
-		file->records, file->n, n > 1 ? "tip_x_mm" : row->key, &from);
+	const struct incise_calibration_value *last;
+	char first[40];
 
+	name_number(row, 0, first);
+	last = incise_calibration_last(file->records, file->n, first, &from);
 	fprintf(out, "%s = ", row->key);
 	for (int i = 0; i < n; i++) {
 		fputs(n == 1 ? "" : i ? ", " : "[", out);

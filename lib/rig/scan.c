@@ -44,7 +44,7 @@ static int scan_backend(struct kind_found *of, const char *name)
 	return of->found(of->context, &failed);
 }
 
-static const char *const kinds[] = {"tracker", "force", "camera", "stepper"};
+static const char *const kinds[] = {"tracker", "force", "camera", "haptic", "stepper"};
 #define KINDS (sizeof(kinds) / sizeof(*kinds))
 #define NAMES 16
 

@@ -364,6 +364,7 @@ Stream, RecordingInfo, CalibrationStruct, FrameStruct = structs("""
         double tracker_delay_ms, tracker_delay_sd_ms, camera_delay_ms, camera_delay_sd_ms;
         double tip_mm[3], surface_u_mm, stepper_N_step, stepper_backlash_mm;
         double stepper_hysteresis_N, stepper_stiction_N, stepper_steps_s;
+        double frame_turn_deg[3], frame_mm[3];
     };
     struct incise_camera_frame {
         int64_t t_ns;

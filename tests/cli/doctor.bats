@@ -151,3 +151,36 @@ group() {
 		assert report["recording_min"] >= 0
 	END
 }
+
+# bats test_tags=check
+@test "doctor measures a haptic device, and writes a report without the host's name" {
+	rig=sim:haptic,clock=simulated,motion=still,noise_mm=0.03
+	run --separate-stderr incise doctor --rig $rig
+	[[ "$(finding devices haptic)" == "  ok "*opens ]]
+	[[ "$(finding devices samples)" == "  ok "*"1000 Hz"*", 0 % lost" ]]
+	[[ "$(finding devices state)" == "  ok "*"buttons: 2, pressed: 0" ]]
+	# it is tracker and stepper
+	[[ "$(finding devices tracker)$(finding devices stepper)" == "" ]]
+	[[ "$(finding devices force)" == "  ok "*"names none" ]]
+	echo >enter
+	run --separate-stderr incise doctor --rig $rig --protocol --report r.json <enter
+	python3 - r.json "$(uname -n)" <<-'END'
+		import json, sys
+		text = open(sys.argv[1]).read()
+		assert sys.argv[2] not in text or len(sys.argv[2]) < 3
+		report = json.loads(text)
+		assert report["schema"] == "incise/doctor/1" and report["rig"].startswith("sim:haptic"), report
+		steps = report["haptic"]["protocol"]
+		value = {(s["step"], s["quantity"].split(",")[0]): s for s in steps}
+		# 0.03 mm and the encoder's 0.01 / sqrt(12); a white line has about sd * sqrt(8 ln(bins) / n)
+		noise = value["noise", "standard deviation along an axis"]
+		assert abs(noise["value"] - 0.0301) < 0.001 and noise["pass"], noise
+		line = value["noise", "strongest line above 5 Hz"]
+		assert 0.002 < line["value"] < 0.01, line
+		assert [s["value"] for s in steps if s["step"] in ("weight", "wall")] == [None, None]
+		assert all(s["pass"] is None for s in steps if s["value"] is None)
+	END
+	# a device that stops is a problem with its reason
+	run -1 --separate-stderr incise doctor --rig "$rig,unplugged_s=0.5"
+	[[ "$(finding devices samples)" == "  problem "*"unplugged"* ]]
+}

@@ -43,6 +43,7 @@ readers() {
 		csv|calibrate force --from FILE
 		csv|calibrate tip --from FILE
 		csv|calibrate stepper --from FILE
+		csv|calibrate frame --from FILE
 		csv|calibrate depth line --from FILE
 		png|calibrate depth two-point --pick 5,5 --from FILE
 		json|bench compare r.json FILE

@@ -119,6 +119,9 @@ calibrations() {
 	report calibrate-stepper calibrate stepper -o points.csv \
 		--rig sim:clock=simulated,bench=1,handle_friction_N=0,backlash_mm=0.04,stall_mm_s=9
 	report calibrate-stepper.from calibrate stepper --from points.csv --dry-run
+	printf '%s\n' x_mm,y_mm,z_mm,device_x_mm,device_y_mm,device_z_mm 0,0,0,0,0,10 60,0,0,60,0,10 \
+		0,50,0,0,50.1,10 20,20,40,20,20,50 >touched.csv
+	report calibrate-frame calibrate frame --from touched.csv -c framed.conf
 	report calibrate-check calibrate check
 	echo 'force_mV_N = 1240.0;' >none.conf
 	report calibrate-check.none calibrate check -c none.conf --only force

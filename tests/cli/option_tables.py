@@ -71,6 +71,7 @@ VALUES = """
 --key | key |
 --length | 47.5mm 4.75cm 100 | 47.5kg 0 long {}
 --load | idle cpu memory disk view | disc {}
+--log device | |
 --lsl | prefix | {}
 --max-delay | 10 1000 | 9 1001 long {}
 --max-force | 1N 500mN | 0 1kg strong {}
@@ -80,12 +81,13 @@ VALUES = """
 --nominal calibrate depth | 0.1 10 | 0 11 wide {}
 --nominal calibrate force | 1 1e5 | 0 1e6 high {}
 --only bench all | precision,loop |
---only calibrate check | force force,depth,tip,delay,stepper | forse knife {}
+--only calibrate check | force force,depth,tip,delay,stepper,frame | forse knife {}
 --only capture | force tracker force,tracker | camera {}
 --output | |
 --overruns | 0 1000000 | -1 1.5 many {}
 --pick | |
 --pixels | |
+--point | 1,-2,3.5 | 1,2 1,2,3,4 a,b,c {}
 --policy | fifo deadline fifo:1 fifo:84 | rr fifo:0 fifo:85 fifo:x {}
 --poses | arrival acquisition | dawn {}
 --premises | any.fis |
@@ -104,6 +106,7 @@ VALUES = """
 --repeat calibrate stepper | 2 100 | 1 101 {}
 --revoked | file |
 --ridge | 0 1e12 | -1 nan small {}
+--report | a.json | a.odd {}
 --rig | sim: any.conf |
 --ros2 | neck /lab/neck_2 neck,domain=0 neck,domain=232,interface=lo | {} 2neck a//b a/ a-b neck,domain=233 neck,interface=nosuch0 neck,nosuch=1 neck,domain
 --scale | 0.5g 1kg | -1 1mm {}

@@ -34,6 +34,8 @@ table() {
 		calibrate stepper --from p.csv --range 0mm..1mm|--from does not go with --rig, -o FILE.csv, --range
 		calibrate stepper --step-mm 1|--step-mm goes with --from
 		calibrate stepper now|unexpected argument 'now'
+		calibrate frame --point 0,0,0|1 point of the scene: expected 3 to 6
+		calibrate frame --from p.csv --point 0,0,0|--from does not go with --point
 		calibrate tip --rig $rig|--duration or --from
 		capture -o a.csv|expected a name that ends in .rec
 		capture -o .rec|.rec

@@ -30,6 +30,14 @@ void calibrate_value(struct calibrate *c, const char *key, const char *unit, dou
 	calibrate_words(value->unit, "%s", unit);
 }
 
+void calibrate_covariance(struct incise_calibration_record *record, const double *all,
+			  int n)
+{
+	for (int i = 0; i < n; i++)
+		for (int k = 0; k <= i; k++)
+			record->covariance[record->n_covariance++] = all[n * i + k];
+}
+
 void calibrate_stated(struct calibrate *c, double given, const char *key,
 		      const char *unit, const char *question)
 {
@@ -255,7 +263,7 @@ static void write_report(const struct calibrate_kind *kind, const struct calibra
 			 "install gnuplot-nox");
 	} else {
 		plot_folder(c->report);
-		if (!c->refused)
+		if (!c->refused && kind->draw)
 			kind->draw(c, c->report);
 	}
 	out = begin_report(c->report, 0, &file);

@@ -63,7 +63,7 @@ struct calibrate_kind {
 	void (*text)(const void *run, FILE *out);    /* of report.txt */
 	void (*summary)(const void *run, FILE *out); /* on standard output; or NULL */
 	json_t *(*json)(const void *run);
-	/* Data and plots of the report's folder. */
+	/* Data and plots of the report's folder; or NULL. */
 	void (*draw)(const void *run, const char *folder);
 };
 
@@ -73,6 +73,7 @@ int calibrate_depth(int argc, char **argv);
 int calibrate_tip(int argc, char **argv);
 int calibrate_delay(int argc, char **argv);
 int calibrate_stepper(int argc, char **argv);
+int calibrate_frame(int argc, char **argv);
 int calibrate_check(int argc, char **argv);
 
 /*
@@ -94,6 +95,10 @@ int calibrate_run(const struct calibrate_kind *kind, int argc, char **argv, void
 /* Add a coefficient to the record, by its key; its previous value is the active one. */
 void calibrate_value(struct calibrate *calibrate, const char *key, const char *unit,
 		     double left, double u);
+
+/* State the covariance of its n values, from all of it, row by row. */
+void calibrate_covariance(struct incise_calibration_record *record, const double *all,
+			  int n);
 
 /*
  * Add a standard uncertainty that is not measured here, but known to who calibrates: @given, or, if

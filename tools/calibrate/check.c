@@ -13,6 +13,9 @@
 #include "../cli/uncertainty.h"
 #include "calibrate.h"
 
+/* Only a rig with a haptic device has it: listed where it was calibrated, or named by --only. */
+#define FRAME "frame"
+
 /* Kinds of calibration, the nominal values, and their keys. */
 static const struct {
 	const char *name, *nominal, *keys[7];
@@ -28,6 +31,10 @@ static const struct {
 	 "not known",
 	 {"stepper_N_step", "stepper_backlash_mm", "stepper_hysteresis_N",
 	  "stepper_stiction_N", "stepper_steps_s"}},
+	{FRAME,
+	 "as rig.conf says",
+	 {"frame_turn_x_deg", "frame_turn_y_deg", "frame_turn_z_deg", "frame_x_mm",
+	  "frame_y_mm", "frame_z_mm"}},
 };
 
 enum { KINDS = sizeof(kinds) / sizeof(*kinds) };
@@ -50,7 +57,7 @@ struct check {
 	struct calibrate common;
 	const char *recording;
 	double due_s;
-	bool only[KINDS];
+	bool only[KINDS], named; /* by --only */
 	struct status status[KINDS];
 	struct comparison comparison;
 };
@@ -64,6 +71,7 @@ static void parse_only(void *run, char *list)
 
 	for (int k = 0; k < KINDS; k++)
 		names[k] = kinds[k].name;
+	check->named = true;
 	memset(check->only, 0, sizeof(check->only));
 	for (int i = 0; i < n; i++)
 		check->only[cli_choice("only", items[i], names)] = true;
@@ -80,8 +88,8 @@ static const struct cli_option option_table[] = {
 	{0, "due", "AGE", "age at which a calibration expires (default: 365d)",
 	 CLI_QUANTITY(struct check, due_s, ages, 0, 1e10)},
 	{0, "only", "LIST",
-	 "calibrations that this rig needs, of force,depth,tip,delay,stepper "
-	 "(default: all)",
+	 "calibrations that this rig needs, of force,depth,tip,delay,stepper,frame "
+	 "(default: all that are known)",
 	 CLI_PARSED_BY(parse_only)},
 	{0, "recording", "NAME.rec",
 	 "check whether its tracker and camera agree about the depth",
@@ -353,6 +361,8 @@ int calibrate_check(int argc, char **argv)
 		compare_depths(check.recording, &check.comparison);
 	for (int k = 0; k < KINDS; k++) {
 		judge_kind(&check, k);
+		check.only[k] &= check.named || check.status[k].last ||
+				 strcmp(kinds[k].name, FRAME) != 0;
 		due += check.only[k] && check.status[k].due;
 	}
 	if (check.common.json)

@@ -65,7 +65,13 @@ static void find_columns(struct table *table, const struct table_form *form,
 			table->at[c] = i;
 		}
 	}
-	if (!form->is_complete(table))
+	for (int c = 0; c < form->n_needed; c++)
+		if (table->at[c] < 0)
+			cli_fail("%s:%d: there is no column '%s'; expected a line of "
+				 "column names: %s; %s optional",
+				 table->path, table->line, form->columns[c].name,
+				 form->needed, form->optional);
+	if (form->is_complete && !form->is_complete(table))
 		cli_fail("%s:%d: expected a line of column names: %s; %s optional",
 			 table->path, table->line, form->needed, form->optional);
 }

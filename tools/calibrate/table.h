@@ -28,8 +28,9 @@ struct table_form {
 	const char *needed;   /* "reading_mV, and mass_g or force_N" */
 	const char *optional; /* "t_s is" */
 	struct table_column columns[TABLE_COLUMNS];
-	/* Whether the columns that are needed are there. */
+	/* Whether the columns that are needed are there; or NULL, and their number, the first ones. */
 	bool (*is_complete)(const struct table *table);
+	int n_needed;
 };
 
 /* Give each row to @add, NAN where the file has no such column. */

@@ -132,37 +132,26 @@ static void read_recording(struct tip *tip, const char *path)
 	incise_recording_close(recording);
 }
 
-static bool has_pose(const struct table *table);
-
 static const struct table_form form = {
-	"poses",  "x_mm, y_mm, z_mm, qw, qx, qy, qz",
-	"t_s is", {{"t_s"}, {"x_mm"}, {"y_mm"}, {"z_mm"}, {"qw"}, {"qx"}, {"qy"}, {"qz"}},
-	has_pose,
+	"poses",
+	"x_mm, y_mm, z_mm, qw, qx, qy, qz",
+	"t_s is",
+	{{"x_mm"}, {"y_mm"}, {"z_mm"}, {"qw"}, {"qx"}, {"qy"}, {"qz"}, {"t_s"}},
+	.n_needed = 7,
 };
-
-static bool has_pose(const struct table *table)
-{
-	for (int c = 1; c < TABLE_COLUMNS; c++)
-		if (table->at[c] < 0)
-			cli_fail("%s:%d: there is no column '%s'; expected a line of "
-				 "column names: %s; %s optional",
-				 table->path, table->line, form.columns[c].name,
-				 form.needed, form.optional);
-	return true;
-}
 
 static void add_tip_row(void *run, const struct table *table, const double *row)
 {
 	struct tip *tip = run;
-	double t_s = isnan(row[0]) ? tip->n : row[0];
+	double t_s = isnan(row[7]) ? tip->n : row[7];
 	struct incise_tip_pose *pose = next_pose(tip);
 
 	if (fabs(t_s) > 1e9)
 		cli_fail("%s:%d: t_s: expected a number up to 1e9; correct it",
 			 table->path, table->line);
 	pose->t_ns = llround(t_s * 1e9);
-	memcpy(pose->position_mm, row + 1, sizeof(pose->position_mm));
-	memcpy(pose->quaternion, row + 4, sizeof(pose->quaternion));
+	memcpy(pose->position_mm, row, sizeof(pose->position_mm));
+	memcpy(pose->quaternion, row + 3, sizeof(pose->quaternion));
 }
 
 static void read_poses(void *run, const char *path)
@@ -292,10 +281,7 @@ static int fit_tip(void *run, struct incise_error *err)
 	for (int i = 0; i < 3; i++)
 		calibrate_value(&tip->common, keys[i], "mm", fit->tip_mm[i],
 				sqrt(fit->covariance[4 * i]));
-	for (int i = 0; i < 3; i++)
-		for (int j = 0; j <= i; j++)
-			record->covariance[record->n_covariance++] =
-				fit->covariance[3 * i + j];
+	calibrate_covariance(record, fit->covariance, 3);
 	calibrate_words(record->method,
 			"pivot, least squares of %d of %d poses, cone %.0f degrees",
 			fit->inliers, fit->n, fit->cone_deg);

@@ -42,6 +42,11 @@ struct incise_calibration {
 	double stepper_hysteresis_N; /**< between the directions at one position */
 	double stepper_stiction_N;   /**< force at which it starts to move */
 	double stepper_steps_s;	     /**< largest rate without lost steps */
+	/**
+	 * Place of a haptic device in the scene: its turn as an axis, in the scene, times the
+	 * angle, and its origin; NAN: as rig.conf says. See incise_calibration_frame().
+	 */
+	double frame_turn_deg[3], frame_mm[3];
 };
 
 /** Set the values of Song et al. (2006). */
@@ -71,9 +76,18 @@ INCISE_API int incise_calibration_update(const char *path,
 INCISE_API double incise_calibration_get(const struct incise_calibration *calibration,
 					 const char *key);
 
+/**
+ * Get the place of a haptic device in the scene.
+ *
+ * @param turn set to a unit quaternion, w first, from the device's to the scene's frame
+ * @return false: not calibrated; then both are unchanged
+ */
+INCISE_API bool incise_calibration_frame(const struct incise_calibration *calibration,
+					 double turn[4], double origin_mm[3]);
+
 /** A coefficient measured by a calibration. */
 struct incise_calibration_value {
-	char key[32]; /**< of calibration.conf; tip_x_mm, tip_y_mm, tip_z_mm for tip_mm */
+	char key[32]; /**< of calibration.conf; tip_x_mm, tip_y_mm, tip_z_mm for tip_mm … */
 	char unit[16]; /**< mV/N, mm/px, ms, … */
 	double found;  /**< previous value; NAN: no value */
 	double left;   /**< new value */
@@ -104,7 +118,7 @@ struct incise_calibration_budget {
 
 /** A calibration in the history of calibration.conf. */
 struct incise_calibration_record {
-	char kind[16]; /**< force, depth, tip, delay, stepper: letters a to z */
+	char kind[16]; /**< force, depth, tip, delay, stepper, frame: letters a to z */
 	char date[32]; /**< UTC, as in 2026-11-21T14:48:16Z; empty for append: now */
 	char device[64];
 	char method[120]; /**< in words */

@@ -40,7 +40,7 @@ typedef int incise_scan_found(void *context, const struct incise_scan_device *de
 /**
  * Search for devices. Blocks for at most some seconds.
  *
- * @param kind "stepper", "tracker", "force" or "camera"; NULL: any kind of that backend
+ * @param kind "stepper", "tracker", "force", "camera" or "haptic"; NULL: any kind of that backend
  * @param spec "BACKEND:ARGUMENTS", for example "can:can0"; NULL: search all backends that need
  *             no arguments; a failing backend is reported as an unusable device with the
  *             reason in its line
