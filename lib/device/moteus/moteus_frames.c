@@ -7,15 +7,10 @@
 #include "moteus.h"
 
 #define ANSWER 0x8000
-#define REPLY 0x20
 #define REFUSED_WRITE 0x30
 #define REFUSED_READ 0x31
 #define PADDING 0x50
-/* Bits of a kind: type of the values, and their number unless it is 0. */
-#define TYPE 0x0c
-#define INT8 0x00
-#define FLOAT 0x0c
-#define NUMBER 0x03
+#define ANSWER_BYTES 22
 #define VOLTAGE_LSB 0.5 /* V, of an int8 */
 
 /* --- out ----------------------------------------------------------------------------- */
@@ -80,80 +75,56 @@ void moteus_pack_torque(struct canfd_frame *frame, int id, double torque_N_m,
 
 /* --- in ------------------------------------------------------------------------------ */
 
-static double read_value(const uint8_t *at, int type)
+static double get_float(const uint8_t *at)
 {
 	uint32_t bits;
 	float single;
 
-	if (type == INT8)
-		return (int8_t)*at;
 	memcpy(&bits, at, sizeof(bits));
 	bits = le32toh(bits);
 	memcpy(&single, &bits, sizeof(single));
 	return (double)single;
 }
 
-/* Registers of a query, each with the type that it asks for. */
-static const struct {
-	uint8_t number, type;
-} rows[] = {{0x00, INT8}, {0x01, FLOAT}, {0x02, FLOAT}, {0x03, FLOAT},
-	    {0x0d, INT8}, {0x0e, INT8},	 {0x0f, INT8}};
-#define ROWS (sizeof(rows) / sizeof(*rows))
-
-static void set_value(double *values, unsigned int *seen, int number, int type,
-		      double value)
+/* A drive answers a query's subframes in their order, and ends at one that it refuses. */
+static bool check_heads(const struct canfd_frame *frame, int *refused)
 {
-	for (unsigned int i = 0; i < ROWS; i++)
-		if (rows[i].number == number && rows[i].type == type) {
-			values[i] = value;
-			*seen |= 1U << i;
+	static const uint8_t heads[][3] = {
+		{0, 0x21, 0x00}, {3, 0x2f, 0x01}, {17, 0x23, 0x0d}};
+
+	for (int i = 0; i < 3; i++) {
+		const uint8_t *head = frame->data + heads[i][0];
+
+		if (heads[i][0] + 2 > frame->len)
+			return false;
+		if (*head == REFUSED_WRITE || *head == REFUSED_READ) {
+			*refused = head[1];
+			return true;
 		}
-}
-
-/* Returns the end of a subframe at @at; NULL: not whole, or not of a query's answer. */
-static const uint8_t *take_values(const uint8_t *at, const uint8_t *end, double *values,
-				  unsigned int *seen)
-{
-	int kind = *at++, type = kind & TYPE, n = kind & NUMBER, first;
-	int size = type == INT8 ? 1 : 4;
-
-	if ((kind & ~(TYPE | NUMBER)) != REPLY || (type != INT8 && type != FLOAT) ||
-	    end - at < 2)
-		return NULL;
-	if (!n)
-		n = *at++;
-	first = *at++;
-	if (n * size > end - at)
-		return NULL;
-	for (int i = 0; i < n; i++, at += size)
-		set_value(values, seen, first + i, type, read_value(at, type));
-	return at;
+		if (head[0] != heads[i][1] || head[1] != heads[i][2])
+			return false;
+	}
+	return frame->len >= ANSWER_BYTES;
 }
 
 int moteus_parse(const struct canfd_frame *frame, struct moteus_reply *reply)
 {
-	const uint8_t *at = frame->data, *end = at + frame->len;
+	const int8_t *bytes = (const int8_t *)frame->data;
 	canid_t id = frame->can_id & ~CAN_EFF_FLAG;
-	double v[ROWS] = {0};
-	unsigned int seen = 0;
-	int refused = -1;
 
-	while (at && at < end) {
-		if (*at == PADDING) {
-			at++;
-		} else if ((*at == REFUSED_WRITE || *at == REFUSED_READ) &&
-			   end - at > 1) {
-			refused = at[1];
-			at = end;
-		} else {
-			at = take_values(at, end, v, &seen);
-		}
-	}
-	*reply = (struct moteus_reply){(int)v[0],	   v[1], v[2],	    v[3],
-				       v[4] * VOLTAGE_LSB, v[5], (int)v[6], refused};
-	if (!at || (seen != (1U << ROWS) - 1 && refused < 0) || id & 0xff)
+	*reply = (struct moteus_reply){
+		.mode = bytes[2],
+		.position_turns = get_float(frame->data + 5),
+		.velocity_turns_s = get_float(frame->data + 9),
+		.torque_N_m = get_float(frame->data + 13),
+		.voltage_V = bytes[19] * VOLTAGE_LSB,
+		.temperature_C = bytes[20],
+		.fault = bytes[21],
+		.refused = -1,
+	};
+	if (!check_heads(frame, &reply->refused) || id & 0xff || id >> 8 > MOTEUS_ID_MAX)
 		return 0;
-	return id >> 8 <= MOTEUS_ID_MAX ? (int)(id >> 8) : 0;
+	return (int)(id >> 8);
 }
 
 const char *moteus_fault_text(int fault)

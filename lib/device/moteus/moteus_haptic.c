@@ -5,13 +5,7 @@
  *   position  = Σ turns[i] × mm_turn[i] × dual[i]
  *   torque[i] = dual[i] · force × mm_turn[i] / 2π
  *
- * A cycle is a push, and the read that takes the answers to it:
- *
- *   push ── torque, query ─▶ motors               read: answers of all of them are a sample
- *    │◀─────── answers ─────────╯                  │
- *    ╰──────────────── 1 / rate ───────────────────╯
- *
- * The first push, and one after a pause in which the watchdogs may have run out, stop the motors,
+ * A cycle is a push, which asks for answers, and the read that makes a sample of them. The first push, and one after a pause in which the watchdogs may have run out, stop the motors,
  * as only that ends their time-out; torques follow when all are in mode 10 again. A fault, a jump
  * of a position and a motor that does not answer end all torques for good.
  */
@@ -95,7 +89,7 @@ static INCISE_PRINTF(4, 5) void end_torques(struct moteus *m, int code, unsigned
 
 static void end_bus(struct moteus *m, int rc)
 {
-	end_torques(m, rc == -EIO ? -EIO : -ENODEV, 0, "%s: %s", m->bus->name,
+	end_torques(m, rc == -EIO ? rc : -ENODEV, 0, "%s: %s", m->bus->name,
 		    strerror(-rc));
 }
 
@@ -129,17 +123,15 @@ static void pack_no_torque(struct canfd_frame *frame, int id)
 	moteus_pack_torque(frame, id, 0, 0, WATCHDOG_MS * 1e-3);
 }
 
-/* A drive that lost its count of turns, or another one of the same id. */
+/* A drive that lost its count of turns; by its velocities, as far as they are numbers. */
 static bool has_jumped(const struct motor *motor, const struct moteus_reply *reply,
 		       int64_t t_ns)
 {
-	const struct moteus_reply *last = &motor->last;
 	double dt_s = (double)(t_ns - motor->answered_ns) * 1e-9;
-	double speed = fabs(last->velocity_turns_s) + fabs(reply->velocity_turns_s);
+	double most = fabs(motor->last.velocity_turns_s) + fabs(reply->velocity_turns_s);
+	double way = fabs(reply->position_turns - motor->last.position_turns);
 
-	return motor->answered_ns &&
-	       fabs(reply->position_turns - last->position_turns) >
-		       JUMP_TURNS + (isfinite(speed) ? speed * dt_s : 0);
+	return motor->answered_ns && way > fmax(JUMP_TURNS, JUMP_TURNS + most * dt_s);
 }
 
 static void judge_answer(struct moteus *m, const struct motor *motor,
@@ -305,6 +297,15 @@ static void send_force(struct moteus *m, const double force_N[3])
 	}
 }
 
+/* The handle may be anywhere by now: no jump. */
+static void restart_motors(struct moteus *m)
+{
+	m->running = false;
+	for (int i = 0; i < m->n; i++)
+		m->motor[i].answered_ns = 0;
+	send_all(m, moteus_pack_stop);
+}
+
 static int push_moteus(struct incise_haptic *haptic, const double force_N[3],
 		       const double torque_N_mm[3])
 {
@@ -321,10 +322,8 @@ static int push_moteus(struct incise_haptic *haptic, const double force_N[3],
 		send_all(m, moteus_pack_query);
 		return m->failed;
 	}
-	if (m->cycles == 1 || pause_ns > WATCHDOG_NS / 2) {
-		m->running = false;
-		send_all(m, moteus_pack_stop);
-	}
+	if (m->cycles == 1 || pause_ns > WATCHDOG_NS / 2)
+		restart_motors(m);
 	if (m->running && (double)find_silence(m, &id) * 1e-9 <= LATE_CYCLES / m->rate_hz)
 		send_force(m, force_N);
 	else
@@ -368,13 +367,13 @@ static int take_lines(struct moteus *m, const struct incise_haptic_setup *setup,
 	double direction[MOTORS][3], dual[MOTORS][3];
 	bool ok = true;
 
-	if (setup->n_motor_directions != 3 * m->n || setup->n_motors != m->n ||
-	    setup->n_motor_torques != m->n)
+	/* Numbers of the three keys fit each other. */
+	if (setup->n_motors != m->n)
 		return incise_error_set(
 			err, EINVAL,
-			"%s: haptic_setup: expected %d numbers in motor_direction, and "
-			"%d in motor_mm_turn and motor_torque_N_mm",
-			where, 3 * m->n, m->n);
+			"%s: haptic_setup: expected motor_direction, motor_mm_turn and "
+			"motor_torque_N_mm of %d motors, not of %d",
+			where, m->n, setup->n_motors);
 	for (int i = 0; i < m->n; i++)
 		ok &= v3_unit(direction[i], setup->motor_direction + 3 * i, 1e-6);
 	if (ok)

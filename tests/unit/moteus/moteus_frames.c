@@ -84,36 +84,32 @@ TEST(other_answers)
 		"",
 		"5050",
 		/* no fault at the end; cut off in a float; in a head */
-		"21000a2f01000000000000000000000000220d301f",
+		"21000a2f01000000000000000000000000230d301f",
 		"21000a2f0100000000000000000000",
 		"21000a2f",
 		"21",
-		/* a command; int16; a stream */
-		"01000a",
-		"25000a00",
+		/* a command; int16; another register; a stream; half a refusal */
+		"01000a2f01000000000000000000000000230d301f00",
+		"25000a2f01000000000000000000000000230d301f00",
+		"21000a2f01000000000000000000000000230c301f00",
 		"400100",
 		"30",
-		/* 255 values in a short frame */
-		"20ff00",
 	};
 	struct moteus_reply reply;
 
-	for (size_t i = 0; i < sizeof(bad) / sizeof(*bad); i++) {
+	for (size_t i = 0; i < sizeof(bad) / sizeof(*bad); i++)
 		assert_int_equal(parse(bad[i], &reply), 0);
-	}
-	/* numbers in a byte of their own, padding between, another register, NaN */
-	assert_int_equal(parse("2001000a5050"
-			       "2c03010000c07f0000c07f0000c07f"
-			       "20040c01301f0050",
-			       &reply),
+	assert_int_equal(parse("21000a2f010000c07f0000c07f0000c07f230d301f0050", &reply),
 			 ID);
-	assert_int_equal(reply.mode, 10);
-	assert_true(isnan(reply.position_turns));
-	assert_true(reply.voltage_V == 24 && reply.temperature_C == 31);
-	/* refused ones */
+	assert_true(isnan(reply.position_turns) && isnan(reply.velocity_turns_s));
+	/* refused: a write, and each read */
 	assert_int_equal(parse("302701", &reply), ID);
 	assert_int_equal(reply.refused, 0x27);
-	assert_int_equal(parse("21000a310d01", &reply), ID);
+	assert_int_equal(parse("310001", &reply), ID);
+	assert_int_equal(reply.refused, 0);
+	assert_int_equal(parse("21000a310201", &reply), ID);
+	assert_int_equal(reply.refused, 2);
+	assert_int_equal(parse("21000a2f01000000000000000000000000310d01", &reply), ID);
 	assert_int_equal(reply.refused, 0x0d);
 }
 

@@ -152,7 +152,7 @@ TEST(words, start, end)
 		assert_non_null(strstr(err.text, "moteus:can0:1,2,3"));
 	}
 	assert_null(open_device("can0:1,2"));
-	assert_non_null(strstr(err.text, "expected 6 numbers in motor_direction"));
+	assert_non_null(strstr(err.text, "motor_torque_N_mm of 2 motors, not of 3"));
 	setup.motor_direction[7] = 0.1;
 	setup.motor_direction[8] = 0.05;
 	assert_null(open_device("can0:1,2,3"));
@@ -303,6 +303,7 @@ TEST(a_pause, start, end)
 	assert_true(drives.drive[0].torque > 0);
 	drives_advance(&drives, (WATCHDOG_MS + 1) * DRIVES_MS);
 	assert_int_equal(drives.drive[0].mode, MOTEUS_TIMEOUT);
+	drives.drive[0].position += 3; /* by a hand, meanwhile */
 	tick(force_N, &sample);
 	for (; tick(force_N, &sample) == 1 && sample.flags; off++)
 		assert_no_torque();
