@@ -100,29 +100,49 @@ static void draw_handle(struct torque_job *job, double target_mm, double speed_m
 			most_N);
 }
 
-static void add_force(struct torque_job *job, int pass, int back)
+static double find_place(const struct torque_job *job)
 {
-	double away_mm[3], place;
+	double away_mm[3];
 
 	v3_sub(away_mm, job->handle.last.position_mm, job->start_mm);
-	place = (v3_dot(away_mm, job->direction) / job->span_mm - EDGE) / (1 - 2 * EDGE);
-	if (!(place >= 0 && place < 1))
-		return;
-	job->sum_N[pass][back][(int)(place * BINS)] +=
-		v3_dot(job->handle.force_N, job->direction);
-	job->n[pass][back][(int)(place * BINS)]++;
+	return v3_dot(away_mm, job->direction);
 }
 
+static void add_force(struct torque_job *job, int pass, int back)
+{
+	double share = (find_place(job) / job->span_mm - EDGE) / (1 - 2 * EDGE);
+
+	if (!(share >= 0 && share < 1))
+		return;
+	job->sum_N[pass][back][(int)(share * BINS)] +=
+		v3_dot(job->handle.force_N, job->direction);
+	job->n[pass][back][(int)(share * BINS)]++;
+}
+
+static void check_flags(const struct handle *handle)
+{
+	char cause[300] = "";
+
+	if (!handle->last.flags)
+		return;
+	incise_haptic_cause(handle->haptic, cause, sizeof(cause));
+	cli_fail("%s", *cause ? cause : "the device is not ready");
+}
+
+/* Until the handle is there: friction stretches the spring first. */
 static void move_once(struct torque_job *job, int pass, int back)
 {
 	struct incise_clock *clock = job->handle.clock;
 	int64_t start_ns = incise_clock_now(clock);
+	double from_mm = find_place(job), speed_mm_s = back ? -SPEED_MM_S : SPEED_MM_S;
+	double end_mm = job->span_mm * (back ? EDGE / 2 : 1 - EDGE / 2);
 	struct incise_error err = {0};
 
-	for (double way_mm = 0; way_mm < job->span_mm;) {
-		way_mm = SPEED_MM_S * (double)(incise_clock_now(clock) - start_ns) * 1e-9;
-		draw_handle(job, back ? job->span_mm - way_mm : way_mm,
-			    back ? -SPEED_MM_S : SPEED_MM_S);
+	while ((find_place(job) - end_mm) * speed_mm_s < 0) {
+		double t_s = (double)(incise_clock_now(clock) - start_ns) * 1e-9;
+
+		check_flags(&job->handle);
+		draw_handle(job, from_mm + speed_mm_s * t_s, speed_mm_s);
 		add_force(job, pass, back);
 		if (handle_poll(&job->handle, false, &err))
 			cli_fail_with(&err);
@@ -139,8 +159,6 @@ static void measure_torque(struct torque_job *job)
 	handle_begin(&job->handle, rig);
 	if (handle_record(&job->handle, 0.3, &err))
 		cli_fail_with(&err);
-	if (job->handle.last.flags)
-		cli_fail("%s is not ready", job->handle.info.name);
 	v3_copy(job->start_mm, job->handle.last.position_mm);
 	for (int pass = 0; pass < PASSES; pass++) {
 		move_once(job, pass, 0);

@@ -85,7 +85,7 @@ class Drive:
         self.mode_s = 0.0
         self.position = self.velocity = self.hand = 0.0
         self.voltage, self.temperature = 24.0, 31.0
-        self.inertia, self.friction, self.cogging = 2e-4, 0.01, 0.005  # N m / (turn/s²), N m, N m
+        self.inertia, self.friction, self.cogging = 1e-5, 0.002, 0.001  # N m / (turn/s²), N m, N m
         self.forget()
         self.silent = self.gives_nan = False
         self.has_watchdog = True
@@ -127,7 +127,7 @@ class Drive:
         push = self.torque + self.hand
         push += self.cogging * math.sin(2 * math.pi * 12 * self.position)
         if self.mode == TIMEOUT:
-            push -= 0.05 * self.velocity
+            self.velocity *= max(0.0, 1 - 50 * dt)
         after = self.velocity + push / self.inertia * dt
         slow = self.friction / self.inertia * dt
         self.velocity = math.copysign(max(0.0, abs(after) - slow), after)

@@ -8,8 +8,9 @@
 drive_start()
 {
 	drive=
-	rm -f drive.in drive.out
+	rm -f drive.in
 	mkfifo drive.in
+	: >drive.out
 	${drive_ahead:-} "$INCISE_BUILD/tests/can/${drive_program:-drive}" "$@" <drive.in >drive.out 2>drive.err 3>&- &
 	drive_pid=$!
 	exec 7>drive.in

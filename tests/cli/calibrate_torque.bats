@@ -23,6 +23,9 @@ setup() {
 	run --separate-stderr incise calibrate torque \
 		--rig sim:haptic,clock=simulated,motion=still,hand_N_mm=20
 	failed_with "does not follow a force of"
+	run --separate-stderr incise calibrate torque \
+		--rig sim:haptic,clock=simulated,motion=still,hand_N_mm=0,not_ready_s=2
+	failed_with "its not_ready_s has passed"
 	run --separate-stderr incise calibrate torque --rig sim:
 	failed_with "no haptic device"
 	run --separate-stderr incise calibrate torque --direction 0,0,0 --rig sim:haptic

@@ -110,6 +110,29 @@ kill -CONT "$pid"
 sleep 0.3
 drive_tell state 1
 check "and starts again with the program" [ "$(drive_value mode)" = 10 ]
+kill "$pid"
+wait "$pid" 2>/dev/null
+
+# The commands of a user, by way of the owner of the device.
+cat >rig.conf <<END
+haptic = "$drive";
+haptic_setup = {
+	motor_direction = [1, 0, 0]; motor_mm_turn = [10.0]; motor_torque_N_mm = [100.0];
+	rate_hz = 250.0; mass_kg = 0.6; lost_s = 0.5;
+};
+END
+PATH=$INCISE_BUILD/bin:$PATH
+incise calibrate torque --rig rig.conf --json >torque.json 2>torque.err 7>&-
+sed 's/^/# /' torque.err
+out=$(tr -d '\n' <torque.json)
+echo "# $out"
+# 0.002 N m, and 0.001 sin, by 10 mm a turn
+check "its friction is measured" is coulomb_N "> 1.1 && $(of coulomb_N) < 1.4"
+check "and its cogging" is cogging_N "> 0.2 && $(of cogging_N) < 0.7"
+sleep 2
+check "the owner has stopped the motor" free
+
+begin vcan0:1 0.2
 ip link set vcan0 down
 ended
 check "an interface that goes down is named" has "Network is down"
