@@ -32,7 +32,7 @@ struct torque_job {
 	struct handle handle;
 	double start_mm[3];
 	double sum_N[PASSES][2][BINS], n[PASSES][2][BINS]; /* there, and back */
-	double friction_N, u_friction_N, cogging_N, u_cogging_N;
+	double friction_N, u_friction_N, cogging_N;
 };
 
 static void parse_direction(void *member, char *text)
@@ -169,48 +169,37 @@ static void measure_torque(struct torque_job *job)
 
 /* --- the result -------------------------------------------------------------------------- */
 
-static double mean_force(const struct torque_job *job, int pass, int back, int bin)
-{
-	if (!(job->n[pass][back][bin] > 0))
-		cli_fail("no sample in a part of the line; choose a longer --span");
-	return job->sum_N[pass][back][bin] / job->n[pass][back][bin];
-}
-
-/* Mean of @n values; *spread: their variance. */
+/* Mean of @n values; *spread: their standard deviation. */
 static double mean_values(const double *values, int n, double *spread)
 {
-	double mean = 0;
+	double mean = 0, sum2 = 0;
 
-	*spread = 0;
 	for (int i = 0; i < n; i++)
 		mean += values[i] / n;
 	for (int i = 0; i < n; i++)
-		*spread += (values[i] - mean) * (values[i] - mean) / (n - 1);
+		sum2 += (values[i] - mean) * (values[i] - mean);
+	*spread = sqrt(sum2 / (n - 1));
 	return mean;
 }
 
-/* Uncertainties are standard ones, by the spread of the passes. */
+/* The uncertainty is by the spread of the passes. Weight, the mean of both ways, is no cogging. */
 static void fit_torque(struct torque_job *job)
 {
-	double friction_N[PASSES] = {0}, cogging_N[BINS], both_N[PASSES], spread;
+	double friction_N[PASSES] = {0}, cogging_N[BINS] = {0};
 
-	for (int bin = 0; bin < BINS; bin++) {
-		for (int pass = 0; pass < PASSES; pass++) {
-			double there_N = mean_force(job, pass, 0, bin);
-			double back_N = mean_force(job, pass, 1, bin);
+	for (int i = 0; i < PASSES * BINS; i++) {
+		int pass = i / BINS, bin = i % BINS;
+		double there_N = job->sum_N[pass][0][bin] / job->n[pass][0][bin];
+		double back_N = job->sum_N[pass][1][bin] / job->n[pass][1][bin];
 
-			friction_N[pass] += (there_N - back_N) / 2 / BINS;
-			both_N[pass] = (there_N + back_N) / 2;
-		}
-		cogging_N[bin] = mean_values(both_N, PASSES, &spread);
-		job->u_cogging_N += spread / PASSES / BINS;
+		friction_N[pass] += (there_N - back_N) / 2 / BINS;
+		cogging_N[bin] += (there_N + back_N) / 2 / PASSES;
 	}
-	job->friction_N = mean_values(friction_N, PASSES, &spread);
-	job->u_friction_N = sqrt(spread / PASSES);
-	job->u_cogging_N = sqrt(job->u_cogging_N);
-	/* Weight is no cogging. */
-	mean_values(cogging_N, BINS, &spread);
-	job->cogging_N = sqrt(spread);
+	job->friction_N = mean_values(friction_N, PASSES, &job->u_friction_N);
+	job->u_friction_N /= sqrt(PASSES);
+	mean_values(cogging_N, BINS, &job->cogging_N);
+	if (!isfinite(job->friction_N))
+		cli_fail("no sample in a part of the line; choose a longer --span");
 }
 
 static void print_result(const struct torque_job *job)
@@ -219,17 +208,16 @@ static void print_result(const struct torque_job *job)
 
 	if (!job->json) {
 		printf("friction       %.4f N, u %.4f N\n"
-		       "cogging (rms)  %.4f N, u %.4f N\n"
+		       "cogging (rms)  %.4f N\n"
 		       "in rig.conf: haptic_setup = { coulomb_N = %.4f; };\n",
 		       job->friction_N, job->u_friction_N, job->cogging_N,
-		       job->u_cogging_N, job->friction_N);
+		       job->friction_N);
 		return;
 	}
 	report = json_object();
 	json_set_number(report, "coulomb_N", job->friction_N);
 	json_set_number(report, "u_coulomb_N", job->u_friction_N);
 	json_set_number(report, "cogging_N", job->cogging_N);
-	json_set_number(report, "u_cogging_N", job->u_cogging_N);
 	json_print(report);
 }
 

@@ -130,6 +130,7 @@ int moteus_parse(const struct canfd_frame *frame, struct moteus_reply *reply)
 const char *moteus_fault_text(int fault)
 {
 	static const char *const texts[] = {
+		[0] = "no fault",
 		[32] = "the calibration saw no magnet",
 		[33] = "motor driver fault, as by too little voltage",
 		[34] = "over voltage",

@@ -197,28 +197,21 @@ static void drain_bus(struct moteus *m)
 		end_bus(m, rc);
 }
 
-/* How long the slowest motor owes an answer. */
-static int64_t find_silence(const struct moteus *m, int *id)
-{
-	int64_t now = now_ns(m), longest_ns = 0;
-
-	for (int i = 0; i < m->n; i++) {
-		int64_t asked_ns = m->motor[i].asked_ns;
-
-		if (!asked_ns || now - asked_ns <= longest_ns)
-			continue;
-		longest_ns = now - asked_ns;
-		*id = m->motor[i].id;
-	}
-	return longest_ns;
-}
-
-static bool is_any(const struct moteus *m, enum moteus_mode mode, bool wanted)
+/* A motor that owes an answer for longer. */
+static const struct motor *find_silent(const struct moteus *m, int64_t ns)
 {
 	for (int i = 0; i < m->n; i++)
-		if ((m->motor[i].last.mode == (int)mode) == wanted)
-			return true;
-	return false;
+		if (m->motor[i].asked_ns && now_ns(m) - m->motor[i].asked_ns > ns)
+			return &m->motor[i];
+	return NULL;
+}
+
+static bool are_all(const struct moteus *m, enum moteus_mode mode)
+{
+	for (int i = 0; i < m->n; i++)
+		if (m->motor[i].last.mode != (int)mode)
+			return false;
+	return true;
 }
 
 /* --- samples ------------------------------------------------------------------------- */
@@ -254,13 +247,14 @@ static int read_moteus(struct incise_haptic *haptic, struct incise_haptic_sample
 		       int n)
 {
 	struct moteus *m = (struct moteus *)haptic;
-	int id;
+	const struct motor *silent;
 
 	drain_bus(m);
-	if (find_silence(m, &id) > SILENT_NS)
+	silent = find_silent(m, SILENT_NS);
+	if (silent)
 		end_torques(m, -EIO, 0,
 			    "motor %d does not answer; check its supply and the cable",
-			    id);
+			    silent->id);
 	if (m->failed)
 		return m->failed;
 	for (int i = 0; i < m->n; i++)
@@ -268,7 +262,7 @@ static int read_moteus(struct incise_haptic *haptic, struct incise_haptic_sample
 			return 0;
 	if (n < 1 || m->sampled == m->cycles)
 		return 0;
-	m->running |= !m->flags && !is_any(m, MOTEUS_POSITION, false);
+	m->running |= !m->flags && are_all(m, MOTEUS_POSITION);
 	make_sample(m, samples);
 	m->lost += m->cycles - m->sampled - 1;
 	m->sampled = m->cycles;
@@ -311,7 +305,6 @@ static int push_moteus(struct incise_haptic *haptic, const double force_N[3],
 {
 	struct moteus *m = (struct moteus *)haptic;
 	int64_t now = now_ns(m), pause_ns = now - m->pushed_ns;
-	int id;
 
 	(void)torque_N_mm;
 	if (m->failed)
@@ -324,7 +317,7 @@ static int push_moteus(struct incise_haptic *haptic, const double force_N[3],
 	}
 	if (m->cycles == 1 || pause_ns > WATCHDOG_NS / 2)
 		restart_motors(m);
-	if (m->running && (double)find_silence(m, &id) * 1e-9 <= LATE_CYCLES / m->rate_hz)
+	if (m->running && !find_silent(m, (int64_t)(LATE_CYCLES * 1e9 / m->rate_hz)))
 		send_force(m, force_N);
 	else
 		send_all(m, pack_no_torque);
@@ -427,21 +420,16 @@ static int test_watchdogs(struct moteus *m, const char *where, struct incise_err
 
 	if (!rc)
 		rc = ask_all(m, pack_no_torque, where, err);
-	for (int i = 0; i < TEST_ROUNDS && !rc && is_any(m, MOTEUS_TIMEOUT, false); i++)
+	for (int i = 0; i < TEST_ROUNDS && !rc && !are_all(m, MOTEUS_TIMEOUT); i++)
 		rc = ask_all(m, moteus_pack_query, where, err);
-	for (int i = 0; i < m->n && !rc; i++) {
-		const struct moteus_reply *last = &m->motor[i].last;
-
-		if (last->mode != MOTEUS_TIMEOUT)
+	for (int i = 0; i < m->n && !rc; i++)
+		if (m->motor[i].last.mode != MOTEUS_TIMEOUT)
 			rc = incise_error_set(
 				err, EPROTO,
-				"%s: motor %d does not start and then stop %d ms after "
-				"the last command (mode %d, fault %d: %s)",
-				where, m->motor[i].id, WATCHDOG_MS, last->mode,
-				last->fault,
-				last->fault ? moteus_fault_text(last->fault)
-					    : "its watchdog; update its firmware");
-	}
+				"%s: motor %d does not start, and stop by its watchdog %d "
+				"ms later: mode %d, %s",
+				where, m->motor[i].id, WATCHDOG_MS, m->motor[i].last.mode,
+				moteus_fault_text(m->motor[i].last.fault));
 	return rc ? rc : ask_all(m, moteus_pack_stop, where, err);
 }
 
@@ -499,38 +487,33 @@ static const struct incise_haptic_ops moteus_ops = {
 	.cause = tell_cause,
 };
 
-static int start_moteus(struct moteus *m, const struct can_transport *transport,
-			const struct incise_backend_request *request,
-			struct incise_error *err)
-{
-	char interface[INTERFACE];
-	const struct can_bus_request bus = {
-		.where = request->where, .device = interface, .node = LOCK, .fd = true};
-	int rc = take_words(m, request->arguments, interface, request->where, err);
-
-	m->rate_hz = request->haptic->rate_hz > 0 ? request->haptic->rate_hz : RATE_HZ;
-	if (!rc)
-		rc = take_lines(m, request->haptic, request->where, err);
-	if (!rc)
-		rc = transport->open(&m->bus, &bus, err);
-	return rc ? rc : test_watchdogs(m, request->where, err);
-}
-
 void *moteus_open_on(const struct can_transport *transport,
 		     const struct incise_backend_request *request,
 		     struct incise_error *err)
 {
+	const char *where = request->where;
+	char interface[INTERFACE];
+	const struct can_bus_request bus = {
+		.where = where, .device = interface, .node = LOCK, .fd = true};
 	struct moteus *m = calloc(1, sizeof(*m));
-	int rc = m ? start_moteus(m, transport, request, err)
-		   : incise_error_set(err, ENOMEM, "%s: %s", request->where,
-				      strerror(ENOMEM));
+	int rc;
 
-	if (!rc) {
-		m->haptic.ops = &moteus_ops;
-		return m;
+	if (!m) {
+		errno = -incise_error_set(err, ENOMEM, "%s: %s", where, strerror(ENOMEM));
+		return NULL;
 	}
-	if (m)
-		close_moteus(&m->haptic);
+	m->haptic.ops = &moteus_ops;
+	m->rate_hz = request->haptic->rate_hz > 0 ? request->haptic->rate_hz : RATE_HZ;
+	rc = take_words(m, request->arguments, interface, where, err);
+	if (!rc)
+		rc = take_lines(m, request->haptic, where, err);
+	if (!rc)
+		rc = transport->open(&m->bus, &bus, err);
+	if (!rc)
+		rc = test_watchdogs(m, where, err);
+	if (!rc)
+		return m;
+	close_moteus(&m->haptic);
 	errno = -rc;
 	return NULL;
 }

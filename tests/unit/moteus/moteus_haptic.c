@@ -264,10 +264,10 @@ TEST(refused_at_the_start, start, end)
 		{ETIMEDOUT, "no answer of motor 2"},
 		{EPROTO, "two motors on can0 have the id 2"},
 		{EPROTO, "motor 2 refuses register 0x027"},
-		{EPROTO, "motor 2 does not start and then stop 50 ms after the last "
-			 "command (mode 10, fault 0: its watchdog"},
+		{EPROTO, "motor 2 does not start, and stop by its watchdog 50 ms later: "
+			 "mode 10, no fault"},
 		{EPROTO, "motor 2 gives no position"},
-		{EPROTO, "motor 2 does not start"},
+		{EPROTO, "later: mode 0, no fault"},
 		{ENODEV, "can0: Network is down"},
 	};
 

@@ -80,7 +80,7 @@ device vcan0:1,3 10 0
 check "one that is missing is named" has "no answer of motor 3"
 drive_tell watchdog 2 0
 device vcan0:1,2 10 0
-check "one without a watchdog is refused" has "motor 2 does not start and then stop"
+check "one without a watchdog is refused" has "motor 2 does not start, and stop by its watchdog"
 drive_tell watchdog 2 1
 
 begin vcan0:1,2 0.2
