@@ -52,7 +52,8 @@ struct moteus {
 	struct motor motor[MOTORS];
 	int n;
 	double rate_hz;
-	int64_t pushed_ns;	  /* time of the last push */
+	int64_t answer_ns; /* from a measurement to its arrival, as it was at the start */
+	int64_t pushed_ns; /* time of the last push */
 	uint64_t cycles, sampled; /* of pushes */
 	uint64_t lost;
 	bool running;	/* all motors were in mode 10 since the last stop */
@@ -176,12 +177,14 @@ static void take_frame(struct moteus *m, const struct canfd_frame *frame, int64_
 		if (motor->id != id)
 			continue;
 		judge_answer(m, motor, &reply, t_ns);
+		/* Drives measure between the question and the answer. */
+		if (!m->cycles)
+			m->answer_ns = (t_ns - motor->asked_ns) / 2;
 		motor->asked_ns = 0;
 		motor->answers++;
-		if (!(fabs(reply.position_turns) < TURNS_MOST))
-			continue;
-		motor->last = reply;
 		motor->answered_ns = t_ns;
+		if (fabs(reply.position_turns) < TURNS_MOST)
+			motor->last = reply;
 	}
 }
 
@@ -216,11 +219,10 @@ static bool are_all(const struct moteus *m, enum moteus_mode mode)
 
 /* --- samples ------------------------------------------------------------------------- */
 
-static void make_sample(struct moteus *m, struct incise_haptic_sample *sample)
+static void make_sample(const struct moteus *m, struct incise_haptic_sample *sample)
 {
-	int64_t arrived_ns = m->pushed_ns;
-
 	*sample = (struct incise_haptic_sample){
+		.t_ns = INT64_MAX,
 		.seq = m->cycles - 1,
 		.quaternion = {1},
 		.flags = m->flags | (m->running ? 0U : INCISE_HAPTIC_NOT_READY),
@@ -233,14 +235,12 @@ static void make_sample(struct moteus *m, struct incise_haptic_sample *sample)
 		       last->position_turns * motor->mm_turn, motor->dual);
 		v3_add(sample->velocity_mm_s, sample->velocity_mm_s,
 		       last->velocity_turns_s * motor->mm_turn, motor->dual);
-		if (motor->answered_ns > arrived_ns)
-			arrived_ns = motor->answered_ns;
+		if (motor->answered_ns - m->answer_ns < sample->t_ns)
+			sample->t_ns = motor->answered_ns - m->answer_ns;
 		/* The drive limits the torque because of its temperature. */
 		if (last->fault == 100 || last->fault == 101)
 			sample->flags |= INCISE_HAPTIC_PROTECTED;
 	}
-	/* Drives measure between the question and the answer. */
-	sample->t_ns = m->pushed_ns + (arrived_ns - m->pushed_ns) / 2;
 }
 
 static int read_moteus(struct incise_haptic *haptic, struct incise_haptic_sample *samples,

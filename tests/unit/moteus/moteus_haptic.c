@@ -443,6 +443,9 @@ TEST(answers_that_are_lost_or_late, start, end)
 	for (int i = 0; i < 50; i++)
 		assert_true(tick((double[3]){1}, &sample) >= 0);
 	assert_int_equal(sample.flags, 0);
+	/* of the push before, whose answer came a quarter of a tick ago by the last read */
+	assert_int_equal(drives.now_ns - sample.t_ns,
+			 DRIVES_MS + DRIVES_MS / 2 + DRIVES_MS / 8);
 	drives.drive[0].latency_ns = 20 * DRIVES_MS;
 	for (int i = 0; i < 20 && tick((double[3]){1}, &sample) >= 0; i++)
 		;
