@@ -126,9 +126,9 @@ incise calibrate torque --rig rig.conf --json >torque.json 2>torque.err 7>&-
 sed 's/^/# /' torque.err
 out=$(tr -d '\n' <torque.json)
 echo "# $out"
-# 0.002 N m, and 0.001 sin, by 10 mm a turn
-check "its friction is measured" is coulomb_N "> 1.1 && $(of coulomb_N) < 1.4"
-check "and its cogging" is cogging_N "> 0.2 && $(of cogging_N) < 0.7"
+# 0.002 N m by 10 mm a turn are 1.26 N; cogging of 4.7 N/mm, steeper than the spring, counts for less.
+check "its friction is measured" is coulomb_N "> 1 && $(of coulomb_N) < 1.4"
+check "and its cogging" is cogging_N "> 0.05 && $(of cogging_N) < 0.7"
 sleep 2
 check "the owner has stopped the motor" free
 
