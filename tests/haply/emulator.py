@@ -101,7 +101,9 @@ class Service:
         self.configured = 0
         self.writers, self.listeners = [], []
         config = {"type": "inverse3", "port": "/dev/ttyACM0",
-                  "device_info": {"major_version": 7, "minor_version": 4, "id": "049D", "device_type": 4},
+                  "device_info": {"major_version": 7, "minor_version": 4, "id": "049D", "device_type": 4,
+                                  "uuid": "0-0"},
+                  "extended_device_id": "0-0", "extended_firmware_version": "0",
                   "gravity_compensation": {"enabled": True, "scaling_factor": 1.0},
                   "handedness": "right", "streaming_mode": "USB", "torque_scaling": {"enabled": True}}
         if self.form == "3.5":
@@ -113,18 +115,19 @@ class Service:
             "state": {"cursor_position": {"x": 0.0, "y": -0.12, "z": 0.15}, "cursor_velocity": dict(zero),
                       "angular_position": {"a0": 0.0, "a1": 0.0, "a2": 0.0},
                       "body_orientation": {"w": 1.0, "x": 0.0, "y": 0.0, "z": 0.0},
-                      "current_cursor_force": dict(zero), "control_mode": "idle"},
+                      "current_cursor_force": dict(zero), "mode": "idle", "control_mode": "idle"},
             "status": {"calibrated": True, "in_use": False, "power_supply": True, "ready": True,
                        "started": True}}}
         turned = {"x": 0.1, "y": 0.2, "z": -0.3, "w": math.sqrt(1 - 0.14)}
         if options.grip == "wired":
             self.parts["verse_grip"] = {
-                "config": {"type": "verse_grip"},
+                "config": {"type": "verse_grip", "port": "/dev/ttyACM1"},
                 "state": {"orientation": turned, "button": False, "hall": 0},
                 "status": {"ready": True, "error": 0}}
         elif options.grip == "wireless":
             self.parts["wireless_verse_grip"] = {
-                "config": {"type": "wireless_verse_grip"},
+                "config": {"type": "wireless_verse_grip", "port": "/dev/ttyACM1", "major_version": 1,
+                           "minor_version": 0, "hardware_version": 1},
                 "state": {"orientation": turned, "buttons": {"a": False, "b": False, "c": False},
                           "hall": 0, "battery_level": 0.8},
                 "status": {"ready": True, "connected": True, "awake": True}}

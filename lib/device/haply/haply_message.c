@@ -11,36 +11,34 @@
 #include "haply_message.h"
 
 #define DEVICES_MAX 8 /* of a kind that are looked at; their ids fit */
-#define POSITION_MOST_M 10
-#define VELOCITY_MOST_M_S 1000
+#define MM 1e3
+#define POSITION_MOST_MM 1e4
+#define VELOCITY_MOST_MM_S 1e6
 #define UNIT_TOLERANCE 0.02 /* of the square of a quaternion's length */
 
-/* Members whose names are a letter each. False unless all are numbers of at most @most: then all are NaN. */
-static bool read_numbers(const json_t *object, const char *letters, double most,
-			 double unit, double *numbers)
+/* Three numbers of at most @most; false: *xyz is NaN. */
+static bool read_xyz(json_t *object, const char *key, double unit, double most,
+		     double xyz[3])
 {
-	bool all = true;
+	bool ok = !json_unpack(object, "{s:{s:F, s:F, s:F}}", key, "x", &xyz[0], "y",
+			       &xyz[1], "z", &xyz[2]);
 
-	for (int i = 0; letters[i]; i++) {
-		const json_t *member =
-			json_object_get(object, (const char[]){letters[i], 0});
-
-		numbers[i] = json_is_number(member) ? json_number_value(member) : NAN;
-		all = all && fabs(numbers[i]) <= most;
-		numbers[i] *= unit;
+	for (int i = 0; i < 3; i++) {
+		xyz[i] *= unit;
+		ok = ok && fabs(xyz[i]) <= most;
 	}
-	for (int i = 0; letters[i] && !all; i++)
-		numbers[i] = NAN;
-	return all;
+	for (int i = 0; i < 3 && !ok; i++)
+		xyz[i] = NAN;
+	return ok;
 }
 
 static bool is_id(const char *id)
 {
+	static const char letters[] = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+				      "abcdefghijklmnopqrstuvwxyz-_.:";
 	size_t n = id ? strlen(id) : 0;
 
-	return n && n < HAPLY_ID_SIZE &&
-	       strspn(id, "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ"
-			  "abcdefghijklmnopqrstuvwxyz-_.:") == n;
+	return n && n < HAPLY_ID_SIZE && strspn(id, letters) == n;
 }
 
 /* Device @i of a kind, in either form, and its id; NULL: no more. */
@@ -50,7 +48,7 @@ static json_t *get_device(json_t *kind, size_t i, const char **id)
 	void *at = json_object_iter(kind);
 
 	*id = json_string_value(json_object_get(device, "device_id"));
-	if (!json_is_object(kind))
+	if (!at)
 		return device;
 	while (at && i--)
 		at = json_object_iter_next(kind, at);
@@ -61,15 +59,16 @@ static json_t *get_device(json_t *kind, size_t i, const char **id)
 /* The device @wanted, "": the first, with its id; or NULL. */
 static json_t *find_device(json_t *kind, const char *wanted, char id[HAPLY_ID_SIZE])
 {
+	json_t *device = NULL;
 	const char *name;
-	json_t *device;
 
-	for (size_t i = 0; i < DEVICES_MAX && (device = get_device(kind, i, &name)); i++)
-		if (is_id(name) && (!*wanted || !strcmp(wanted, name))) {
-			snprintf(id, HAPLY_ID_SIZE, "%s", name);
-			return device;
-		}
-	return NULL;
+	for (size_t i = 0; i < DEVICES_MAX; i++) {
+		device = get_device(kind, i, &name);
+		if (!device || (is_id(name) && (!*wanted || !strcmp(wanted, name))))
+			break;
+	}
+	snprintf(id, HAPLY_ID_SIZE, "%s", device ? name : "");
+	return device;
 }
 
 /* The reason why a device is not ready, or NULL. Older formats and grips do not say each. */
@@ -95,13 +94,13 @@ static const char *check_status(const json_t *status)
 	return NULL;
 }
 
-static bool is_scaled(const json_t *transform)
+static bool is_scaled(json_t *transform)
 {
-	const json_t *scale = json_object_get(transform, "scale");
 	double xyz[3];
 
-	return scale && !(read_numbers(scale, "xyz", 2, 1, xyz) &&
-			  fabs(xyz[0] - 1) + fabs(xyz[1] - 1) + fabs(xyz[2] - 1) < 1e-6);
+	return json_object_get(transform, "scale") &&
+	       !(read_xyz(transform, "scale", 1, 2, xyz) &&
+		 fabs(xyz[0] - 1) + fabs(xyz[1] - 1) + fabs(xyz[2] - 1) < 1e-6);
 }
 
 /* As "force_gate:gain:0.3,damping:scalar:0.0,torque_scaling:enabled:true,…" */
@@ -127,59 +126,38 @@ static void print_filters(char *text, size_t size, const json_t *config)
 	control_characters_hide(text);
 }
 
-static void read_config(struct haply_frame *frame, const json_t *config)
+static void read_inverse3(struct haply_frame *frame, json_t *device)
 {
-	frame->has_config = true;
-	if (frame->format == HAPLY_3_1 && json_object_get(config, "filters"))
+	json_t *config = json_object_get(device, "config");
+	json_t *state = json_object_get(device, "state");
+	int on = 0;
+
+	frame->has_config = json_is_object(config);
+	if (json_object_get(config, "filters") && frame->format == HAPLY_3_1)
 		frame->format = HAPLY_3_5;
-	frame->mount_scaled = is_scaled(json_object_get(config, "mount"));
-	frame->own_gravity = json_is_true(json_object_get(
-		json_object_get(config, "gravity_compensation"), "enabled"));
+	json_unpack(config, "{s:{s:b}}", "gravity_compensation", "enabled", &on);
+	frame->own_gravity = on;
 	print_filters(frame->filters, sizeof(frame->filters), config);
-}
-
-static void read_inverse3(struct haply_frame *frame, const json_t *device)
-{
-	const json_t *state = json_object_get(device, "state");
-	const json_t *config = json_object_get(device, "config");
-
-	if (json_is_object(config))
-		read_config(frame, config);
-	frame->not_ready = check_status(json_object_get(device, "status"));
+	frame->mount_scaled = is_scaled(json_object_get(config, "mount"));
 	frame->scaled = is_scaled(json_object_get(state, "transform"));
-	read_numbers(json_object_get(state, "cursor_velocity"), "xyz", VELOCITY_MOST_M_S,
-		     1e3, frame->velocity_mm_s);
-	if (!read_numbers(json_object_get(state, "cursor_position"), "xyz",
-			  POSITION_MOST_M, 1e3, frame->position_mm))
+	frame->not_ready = check_status(json_object_get(device, "status"));
+	read_xyz(state, "cursor_velocity", MM, VELOCITY_MOST_MM_S, frame->velocity_mm_s);
+	if (!read_xyz(state, "cursor_position", MM, POSITION_MOST_MM, frame->position_mm))
 		frame->not_ready = "sent no position; see the messages of its service";
 }
 
-static uint32_t read_buttons(const json_t *state)
+static void read_grip(struct haply_frame *frame, json_t *grip)
 {
-	const json_t *buttons = json_object_get(state, "buttons");
-	const json_t *first = json_object_get(state, "button");
-	const json_t *pressed[HAPLY_BUTTONS] = {
-		first ? first : json_object_get(buttons, "a"),
-		json_object_get(buttons, "b"),
-		json_object_get(buttons, "c"),
-		json_object_get(state, "hall"),
-	};
-	uint32_t bits = 0;
-
-	for (int i = 0; i < HAPLY_BUTTONS; i++)
-		if (json_is_true(pressed[i]) || json_integer_value(pressed[i]))
-			bits |= 1u << i;
-	return bits;
-}
-
-static void read_grip(struct haply_frame *frame, const json_t *grip)
-{
-	const json_t *state = json_object_get(grip, "state");
+	json_t *state = json_object_get(grip, "state");
 	const char *denied = check_status(json_object_get(grip, "status"));
+	int a = 0, b = 0, c = 0, hall = 0;
 	double q[4], size2 = 0;
 
-	frame->buttons = read_buttons(state);
-	if (read_numbers(json_object_get(state, "orientation"), "wxyz", 2, 1, q))
+	json_unpack(state, "{s?b, s?i, s?{s?b, s?b, s?b}}", "button", &a, "hall", &hall,
+		    "buttons", "a", &a, "b", &b, "c", &c);
+	frame->buttons = (uint32_t)(a | b << 1 | c << 2 | (hall != 0) << 3);
+	if (!json_unpack(state, "{s:{s:F, s:F, s:F, s:F}}", "orientation", "w", &q[0],
+			 "x", &q[1], "y", &q[2], "z", &q[3]))
 		size2 = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
 	if (fabs(size2 - 1) < UNIT_TOLERANCE)
 		memcpy(frame->quaternion, q, sizeof(q));
@@ -199,6 +177,7 @@ static void read_frame(struct haply_frame *frame, const json_t *root, const char
 
 	*frame = (struct haply_frame){.quaternion = {1},
 				      .position_mm = {NAN, NAN, NAN},
+				      .velocity_mm_s = {NAN, NAN, NAN},
 				      .not_ready = "is not there; plug it in"};
 	frame->format = json_is_object(kind) ? HAPLY_3_0 : HAPLY_3_1;
 	for (size_t i = 0; i < DEVICES_MAX && get_device(kind, i, &name); i++)
@@ -217,16 +196,27 @@ static void read_frame(struct haply_frame *frame, const json_t *root, const char
 		frame->not_ready = "has lost its VerseGrip; plug or pair it again";
 }
 
+/* An object, or NULL. */
+static json_t *load_object(const char *text, size_t n)
+{
+	json_t *root = n < HAPLY_FRAME_MAX ? json_loadb(text, n, 0, NULL) : NULL;
+
+	if (json_is_object(root))
+		return root;
+	json_decref(root);
+	return NULL;
+}
+
 int haply_frame_parse(struct haply_frame *frame, const char *text, size_t n,
 		      const char *id, const char *grip)
 {
-	json_t *root = n < HAPLY_FRAME_MAX ? json_loadb(text, n, 0, NULL) : NULL;
-	bool is_frame = json_is_object(root);
+	json_t *root = load_object(text, n);
 
-	if (is_frame)
-		read_frame(frame, root, id, grip);
+	if (!root)
+		return -EPROTO;
+	read_frame(frame, root, id, grip);
 	json_decref(root);
-	return is_frame ? 0 : -EPROTO;
+	return 0;
 }
 
 size_t haply_command_print(char *text, size_t size, enum haply_format format,
@@ -249,45 +239,34 @@ size_t haply_command_print(char *text, size_t size, enum haply_format format,
 	return n <= size ? n : 0;
 }
 
-static int read_event(const json_t *root, const char *id, const char *grip)
-{
-	const json_t *data = json_object_get(root, "data");
-	const char *of = json_string_value(json_object_get(data, "device_id"));
-	const char *type = json_string_value(json_object_get(data, "safety_type"));
-	const char *name = json_string_value(json_object_get(root, "name"));
-	const char *level = json_string_value(json_object_get(root, "level"));
-	bool ends = level && (!strcmp(level, "info") || !strcmp(level, "notice"));
-
-	if (!name || (of && strcmp(of, id) && strcmp(of, grip)))
-		return 0;
-	if (!strcmp(name, "device-disconnected"))
-		return of && !strcmp(of, id) ? HAPLY_UNPLUGGED : 0;
-	if (!strncmp(name, "device-battery", 14))
-		return HAPLY_BATTERY;
-	if (!strcmp(name, "device-busy"))
-		return HAPLY_BRIEF;
-	if (strcmp(name, "device-safety-triggered") != 0)
-		return 0;
-	if (type && !strncmp(type, "ebrake", 6))
-		return ends ? -HAPLY_BRAKE : HAPLY_BRAKE;
-	if (type && !strncmp(type, "fod", 3))
-		return ends ? -HAPLY_FOREIGN_OBJECT : HAPLY_FOREIGN_OBJECT;
-	return HAPLY_BRIEF;
-}
-
 int haply_event_parse(const char *text, size_t n, const char *id, const char *grip,
 		      char *words, size_t size)
 {
-	json_t *root = n < HAPLY_FRAME_MAX ? json_loadb(text, n, 0, NULL) : NULL;
-	const char *message = json_string_value(json_object_get(root, "message"));
-	int state = read_event(root, id, grip);
+	const char *name = "", *level = "", *message = "", *of = id, *type = "";
+	json_t *root = load_object(text, n);
+	int state = 0;
 
-	if (state > 0)
-		snprintf(words, size, "%s: %.100s",
-			 json_string_value(json_object_get(root, "name")),
-			 message ? message : "");
-	if (state > 0)
+	json_unpack(root, "{s:s, s?s, s?s, s?{s?s, s?s}}", "name", &name, "level", &level,
+		    "message", &message, "data", "device_id", &of, "safety_type", &type);
+	if (strcmp(of, id) && strcmp(of, grip))
+		state = 0;
+	else if (!strcmp(name, "device-disconnected") && !strcmp(of, id))
+		state = HAPLY_UNPLUGGED;
+	else if (!strncmp(name, "device-battery", 14))
+		state = HAPLY_BATTERY;
+	else if (!strcmp(name, "device-busy"))
+		state = HAPLY_BRIEF;
+	else if (!strcmp(name, "device-safety-triggered"))
+		state = !strncmp(type, "ebrake", 6) ? HAPLY_BRAKE
+			: !strncmp(type, "fod", 3)  ? HAPLY_FOREIGN_OBJECT
+						    : HAPLY_BRIEF;
+	if ((state == HAPLY_BRAKE || state == HAPLY_FOREIGN_OBJECT) &&
+	    (!strcmp(level, "info") || !strcmp(level, "notice")))
+		state = -state;
+	if (state > 0) {
+		snprintf(words, size, "%.40s: %.100s", name, message);
 		control_characters_hide(words);
+	}
 	json_decref(root);
 	return state;
 }

@@ -496,3 +496,31 @@ TEST(what_cannot_be_opened_is_refused)
 	}
 	assert_refused("", ENODEV, "no Inverse Service");
 }
+
+/* Reported, not judged: HAPLY_SECONDS=60 on an idle machine. In time: the answer comes within the period. */
+TEST(ticks_in_time_are_counted)
+{
+	const char *seconds = getenv("HAPLY_SECONDS");
+	int64_t until_ns, now_ns;
+	struct incise_haptic_sample sample;
+	long ticks = 0, in_time = 0;
+	double most_ms = 0;
+
+	open_device("--move");
+	until_ns =
+		incise_monotonic_ns() + (int64_t)(1e9 * (seconds ? atof(seconds) : 0.1));
+	while ((now_ns = incise_monotonic_ns()) < until_ns) {
+		if (!step(&sample))
+			continue;
+		now_ns = incise_monotonic_ns();
+		ticks++;
+		in_time += now_ns - sample.t_ns < MS;
+		most_ms = fmax(most_ms, (double)(now_ns - sample.t_ns) * 1e-6);
+	}
+	print_message("%ld ticks, %.3f %% in time, round trip at open %.3f ms, most %.1f "
+		      "ms\n",
+		      ticks, 100.0 * (double)in_time / (double)ticks,
+		      (double)haptic->info.latency_ns * 1e-6, most_ms);
+	assert_true(ticks > 0);
+	close_device();
+}
