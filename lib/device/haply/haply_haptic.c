@@ -70,11 +70,11 @@ struct haply {
 	struct incise_haptic_sample sample;
 	bool has_sample, mount_scaled;
 	uint64_t seq, lost;
-	int bad;	     /* frames in a row */
-	unsigned int states; /* haply_state bits */
-	int64_t brief_ns;    /* HAPLY_BRIEF began */
-	char event[160];     /* the last state's */
-	int error;	     /* negative; for good */
+	int bad;	  /* frames in a row */
+	uint32_t states;  /* haply_protection, BATTERY and CHANGED */
+	int64_t brief_ns; /* HAPLY_BRIEF began */
+	char event[160];  /* the last state's */
+	int error;	  /* negative; for good */
 	char cause[400];
 };
 
@@ -92,34 +92,21 @@ static void fail(struct haply *h, int error, const char *cause)
 		 h->host, h->port, cause);
 }
 
-static uint32_t find_flags(struct haply *h, const char *not_ready)
-{
-	static const uint32_t of_state[] = {INCISE_HAPTIC_CHANGED, INCISE_HAPTIC_BATTERY,
-					    INCISE_HAPTIC_PROTECTED,
-					    INCISE_HAPTIC_PROTECTED,
-					    INCISE_HAPTIC_PROTECTED};
-	uint32_t flags = not_ready ? INCISE_HAPTIC_NOT_READY : 0;
-
-	if (incise_monotonic_ns() - h->brief_ns > BRIEF_NS)
-		h->states &= ~(unsigned int)HAPLY_BRIEF;
-	for (int i = 0; i < 5; i++)
-		flags |= h->states >> i & 1 ? of_state[i] : 0;
-	return flags;
-}
-
 /* Position and orientation are there already. */
 static void add_sample(struct haply *h, int64_t t_ns, const char *not_ready)
 {
-	uint32_t flags = find_flags(h, not_ready);
-
+	if (incise_monotonic_ns() - h->brief_ns > BRIEF_NS)
+		h->states &= ~(uint32_t)HAPLY_BRIEF;
 	h->sample.t_ns = t_ns;
 	h->sample.seq = h->seq++;
-	h->sample.flags = flags;
+	h->sample.flags = (not_ready ? INCISE_HAPTIC_NOT_READY : 0) |
+			  (h->states < HAPLY_BRAKE ? 0 : INCISE_HAPTIC_PROTECTED) |
+			  (h->states & (HAPLY_BRAKE - 1));
 	h->has_sample = true;
-	if (flags & INCISE_HAPTIC_CHANGED)
+	if (h->states & INCISE_HAPTIC_CHANGED)
 		not_ready = "was unplugged, or is another one now; start again";
-	snprintf(h->cause, sizeof(h->cause), flags ? "Inverse3 %s %s%s" : "", h->id,
-		 not_ready ? not_ready : h->event,
+	snprintf(h->cause, sizeof(h->cause), h->sample.flags ? "Inverse3 %s %s%s" : "",
+		 h->id, not_ready ? not_ready : h->event,
 		 not_ready ? "" : "; see the manual of the device");
 }
 
@@ -143,7 +130,7 @@ static void use_frame(struct haply *h, bool late)
 	if (frame->has_config)
 		use_config(h);
 	if (*h->id && !*frame->id && frame->n)
-		h->states |= HAPLY_UNPLUGGED;
+		h->states |= INCISE_HAPTIC_CHANGED;
 	if (v3_finite(frame->position_mm))
 		v3_copy(h->sample.position_mm, frame->position_mm);
 	v3_copy(h->sample.velocity_mm_s, frame->velocity_mm_s);
@@ -180,10 +167,8 @@ static void take_event(struct haply *h, const char *text, size_t n)
 	int state =
 		haply_event_parse(text, n, h->id, h->grip, h->event, sizeof(h->event));
 
-	if (state < 0)
-		h->states &= ~(unsigned int)-state;
-	else
-		h->states |= (unsigned int)state;
+	h->states |= (uint32_t)(state > 0 ? state : 0);
+	h->states &= ~(uint32_t)(state < 0 ? -state : 0);
 	if (state == HAPLY_BRIEF)
 		h->brief_ns = incise_monotonic_ns();
 }
@@ -433,11 +418,10 @@ static bool create_context(struct haply *h)
 static void probe_device(struct haply *h)
 {
 	int64_t start_ns = incise_monotonic_ns(), now_ns = start_ns;
-	uint64_t first = h->seq;
 
-	for (uint64_t n = 0; n < PROBES || (h->events.wsi && !h->events.is_open &&
-					    now_ns - start_ns < EVENTS_NS);
-	     n++) {
+	h->seq = 0;
+	while (h->seq < PROBES ||
+	       (h->events.wsi && !h->events.is_open && now_ns - start_ns < EVENTS_NS)) {
 		send_message(h);
 		wait_answer(h, start_ns + OPEN_NS);
 		now_ns = incise_monotonic_ns();
@@ -446,8 +430,9 @@ static void probe_device(struct haply *h)
 			return;
 		}
 	}
-	h->info.latency_ns = (now_ns - start_ns) / (int64_t)(h->seq - first);
-	h->info.force_latency_ns = h->info.latency_ns;
+	h->info.latency_ns = h->info.force_latency_ns =
+		(now_ns - start_ns) / (int64_t)h->seq;
+	h->seq = 0;
 }
 
 static void fill_info(struct haply *h, double rate_hz)

@@ -251,9 +251,9 @@ int haply_event_parse(const char *text, size_t n, const char *id, const char *gr
 	if (strcmp(of, id) && strcmp(of, grip))
 		state = 0;
 	else if (!strcmp(name, "device-disconnected") && !strcmp(of, id))
-		state = HAPLY_UNPLUGGED;
+		state = INCISE_HAPTIC_CHANGED;
 	else if (!strncmp(name, "device-battery", 14))
-		state = HAPLY_BATTERY;
+		state = INCISE_HAPTIC_BATTERY;
 	else if (!strcmp(name, "device-busy"))
 		state = HAPLY_BRIEF;
 	else if (!strcmp(name, "device-safety-triggered"))

@@ -16,6 +16,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <incise/haptic.h>
 
 #define HAPLY_FRAME_MAX 65536 /* bytes; a longer one is not read */
 #define HAPLY_COMMAND_MAX 512
@@ -58,15 +59,14 @@ size_t haply_command_print(char *text, size_t size, enum haply_format format,
 #define HAPLY_NAME_SESSION "{\"configure\":{\"profile\":{\"name\":\"incise\"}}}"
 #define HAPLY_ASK_CONFIG "{\"force_render_full_state\":{}}"
 
-enum haply_state {
-	HAPLY_UNPLUGGED = 1,
-	HAPLY_BATTERY = 2, /* low */
-	HAPLY_BRAKE = 4,
-	HAPLY_FOREIGN_OBJECT = 8,
-	HAPLY_BRIEF = 16, /* a protection that no event ends */
+/* States that events begin and end, beside INCISE_HAPTIC_BATTERY and INCISE_HAPTIC_CHANGED. */
+enum haply_protection {
+	HAPLY_BRAKE = 16,
+	HAPLY_FOREIGN_OBJECT = 32,
+	HAPLY_BRIEF = 64, /* no event ends it */
 };
 
-/* Read an event: the state that begins, or negative that ends, with words for people; 0: none of these. */
+/* Read an event: the state that begins, with words for people; negative: that ends; 0: none of these. */
 int haply_event_parse(const char *text, size_t n, const char *id, const char *grip,
 		      char *words, size_t size);
 

@@ -149,14 +149,26 @@ static void wait_force(const double expected_N[3], double tolerance)
 	}
 }
 
-static void assert_cause(const char *part)
+static bool has_cause(const char *part, char text[400])
 {
+	haptic->ops->cause(haptic, text, 400);
+	return strstr(text, part);
+}
+
+/* The same with a reason: on a busy machine answers are late, too. */
+static struct incise_haptic_sample wait_cause(uint32_t flags, const char *part)
+{
+	int64_t until_ns = incise_monotonic_ns() + LONG_NS;
+	struct incise_haptic_sample sample;
 	char text[400];
 
-	haptic->ops->cause(haptic, text, sizeof(text));
+	do {
+		if (incise_monotonic_ns() > until_ns)
+			fail_msg("no cause \"%s\", but \"%s\"", part, text);
+		sample = wait_flags(flags);
+	} while (!has_cause(part, text));
 	message_record(text);
-	if (!strstr(text, part))
-		fail_msg("\"%s\" is not in \"%s\"", part, text);
+	return sample;
 }
 
 TEST(each_format_gives_poses_and_takes_forces)
@@ -170,6 +182,7 @@ TEST(each_format_gives_poses_and_takes_forces)
 		     {"--format 3.5 --grip none", false}};
 	const double turned[4] = {sqrt(1 - 0.14), 0.1, 0.2, -0.3}, straight[4] = {1};
 	struct incise_haptic_sample sample;
+	int64_t until_ns;
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		open_device(cases[i].options);
@@ -189,7 +202,9 @@ TEST(each_format_gives_poses_and_takes_forces)
 							      ? "\"profile\": \"incise\""
 							      : "\"profile\": null"));
 		haptic->ops->close(haptic);
-		assert_non_null(strstr(say("report"), "\"force\": [0.0, 0.0, 0.0]"));
+		until_ns = incise_monotonic_ns() + LONG_NS;
+		while (!strstr(say("report"), "\"force\": [0.0, 0.0, 0.0]"))
+			assert_true(incise_monotonic_ns() < until_ns);
 		end_emulator();
 	}
 }
@@ -245,8 +260,7 @@ TEST(another_id_ends_the_force_until_it_is_opened_again)
 	force_N[0] = 1;
 	wait_force(force_N, 0);
 	say("id 04B2");
-	wait_flags(INCISE_HAPTIC_NOT_READY | INCISE_HAPTIC_CHANGED);
-	assert_cause("049D was unplugged");
+	wait_cause(INCISE_HAPTIC_NOT_READY | INCISE_HAPTIC_CHANGED, "049D was unplugged");
 	say("id 049D");
 	wait_flags(INCISE_HAPTIC_CHANGED);
 	/* Its messages name the old id: each was a complaint. */
@@ -289,13 +303,8 @@ TEST(what_is_no_good_frame_is_not_ready)
 		wait_flags(0);
 		snprintf(command, sizeof(command), "raw 9 %s", cases[i].answer);
 		say(command);
-		do
-			sample = wait_flags(INCISE_HAPTIC_NOT_READY);
-		while (!strstr((haptic->ops->cause(haptic, command, sizeof(command)),
-				command),
-			       cases[i].cause));
+		sample = wait_cause(INCISE_HAPTIC_NOT_READY, cases[i].cause);
 		assert_true(sample.position_mm[1] == 1e3 * -0.12);
-		assert_cause(cases[i].cause);
 	}
 	assert_true(haptic->ops->lost(haptic) >= 1);
 	close_device();
@@ -368,9 +377,9 @@ TEST(states_of_the_device_are_flags_with_a_reason)
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		wait_force(force_N, 0);
 		say(cases[i].begin);
-		wait_flags(cases[i].flags);
-		assert_cause(cases[i].cause);
-		if (cases[i].flags != INCISE_HAPTIC_BATTERY)
+		wait_cause(cases[i].flags, cases[i].cause);
+		if (cases[i].flags != INCISE_HAPTIC_BATTERY &&
+		    !strstr(cases[i].begin, "stall"))
 			wait_force(none_N, 0);
 		if (cases[i].end)
 			say(cases[i].end);
@@ -390,8 +399,7 @@ TEST(a_late_frame_is_not_ready_and_ends_the_force)
 	force_N[0] = 1;
 	wait_force(force_N, 0);
 	say("late 20 1000000");
-	sample = wait_flags(INCISE_HAPTIC_NOT_READY);
-	assert_cause("late");
+	wait_cause(INCISE_HAPTIC_NOT_READY, "late");
 	wait_force(none_N, 0);
 	say("late 0 0");
 	sample = wait_flags(0);
@@ -436,6 +444,7 @@ TEST(a_service_that_ends_is_gone_until_it_is_opened_again)
 {
 	int64_t until_ns = incise_monotonic_ns() + LONG_NS;
 	struct incise_haptic_sample sample;
+	char text[400];
 	int rc;
 
 	open_device("--no-events");
@@ -452,7 +461,7 @@ TEST(a_service_that_ends_is_gone_until_it_is_opened_again)
 	haptic->ops->wait(haptic, MS);
 	assert_int_equal(haptic->ops->read(haptic, &sample, 1), -ENODEV);
 	assert_int_equal(haptic->ops->push(haptic, force_N, force_N), -ENODEV);
-	assert_cause("closed the connection");
+	assert_true(has_cause("closed the connection", text));
 	haptic->ops->close(haptic);
 	open_device(NULL);
 	wait_flags(0);
