@@ -59,16 +59,15 @@ static json_t *get_device(json_t *kind, size_t i, const char **id)
 /* The device @wanted, "": the first, with its id; or NULL. */
 static json_t *find_device(json_t *kind, const char *wanted, char id[HAPLY_ID_SIZE])
 {
-	json_t *device = NULL;
 	const char *name;
+	json_t *device;
 
-	for (size_t i = 0; i < DEVICES_MAX; i++) {
-		device = get_device(kind, i, &name);
-		if (!device || (is_id(name) && (!*wanted || !strcmp(wanted, name))))
-			break;
-	}
-	snprintf(id, HAPLY_ID_SIZE, "%s", device ? name : "");
-	return device;
+	for (size_t i = 0; i < DEVICES_MAX && (device = get_device(kind, i, &name)); i++)
+		if (is_id(name) && (!*wanted || !strcmp(wanted, name))) {
+			snprintf(id, HAPLY_ID_SIZE, "%s", name);
+			return device;
+		}
+	return NULL;
 }
 
 /* The reason why a device is not ready, or NULL. Older formats and grips do not say each. */
@@ -96,7 +95,7 @@ static const char *check_status(const json_t *status)
 
 static bool is_scaled(json_t *transform)
 {
-	double xyz[3];
+	double xyz[3] = {0};
 
 	return json_object_get(transform, "scale") &&
 	       !(read_xyz(transform, "scale", 1, 2, xyz) &&
