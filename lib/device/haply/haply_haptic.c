@@ -29,14 +29,13 @@
 #define EVENTS_AFTER 19 /* 10020 */
 #define RATE_HZ 1000
 #define OPEN_NS (3000 * MS)
-#define EVENTS_NS (300 * MS) /* for their connection */
+#define ANSWER_NS MS /* assumed, of poses and forces */
 #define CLOSE_NS (100 * MS)
 #define LATE_PERIODS 4
 #define CONFIG_NS (1000 * MS) /* between two requests for the config */
 #define BRIEF_NS (1000 * MS)  /* a protection counts that no event ends */
 #define REPEATS 2	      /* messages with the force of one push */
 #define BAD_MOST 50	      /* frames in a row that are not understood */
-#define PROBES 32
 /* The service documents that the device goes idle without a new force, and not how soon. */
 #define DEADMAN_S 0.1
 #define LATE "answers late; end other programs, or lower haptic_setup.rate_hz"
@@ -414,25 +413,33 @@ static bool create_context(struct haply *h)
 	return h->context;
 }
 
-/* Measure the round trip without a force; the events connect meanwhile. */
-static void probe_device(struct haply *h)
+/* Connect, and wait for the inventory, which is the first frame. */
+static int connect_service(struct haply *h, const char *arguments, const char *where,
+			   struct incise_error *err)
 {
-	int64_t start_ns = incise_monotonic_ns(), now_ns = start_ns;
+	int64_t until_ns = incise_monotonic_ns() + OPEN_NS;
 
-	h->seq = 0;
-	while (h->seq < PROBES ||
-	       (h->events.wsi && !h->events.is_open && now_ns - start_ns < EVENTS_NS)) {
-		send_message(h);
-		wait_answer(h, start_ns + OPEN_NS);
-		now_ns = incise_monotonic_ns();
-		if (h->waits) {
-			fail(h, -ETIMEDOUT, "answers no commands; update it");
-			return;
-		}
+	if (!parse_arguments(h, arguments))
+		return incise_error_set(err, EINVAL,
+					"%s: \"%.80s\": expected haply:[HOST:PORT][/ID], "
+					"such as haply:localhost:10001/049D; correct it",
+					where, arguments);
+	if (!create_context(h))
+		return incise_error_set(err, ENOMEM, "%s: %s", where, strerror(ENOMEM));
+	h->waits = true;
+	connect_link(h, &h->frames, h->port);
+	connect_link(h, &h->events, h->port + EVENTS_AFTER);
+	wait_answer(h, until_ns);
+	if (h->waits || h->bad)
+		return incise_error_set(err, h->bad ? EPROTO : ENODEV,
+					"%s: no Inverse Service at %.100s port %d; start "
+					"haply-inverse-service, or correct host and port",
+					where, h->host, h->port);
+	while (h->events.wsi && !h->events.is_open && incise_monotonic_ns() < until_ns) {
+		lws_service(h->context, -1);
+		incise_monotonic_sleep_until(incise_monotonic_ns() + MS);
 	}
-	h->info.latency_ns = h->info.force_latency_ns =
-		(now_ns - start_ns) / (int64_t)h->seq;
-	h->seq = 0;
+	return 0;
 }
 
 static void fill_info(struct haply *h, double rate_hz)
@@ -441,31 +448,25 @@ static void fill_info(struct haply *h, double rate_hz)
 
 	snprintf(info->name, sizeof(info->name), "Haply Inverse3 %s", h->id);
 	info->rate_hz = rate_hz > 0 ? rate_hz : RATE_HZ;
+	h->period_ns = (int64_t)(INCISE_NS_PER_S / info->rate_hz);
+	info->latency_ns = info->force_latency_ns = ANSWER_NS;
 	info->deadman_s = DEADMAN_S;
 	info->buttons = *h->grip ? HAPLY_BUTTONS : 0;
 	info->measures_velocity = true;
 	info->measures_orientation = *h->grip;
 	info->own_gravity = h->frame.own_gravity;
 	snprintf(info->filters, sizeof(info->filters), "%s", h->frame.filters);
-	probe_device(h);
 	if (!h->events.is_open)
 		snprintf(info->note, sizeof(info->note),
 			 "no events at port %d: its safety and its batteries are not "
 			 "known",
 			 h->port + EVENTS_AFTER);
-	h->period_ns = (int64_t)(INCISE_NS_PER_S / info->rate_hz);
 }
 
-/* The Inverse3 of the inventory, which is the first frame. */
 static int choose_inverse3(struct haply *h, const char *where, struct incise_error *err)
 {
 	const struct haply_frame *frame = &h->frame;
 
-	if (h->waits || h->bad)
-		return incise_error_set(err, h->bad ? EPROTO : ENODEV,
-					"%s: no Inverse Service at %.100s port %d; start "
-					"haply-inverse-service, or correct host and port",
-					where, h->host, h->port);
 	if (!*frame->id || (!*h->id && frame->n > 1))
 		return incise_error_set(
 			err, *frame->id ? EINVAL : ENODEV,
@@ -476,31 +477,9 @@ static int choose_inverse3(struct haply *h, const char *where, struct incise_err
 	snprintf(h->id, sizeof(h->id), "%s", frame->id);
 	snprintf(h->grip, sizeof(h->grip), "%s", frame->grip);
 	h->format = frame->format;
+	h->has_sample = false;
+	h->seq = 0;
 	return 0;
-}
-
-static int begin_haply(struct haply *h, const struct incise_backend_request *request,
-		       struct incise_error *err)
-{
-	const char *where = request->where;
-	int rc;
-
-	if (!parse_arguments(h, request->arguments))
-		return incise_error_set(err, EINVAL,
-					"%s: \"%.80s\": expected haply:[HOST:PORT][/ID], "
-					"such as haply:localhost:10001/049D; correct it",
-					where, request->arguments);
-	if (!create_context(h))
-		return incise_error_set(err, ENOMEM, "%s: %s", where, strerror(ENOMEM));
-	h->waits = true;
-	connect_link(h, &h->frames, h->port);
-	connect_link(h, &h->events, h->port + EVENTS_AFTER);
-	wait_answer(h, incise_monotonic_ns() + OPEN_NS);
-	rc = choose_inverse3(h, where, err);
-	if (rc)
-		return rc;
-	fill_info(h, request->haptic->rate_hz);
-	return h->error ? incise_error_set(err, -h->error, "%s: %s", where, h->cause) : 0;
 }
 
 static void *open_haply(const struct incise_backend_request *request,
@@ -514,12 +493,39 @@ static void *open_haply(const struct incise_backend_request *request,
 		return NULL;
 	}
 	h->haptic.ops = &ops;
-	rc = begin_haply(h, request, err);
+	rc = connect_service(h, request->arguments, request->where, err);
 	if (!rc)
+		rc = choose_inverse3(h, request->where, err);
+	if (!rc) {
+		fill_info(h, request->haptic->rate_hz);
 		return &h->haptic;
+	}
 	close_haply(&h->haptic);
 	errno = -rc;
 	return NULL;
+}
+
+/* Each Inverse3 of a service; where there is none, none. */
+static int scan_haply(const char *arguments, incise_scan_found *found, void *context,
+		      struct incise_error *err)
+{
+	struct haply *h = calloc(1, sizeof(*h));
+	int rc = h ? connect_service(h, arguments, "haply", err) : -ENOMEM;
+	char *rest = rc ? NULL : h->frame.ids, *id;
+
+	while (!rc && (id = strsep(&rest, ", "))) {
+		struct incise_scan_device device = {.usable = true};
+
+		if (!*id)
+			continue;
+		snprintf(device.device, sizeof(device.device), "haply:%s:%d/%s", h->host,
+			 h->port, id);
+		snprintf(device.what, sizeof(device.what), "Haply Inverse3 %s", id);
+		rc = found(context, &device);
+	}
+	if (h)
+		close_haply(&h->haptic);
+	return rc == -ENODEV ? 0 : rc;
 }
 
 const struct incise_backend incise_haptic_haply = {
@@ -527,6 +533,7 @@ const struct incise_backend incise_haptic_haply = {
 	.kind = "haptic",
 	.name = "haply",
 	.open = open_haply,
+	.scan = scan_haply,
 };
 
 INCISE_MODULE(incise_haptic_haply);
