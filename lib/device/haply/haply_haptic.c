@@ -427,6 +427,7 @@ static int connect_service(struct haply *h, const char *arguments, const char *w
 	if (!create_context(h))
 		return incise_error_set(err, ENOMEM, "%s: %s", where, strerror(ENOMEM));
 	h->waits = true;
+	h->sent_ns = incise_monotonic_ns();
 	connect_link(h, &h->frames, h->port);
 	connect_link(h, &h->events, h->port + EVENTS_AFTER);
 	wait_answer(h, until_ns);

@@ -119,9 +119,11 @@ static struct incise_haptic_sample wait_flags(uint32_t flags)
 	int64_t until_ns = incise_monotonic_ns() + LONG_NS;
 	struct incise_haptic_sample sample = {0};
 
-	do
+	do {
 		assert_true(incise_monotonic_ns() < until_ns);
-	while (!step(&sample) || sample.flags != flags);
+		/* A time of this test. */
+		assert_true(!step(&sample) || sample.t_ns > until_ns - 2 * LONG_NS);
+	} while (sample.flags != flags || !sample.t_ns);
 	return sample;
 }
 
