@@ -98,7 +98,6 @@ class Service:
         self.complaints = []
         self.late = [0, 0]
         self.raw = [0, ""]
-        self.configured = 0
         self.writers, self.listeners = [], []
         config = {"type": "inverse3", "port": "/dev/ttyACM0",
                   "device_info": {"major_version": 7, "minor_version": 4, "id": "049D", "device_type": 4,
@@ -147,14 +146,13 @@ class Service:
                     frame[kind] += [{"device_id": id, **part} for id in self.more]
         return json.dumps(frame)
 
-    def take(self, text):
-        """A message; whether the answer is to have the config."""
+    def take(self, text, first):
+        """A message, and whether it is the first of its session; whether the answer is to have the config."""
         message = json.loads(text, parse_constant=lambda name: self.complaints.append(name))
         session = message.get("session", {})
         if "configure" in session:
-            self.configured += 1
             self.profile = session["configure"]["profile"]["name"]
-            if self.messages or self.configured > 1:
+            if not first:
                 self.complaints.append("configured late, or twice")
         devices = message["inverse3"]
         if self.form == "3.0":
@@ -173,15 +171,17 @@ class Service:
             await shake_hands(reader, writer)
             self.writers.append(writer)
             write_text(writer, self.frame(True))
+            first = True
             while True:
                 text = await read_message(reader, writer)
                 if text is None:
                     break
                 try:
-                    full = self.take(text)
+                    full = self.take(text, first)
                 except (AttributeError, KeyError, TypeError, ValueError) as error:
                     self.complaints.append("%r: %s" % (error, text))
                     full = False
+                first = False
                 answer = self.frame(full)
                 if self.late[1]:
                     self.late[1] -= 1
