@@ -133,7 +133,9 @@ class Service:
 
     def frame(self, full):
         if self.move:
-            self.parts["inverse3"]["state"]["cursor_position"]["x"] = 0.03 * math.sin(self.messages * 1e-3)
+            place = self.parts["inverse3"]["state"]["cursor_position"]
+            place["x"] = 0.03 * math.sin(self.messages * 1e-3)
+            place["z"] = 0.15 + 0.005 * math.sin(self.messages * 3e-3)
         frame = {} if self.form == "3.0" else {"session_id": 7}
         ids = {"inverse3": self.id, "verse_grip": "8200", "wireless_verse_grip": "A0F1"}
         for kind, part in self.parts.items():
