@@ -156,7 +156,7 @@ class Service:
             self.profile = session["configure"]["profile"]["name"]
             if not first:
                 self.complaints.append("configured late, or twice")
-        devices = message["inverse3"]
+        devices = message.get("inverse3", {} if self.form == "3.0" else [])
         if self.form == "3.0":
             devices = [{"device_id": key, **value} for key, value in devices.items()]
         for device in devices:
