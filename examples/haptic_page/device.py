@@ -80,7 +80,7 @@ def main(name):
     gate, x, v, n, stop = Gate(), 0.0, 0.0, 0, []
     signal.signal(signal.SIGTERM, lambda *_: stop.append(1))
     struct.pack_into("=256s64s200s304s15d2q4I", page, DEVICE, f"local:{name}".encode(), b"spring in Python", b"", b"",
-                     *(6 * [0.0]), PEAK_N, 0, 0, 0.1, 0, 0, 0, 1e9 / PERIOD_NS, 0, PERIOD_NS, 0, 0, VELOCITY, 0, 0)
+                     *(6 * [0.0]), PEAK_N, 0, 0, 0.1, 0.002, 0, 0, 1e9 / PERIOD_NS, 0, PERIOD_NS, 0, 0, VELOCITY, 0, 0)
     put(page, OWNER, OWNER_HALF, READY, now(), 0, 0, 0, 0, b"")
     struct.pack_into("=4I16I", page, 8, 1, 0, len(page), os.getpid(), *PARTS)
     page[0:8] = b"INCISEHP"  # last: now the page is complete

@@ -27,6 +27,7 @@ struct haptic_user {
 	struct incise_haptic_page_owner owner; /* the last whole one */
 	struct incise_haptic_page_user own;    /* as written last */
 	uint64_t taken, lost;
+	bool reads;	   /* has read */
 	uint32_t flags;	   /* of the last sample */
 	bool refused;	   /* a sample */
 	int rc;		   /* negative errno that ended the stream */
@@ -149,11 +150,13 @@ static INCISE_REALTIME int read_user(struct incise_haptic *haptic,
 
 	if (rc)
 		return rc;
-	/* The owner may write to the slot behind the last one. */
+	/* The owner may write to the slot behind the last one. Before the first read there is no loss. */
 	if (user->owner.samples - user->taken >= kept) {
-		user->lost += user->owner.samples - user->taken - kept + 1;
+		if (user->reads)
+			user->lost += user->owner.samples - user->taken - kept + 1;
 		user->taken = user->owner.samples - kept + 1;
 	}
+	user->reads = true;
 	for (; user->taken < user->owner.samples && got < n; user->taken++) {
 		if (take_sample(user, &samples[got]))
 			got++;
