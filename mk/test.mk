@@ -190,12 +190,25 @@ $(O)/tests/state/loop: tests/state/loop.c $(O)/lib/libincise-tests.a
 	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ $^ \
 		$(test_libs)
 
+# A haptic device as a module, and a program that uses the haptic device of a rig.
+haptic_peers := $(O)/tests/haptic/haptic_spring.so $(O)/tests/haptic/user
+$(O)/tests/haptic/haptic_spring.so: tests/haptic/spring.c $(O)/lib/libincise.so
+	@mkdir -p $(@D)
+	$(call step,LD)
+	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 -fPIC $(warnings) $(CFLAGS) $(LDFLAGS) -shared -o $@ $< \
+		-L$(O)/lib -lincise
+
+$(O)/tests/haptic/user: tests/haptic/user.c $(O)/lib/libincise-tests.a
+	@mkdir -p $(@D)
+	$(call step,LD)
+	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ $^ $(test_libs)
+
 # Commands leave what they hold when they end to the system.
 bats = BATS_TEST_TIMEOUT=$(LIMIT_S) ASAN_OPTIONS=detect_leaks=0 LOCPATH=$(abspath $(O)/locale) INCISE_BUILD=$(abspath $(O)) CC="$(CC)" CXX="$(CXX)" \
 	bats --print-output-on-failure
 # What the command-line tests call beside the programs. Those of other projects come by pip.
 cli-needs: all $(locale) $(O)/tests/polhemus/fastrak $(O)/tests/state/loop $(O)/tests/day $(O)/tests/sql $(O)/tests/longer \
-	$(attack_programs)
+	$(attack_programs) $(haptic_peers)
 peers: can-drive mcap-reader python-peers stream-peers ros2-peers
 
 # Tests that `make check` runs bear the tag check. Most wait now and then, so one more runs than there are processors.

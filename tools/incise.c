@@ -48,6 +48,7 @@ static const struct {
 	{"serve", "send poses, forces and frames live to other programs"},
 	{"sign", "sign and time-stamp a recording"},
 	{"stepper", "show the state of the actuator and move it by hand", "Administer"},
+	{"device", "own a haptic device, which stays safe when the loop's program ends"},
 	{"bench", "measure error, run time and stability", "Advanced"},
 	{"compile", "convert a model or a scene to fixed point with a certified error"},
 	{"feed", "load a scene into the kernel and send it the poses"},

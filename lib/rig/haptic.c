@@ -9,11 +9,11 @@
 #include <string.h>
 #include "../base/vector.h"
 #include "backends.h"
+#include "haptic_page.h"
 #include "../sim/sim.h"
 
-/* The settings of a rig in place of the device's own. */
-static void set_info(struct incise_haptic *haptic,
-		     const struct incise_haptic_setup *setup)
+void incise_haptic_set_info(struct incise_haptic *haptic,
+			    const struct incise_haptic_setup *setup)
 {
 	struct incise_haptic_info *info = &haptic->info;
 	const struct {
@@ -76,7 +76,7 @@ struct incise_haptic *incise_haptic_open(const char *device, const char *where,
 		return NULL;
 	}
 	haptic->module = loaded.handle;
-	set_info(haptic, setup);
+	incise_haptic_set_info(haptic, setup);
 	return haptic;
 }
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Slots in shared memory; see page.h. The pattern is H.-J. Boehm's, 'Can seqlocks get
- * along with programming language memory models?', MSPC 2012, figure 6.
+ * Slots in shared memory; see page.h.
  */
 #include <errno.h>
 #include <stdbool.h>
-#include <string.h>
+#include <stddef.h>
+#include <incise/haptic_page.h>
 #include <incise/tick_flags.h>
 #include <incise/tool.h>
 #include "../fixed/profile.h"
@@ -14,58 +14,8 @@
 /* A write takes some 20 ns: after so many tries the writer was interrupted. */
 #define TRIES 100
 
-#define SETPOINT_WORDS (sizeof(struct incise_stepper_setpoint) / sizeof(uint32_t))
-#define STATUS_WORDS (sizeof(struct incise_stepper_motor_status) / sizeof(uint32_t))
-#define PLAN_WORDS (sizeof(struct incise_stepper_plan_status) / sizeof(uint32_t))
 #define KNOWN_FAULTS ((1U << INCISE_STEPPER_FAULTS) - 1 - INCISE_STEPPER_FAULT_TRAVEL)
 #define KNOWN_INPUTS ((1U << INCISE_STEPPER_INPUTS) - 1)
-
-static void begin_page(uint32_t *words, uint32_t seq)
-{
-	__atomic_store_n(words, seq, __ATOMIC_RELAXED);
-	__atomic_thread_fence(__ATOMIC_RELEASE);
-}
-
-static void end_page(uint32_t *words, uint32_t seq)
-{
-	__atomic_store_n(words, seq, __ATOMIC_RELEASE);
-}
-
-/* All but seq, which is the first word. */
-static void put(uint32_t *words, const void *from, size_t n)
-{
-	uint32_t word;
-
-	for (size_t i = 1; i < n; i++) {
-		memcpy(&word, (const char *)from + i * sizeof(word), sizeof(word));
-		__atomic_store_n(words + i, word, __ATOMIC_RELAXED);
-	}
-}
-
-/* Whether the copy is whole. */
-static bool get(const uint32_t *words, void *to, size_t n)
-{
-	uint32_t word, seq = __atomic_load_n(words, __ATOMIC_ACQUIRE);
-
-	if (seq & 1)
-		return false;
-	memcpy(to, &seq, sizeof(seq));
-	for (size_t i = 1; i < n; i++) {
-		word = __atomic_load_n(words + i, __ATOMIC_RELAXED);
-		memcpy((char *)to + i * sizeof(word), &word, sizeof(word));
-	}
-	__atomic_thread_fence(__ATOMIC_ACQUIRE);
-	return __atomic_load_n(words, __ATOMIC_RELAXED) == seq;
-}
-
-static INCISE_REALTIME void write_whole(uint32_t *words, const void *from, size_t n)
-{
-	uint32_t seq = __atomic_load_n(words, __ATOMIC_RELAXED) & ~1u;
-
-	begin_page(words, seq + 1);
-	put(words, from, n);
-	end_page(words, seq + 2);
-}
 
 void incise_page_put_setpoint(struct incise_stepper_setpoint *slot, unsigned int mode,
 			      int64_t target, int64_t t_ns)
@@ -73,7 +23,7 @@ void incise_page_put_setpoint(struct incise_stepper_setpoint *slot, unsigned int
 	struct incise_stepper_setpoint setpoint = {
 		.mode = (__u16)mode, .target = target, .t_ns = t_ns};
 
-	write_whole((uint32_t *)slot, &setpoint, SETPOINT_WORDS);
+	incise_haptic_page_put(slot, &setpoint, sizeof(setpoint));
 }
 
 void incise_page_put_pose(struct incise_stepper_setpoint *slot,
@@ -82,16 +32,14 @@ void incise_page_put_pose(struct incise_stepper_setpoint *slot,
 	struct incise_stepper_setpoint setpoint = {
 		.mode = INCISE_STEPPER_MODE_POSE, .t_ns = t_ns, .pose = *pose};
 
-	write_whole((uint32_t *)slot, &setpoint, SETPOINT_WORDS);
+	incise_haptic_page_put(slot, &setpoint, sizeof(setpoint));
 }
 
 int incise_page_get_setpoint(const struct incise_stepper_setpoint *slot, uint32_t *seq,
 			     struct incise_stepper_setpoint *copy)
 {
-	const uint32_t *words = (const uint32_t *)slot;
-
-	if (__atomic_load_n(words, __ATOMIC_RELAXED) == *seq ||
-	    !get(words, copy, SETPOINT_WORDS) || copy->seq == *seq)
+	if (__atomic_load_n(&slot->seq, __ATOMIC_RELAXED) == *seq ||
+	    !incise_haptic_page_get(slot, copy, sizeof(*copy)) || copy->seq == *seq)
 		return 0;
 	*seq = copy->seq;
 	if (copy->mode > INCISE_STEPPER_MODE_VELOCITY || copy->reserved0)
@@ -105,7 +53,7 @@ int incise_page_get_setpoint(const struct incise_stepper_setpoint *slot, uint32_
 void incise_page_put_status(struct incise_stepper_motor_status *slot,
 			    const struct incise_stepper_motor_status *status)
 {
-	write_whole((uint32_t *)slot, status, STATUS_WORDS);
+	incise_haptic_page_put(slot, status, sizeof(*status));
 }
 
 static bool sensible(const struct incise_stepper_motor_status *status)
@@ -126,7 +74,7 @@ int incise_page_get_status(const struct incise_stepper_motor_status *slot,
 	struct incise_stepper_motor_status status;
 
 	for (int i = 0; i < TRIES; i++) {
-		if (!get((const uint32_t *)slot, &status, STATUS_WORDS))
+		if (!incise_haptic_page_get(slot, &status, sizeof(status)))
 			continue;
 		if (!sensible(&status))
 			return -EIO;
@@ -152,7 +100,7 @@ int incise_page_get_plan(const struct incise_stepper_plan_status *slot,
 	struct incise_stepper_plan_status status;
 
 	for (int i = 0; i < TRIES; i++) {
-		if (!get((const uint32_t *)slot, &status, PLAN_WORDS))
+		if (!incise_haptic_page_get(slot, &status, sizeof(status)))
 			continue;
 		if (!plan_sensible(&status))
 			return -EIO;

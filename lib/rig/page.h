@@ -5,8 +5,7 @@
  *   writer   seq odd ── fields ── seq even          one at a time per slot
  *   reader   seq even ── copy ── the same seq       else once more
  *
- * Every word is read and written as an atomic, so that a race gives a torn copy, which
- * seq shows, and no undefined behaviour.
+ * The lock and its use of atomics are those of incise/haptic_page.h.
  */
 #ifndef INCISE_PAGE_H
 #define INCISE_PAGE_H

@@ -71,6 +71,7 @@ VALUES = """
 --key | key |
 --length | 47.5mm 4.75cm 100 | 47.5kg 0 long {}
 --load | idle cpu memory disk view | disc {}
+--log device | |
 --lsl | prefix | {}
 --max-delay | 10 1000 | 9 1001 long {}
 --max-force | 1N 500mN | 0 1kg strong {}

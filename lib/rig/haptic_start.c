@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * Starting the owner of a haptic device; see haptic_page.h. `incise device --background` ends when the owner,
+ * a process of its own session, is ready; or fails with a line on standard error.
+ */
+#include <errno.h>
+#include <fcntl.h>
+#include <limits.h>
+#include <signal.h>
+#include <spawn.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
+#include "haptic_page.h"
+
+#define PROGRAM "incise-device"
+
+extern char **environ;
+
+/* Beside this program, or in bin/ beside the library's folder; else it is looked up in PATH. */
+static void find_program(char path[PATH_MAX + 40])
+{
+	char folder[PATH_MAX];
+	ssize_t n = readlink("/proc/self/exe", folder, sizeof(folder) - 1);
+
+	folder[n > 0 ? n : 0] = 0;
+	snprintf(path, PATH_MAX + 40, "%.*s/" PROGRAM,
+		 (int)(strrchr(folder, '/') ? strrchr(folder, '/') - folder : 0), folder);
+	if (access(path, X_OK) && incise_module_folder(folder, sizeof(folder)))
+		snprintf(path, PATH_MAX + 40, "%s/../../bin/" PROGRAM, folder);
+	if (access(path, X_OK))
+		strcpy(path, PROGRAM);
+}
+
+/* The signals of this program are not the owner's. Returns 0 or a positive errno. */
+static int spawn_owner(pid_t *pid, const char *path, const char *spec, int err_fd)
+{
+	char *const argv[] = {PROGRAM, "--background", "--rig", (char *)spec, NULL};
+	posix_spawn_file_actions_t files;
+	posix_spawnattr_t attributes;
+	sigset_t none, all;
+	int rc = posix_spawnattr_init(&attributes);
+
+	if (rc)
+		return rc;
+	rc = posix_spawn_file_actions_init(&files);
+	if (!rc) {
+		sigemptyset(&none);
+		sigfillset(&all);
+		posix_spawnattr_setflags(&attributes,
+					 POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
+		posix_spawnattr_setsigmask(&attributes, &none);
+		posix_spawnattr_setsigdefault(&attributes, &all);
+		rc = posix_spawn_file_actions_addopen(&files, STDIN_FILENO, "/dev/null",
+						      O_RDONLY, 0);
+		if (!rc)
+			rc = posix_spawn_file_actions_addopen(&files, STDOUT_FILENO,
+							      "/dev/null", O_WRONLY, 0);
+		if (!rc)
+			rc = posix_spawn_file_actions_adddup2(&files, err_fd,
+							      STDERR_FILENO);
+		if (!rc)
+			rc = posix_spawnp(pid, path, &files, &attributes, argv, environ);
+		posix_spawn_file_actions_destroy(&files);
+	}
+	posix_spawnattr_destroy(&attributes);
+	return rc;
+}
+
+/* The last line of a program, without its name. */
+static void read_line(int fd, char *line, size_t size)
+{
+	size_t length = 0;
+	char *last;
+	ssize_t n;
+
+	while ((n = read(fd, line + length, size - 1 - length)) > 0 ||
+	       (n < 0 && errno == EINTR))
+		length += n > 0 ? (size_t)n : 0;
+	while (length && line[length - 1] == '\n')
+		length--;
+	line[length] = 0;
+	last = strrchr(line, '\n');
+	last = last ? last + 1 : line;
+	if (!strncmp(last, "incise device: ", strlen("incise device: ")))
+		last += strlen("incise device: ");
+	memmove(line, last, strlen(last) + 1);
+}
+
+int incise_haptic_start_owner(const char *spec, const char *where,
+			      struct incise_error *err)
+{
+	char path[PATH_MAX + 40], line[2000];
+	int fds[2], status = -1, rc;
+	pid_t pid;
+
+	find_program(path);
+	if (pipe2(fds, O_CLOEXEC))
+		return incise_error_set(err, errno, "%s: %s", where, strerror(errno));
+	rc = spawn_owner(&pid, path, spec, fds[1]);
+	close(fds[1]);
+	if (!rc) {
+		read_line(fds[0], line, sizeof(line));
+		while (waitpid(pid, &status, 0) < 0 && errno == EINTR)
+			;
+	}
+	close(fds[0]);
+	if (rc)
+		return incise_error_set(
+			err, rc,
+			"%s: " PROGRAM ", the owner of the device, cannot "
+			"be started: %s; install it beside this program or "
+			"in PATH",
+			where, strerror(rc));
+	if (!status)
+		return 0;
+	return incise_error_set(err, EIO, "%.490s",
+				*line ? line : "incise device ended without a reason");
+}
