@@ -255,9 +255,10 @@ static void add_haptic(struct doctor *doctor, struct incise_rig *rig)
 	    "incise help rig.conf", "%s; buttons: %d, pressed: %#x",
 	    handle.last.flags ? "it reports a fault, or is not ready" : "ready",
 	    handle.info.buttons, handle.last.buttons);
-	if (*handle.info.filters || *handle.info.note)
-		add(doctor, "devices", "settings", OK, NULL, "its own: %s%s%s",
-		    handle.info.filters, *handle.info.note ? "; " : "", handle.info.note);
+	if (*handle.info.filters)
+		add(doctor, "devices", "filters", OK, NULL, "%s", handle.info.filters);
+	if (*handle.info.note)
+		add(doctor, "devices", "note", OK, NULL, "%s", handle.info.note);
 	free(handle.samples);
 }
 

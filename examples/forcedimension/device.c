@@ -3,8 +3,8 @@
 /*
  * device NAME PEAK_N: an omega, delta, sigma or lambda of Force Dimension for `--rig local:NAME`.
  *
- *     cc -I/usr/include device.c -ldhd -lm -o device        with the headers of the SDK 3.x; c++ for
- *     ./device omega 12                                      those that are C++ by their defaults
+ *     cc -D_GNU_SOURCE device.c -ldhd -lm -o device     with the SDK 3.x; by c++ where its header is
+ *     ./device omega 12                                 C++, by its default arguments
  *
  * The names are those of the SDK's public documentation (metres, newtons). PEAK_N is the largest force by the
  * device's data sheet, which the SDK does not tell. The device is initialised by hand, as its manual says.

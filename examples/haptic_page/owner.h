@@ -70,8 +70,9 @@ static void owner_sample(struct owner *owner, struct incise_haptic_page_sample *
 {
 	sample->t_ns = owner->half.heartbeat_ns = now_ns();
 	sample->sequence = sample->number = owner->half.samples++;
-	incise_haptic_page_put(&owner->page->ring[sample->number % INCISE_HAPTIC_PAGE_RING],
-			       sample, sizeof(*sample));
+	incise_haptic_page_put(
+		&owner->page->ring[sample->number % INCISE_HAPTIC_PAGE_RING], sample,
+		sizeof(*sample));
 	incise_haptic_page_put(&owner->page->owner, &owner->half, sizeof(owner->half));
 	if (!sample->number)
 		incise_haptic_page_publish(owner->page, (uint32_t)getpid());
@@ -118,9 +119,10 @@ static void owner_force(struct owner *owner, double peak_N, double force_N[3])
 	for (i = 0; i < 3; i++)
 		length = hypot(length, owner->user.force_N[i]);
 	for (i = 0; i < 3; i++)
-		force_N[i] = owner->share > 0 ? owner->share * owner->user.force_N[i] *
-							(length > peak_N ? peak_N / length : 1)
-					      : 0;
+		force_N[i] = owner->share > 0
+				     ? owner->share * owner->user.force_N[i] *
+					       (length > peak_N ? peak_N / length : 1)
+				     : 0;
 }
 
 /* End with a reason; @state INCISE_HAPTIC_PAGE_ENDED or _FAILED. */
@@ -144,8 +146,8 @@ static void quaternion_of(const double r[3][3], double q[4])
 	if (r[0][0] + r[1][1] + r[2][2] > 0) {
 		q[0] = 1 + r[0][0] + r[1][1] + r[2][2];
 		for (i = 0; i < 3; i++)
-			q[1 + i] = r[(i + 2) % 3][(i + 1) % 3] -
-				   r[(i + 1) % 3][(i + 2) % 3];
+			q[1 + i] =
+				r[(i + 2) % 3][(i + 1) % 3] - r[(i + 1) % 3][(i + 2) % 3];
 	} else {
 		q[0] = r[b][a] - r[a][b];
 		q[1 + k] = 1 + r[k][k] - r[a][a] - r[b][b];

@@ -3,7 +3,7 @@
 /*
  * device NAME: a Touch, Touch X or Phantom of 3D Systems for `--rig local:NAME`.
  *
- *     cc device.c -lHD -lm -o device        with OpenHaptics 3.4 for Linux
+ *     cc -D_GNU_SOURCE device.c -lHD -lm -o device        with OpenHaptics 3.4 for Linux
  *     ./device touch
  *
  * The names are those of OpenHaptics' public documentation (mm, mm/s, newtons; x right, y up, z to the user).
