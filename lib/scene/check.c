@@ -180,8 +180,8 @@ static void advise(struct incise_plan *plan, const struct incise_tracker_info *t
 			 damping > 0 ? ", or " : "");
 	if (damping > 0)
 		snprintf(text + strlen(text), 200 - strlen(text),
-			 "use a device with device.damping_N_s_mm of at least %.3g",
-			 damping);
+			 "use a device with %s.damping_N_s_mm of at least %.3g",
+			 tracker->haptic ? "haptic_setup" : "device", damping);
 	if (!*text)
 		snprintf(text, 200,
 			 "no gain down to %.3g holds, and no damping of the device up "
