@@ -616,6 +616,7 @@ static void print(const struct doctor *doctor)
 	}
 	printf("\n%s, %s\n", cli_count(count_doctor(doctor, PROBLEM), "problem"),
 	       cli_count(count_doctor(doctor, WARNING), "warning"));
+	cli_written();
 }
 
 static json_t *make_doctor_json(const struct doctor *doctor)
@@ -698,6 +699,8 @@ int main(int argc, char **argv)
 	check_display(&doctor);
 	check_calibration(&doctor);
 	check_disk(&doctor);
+	if (doctor.asked && !doctor.has_haptic)
+		cli_fail("--protocol: the rig has no haptic device; name one by --rig");
 	if (doctor.report)
 		write_report(&doctor);
 	if (doctor.json)

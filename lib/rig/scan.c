@@ -8,8 +8,10 @@
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 #include <incise/scan.h>
+#include "../base/monotonic.h"
 #include "backends.h"
 #include "haptic_page.h"
 
@@ -80,11 +82,12 @@ static int find_any(struct incise_loaded *loaded, struct kind_found *of, const c
 #define PAGES "/dev/shm"
 #define PAGE "incise-"
 
-/* A page that somebody's own process serves; its owner may have died. */
+/* A page of this user, which somebody's own process serves; its owner may have died. */
 static int scan_page(const char *name, incise_scan_found *found, void *context)
 {
-	struct incise_scan_device device = {.usable = true, .kind = "haptic"};
+	struct incise_scan_device device = {.kind = "haptic"};
 	struct incise_haptic_page page;
+	struct stat st = {0};
 	char path[300];
 	ssize_t size = 0;
 	int fd;
@@ -92,15 +95,19 @@ static int scan_page(const char *name, incise_scan_found *found, void *context)
 	snprintf(path, sizeof(path), PAGES "/%.255s", name);
 	fd = open(path, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
 	if (fd >= 0) {
-		size = pread(fd, &page, sizeof(page), 0);
+		if (!fstat(fd, &st) && st.st_uid == geteuid())
+			size = pread(fd, &page, sizeof(page), 0);
 		close(fd);
 	}
 	if (size != sizeof(page) ||
 	    memcmp(page.head.magic, INCISE_HAPTIC_PAGE_MAGIC, sizeof(page.head.magic)) ||
 	    strncmp(page.device.device, HAPTIC_PAGE_LOCAL, strlen(HAPTIC_PAGE_LOCAL)))
 		return 0;
+	device.usable =
+		incise_monotonic_ns() - page.owner.heartbeat_ns < INCISE_HAPTIC_PAGE_DEAD_NS;
 	snprintf(device.device, sizeof(device.device), "%.255s", page.device.device);
-	snprintf(device.what, sizeof(device.what), "%.63s", page.device.name);
+	snprintf(device.what, sizeof(device.what), "%.63s%s", page.device.name,
+		 device.usable ? "" : ": its owner has died; start it again");
 	return found(context, &device);
 }
 

@@ -56,14 +56,17 @@ serve() { # ARGUMENT…
 }
 
 # bats test_tags=check
-@test "forcedimension: a stand-in's metres become millimetres, its owner ends at SIGTERM" {
+@test "forcedimension: a stand-in's metres become millimetres, a dead owner is told" {
 	compile forcedimension
 	serve 12
 	incise doctor --rig "local:$id" --report r.json >out || :
 	grep -q "haptic = \"local:$id\";    # stub of dhd" out
 	[ "$(key r.json haptic.peak_N)" = 12.0 ] || [ "$(key r.json haptic.peak_N)" = 12 ]
-	kill "$device"
-	await ended
+	kill -9 "$device"
+	sleep 1.1
+	incise info devices >out
+	grep -q "stub of dhd: its owner has died" out
+	rm "/dev/shm/incise-$id"
 	run -2 --separate-stderr ./device "$id"
 	[[ "$stderr" == *"usage:"*"PEAK_N"* ]]
 }
