@@ -10,7 +10,8 @@ setup() {
 }
 
 teardown() {
-	[ -z "${device:-}" ] || kill "$device" 2>/dev/null || :
+	[ -z "${device:-}" ] || kill -9 "$device" 2>/dev/null || :
+	rm -f "/dev/shm/incise-$id"
 }
 
 # As C, and as C++, which a header with default arguments needs.
