@@ -103,8 +103,8 @@ static int scan_page(const char *name, incise_scan_found *found, void *context)
 	    memcmp(page.head.magic, INCISE_HAPTIC_PAGE_MAGIC, sizeof(page.head.magic)) ||
 	    strncmp(page.device.device, HAPTIC_PAGE_LOCAL, strlen(HAPTIC_PAGE_LOCAL)))
 		return 0;
-	device.usable =
-		incise_monotonic_ns() - page.owner.heartbeat_ns < INCISE_HAPTIC_PAGE_DEAD_NS;
+	device.usable = incise_monotonic_ns() - page.owner.heartbeat_ns <
+			INCISE_HAPTIC_PAGE_DEAD_NS;
 	snprintf(device.device, sizeof(device.device), "%.255s", page.device.device);
 	snprintf(device.what, sizeof(device.what), "%.63s%s", page.device.name,
 		 device.usable ? "" : ": its owner has died; start it again");
