@@ -36,6 +36,7 @@ tick.i: ## the stages of a tick for each kind of numbers, preprocessed, in build
 
 hidden := $(O)/obj/lib/hidden.a
 crypto_objects := $(O)/obj/lib/base/crypto/sha256.o
+$(crypto_objects): pc_cflags = $(shell $(PKG_CONFIG) --cflags libcrypto)
 define library
 pc_flags_$1 = $$(if $$(pc_$1),$$(shell $$(PKG_CONFIG) --cflags $$(pc_$1)))
 pc_libs_$1 = $$(if $$(pc_$1),$$(shell $$(PKG_CONFIG) --libs $$(pc_$1)))

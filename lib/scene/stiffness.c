@@ -227,7 +227,8 @@ static void set_delay(struct incise_plan *plan, const struct incise_tracker_info
 	double ticks = ceil(late_s / device->period_s - 1e-9);
 
 	/* A haptic device says its own. */
-	plan->stability.own_delay = plan->scene->device.delay_ticks >= 0 && !tracker->haptic;
+	plan->stability.own_delay =
+		plan->scene->device.delay_ticks >= 0 && !tracker->haptic;
 	device->delay_ticks = plan->stability.own_delay ? plan->scene->device.delay_ticks
 							: (int)fmin(ticks, INT_MAX);
 }

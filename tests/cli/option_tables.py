@@ -107,7 +107,7 @@ VALUES = """
 --repeat calibrate stepper | 2 100 | 1 101 {}
 --revoked | file |
 --ridge | 0 1e12 | -1 nan small {}
---report | a.json | a.odd {}
+--report | a.json | a.odd
 --rig | sim: any.conf |
 --ros2 | neck /lab/neck_2 neck,domain=0 neck,domain=232,interface=lo | {} 2neck a//b a/ a-b neck,domain=233 neck,interface=nosuch0 neck,nosuch=1 neck,domain
 --scale | 0.5g 1kg | -1 1mm {}

@@ -67,7 +67,11 @@ int handle_await_press(struct handle *handle, struct incise_error *err)
 		if (handle->pressed || poll(&input, 1, 0) <= 0)
 			continue;
 		handle->pressed = fgets(line, sizeof(line), stdin);
-		input.fd = handle->pressed ? input.fd : -1;
+		input.fd = -1; /* not read again at its end */
+		if (!handle->pressed && !handle->info.buttons)
+			rc = incise_error_set(err, ENODATA,
+					      "the input ended, and %s has no button",
+					      handle->info.name);
 	}
 	return rc;
 }

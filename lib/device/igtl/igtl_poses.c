@@ -20,8 +20,6 @@
 #define LIMIT_MM 1e6
 /* Limit of products of columns: a sender may print three digits; a scale of 1 % is an error. */
 #define ORTHONORMAL 2e-3
-#define WINDOW_NS INT64_C(5000000000)
-#define DELAY_MAX_NS INT64_C(1000000000) /* more is another clock, not a delay */
 #define POSES_LEAST 5
 #define SLIP 2 /* periods */
 
@@ -81,7 +79,8 @@ int igtl_poses_reconnected(struct igtl_poses *poses)
 	poses->stream = stream;
 	incise_pace_broken(&poses->pace);
 	poses->restarted = poses->n;
-	poses->is_mapped = poses->refused = false;
+	poses->refused = false;
+	poses->clock = (struct incise_sender_clock){0};
 	poses->stamp_ns = 0;
 	return 0;
 }
@@ -92,36 +91,6 @@ static void lose(struct igtl_poses *poses, uint64_t n)
 {
 	poses->seq += n;
 	atomic_fetch_add_explicit(&poses->lost, n, memory_order_relaxed);
-}
-
-/* The clock of the sender was set, or it is the first timestamp. */
-static void map_anew(struct igtl_poses *poses, int64_t t_ns, int64_t offset_ns)
-{
-	poses->is_mapped = true;
-	poses->window_ns = t_ns;
-	poses->least_ns[0] = poses->least_ns[1] = offset_ns;
-}
-
-/* Wall clocks of 1970 to 2106 and a monotonic one: no difference overflows. */
-static int64_t map(struct igtl_poses *poses, int64_t stamp_ns, int64_t t_ns)
-{
-	int64_t offset_ns = t_ns - stamp_ns, least_ns;
-
-	if (!poses->is_mapped || stamp_ns < poses->stamp_ns)
-		map_anew(poses, t_ns, offset_ns);
-	if (t_ns - poses->window_ns > WINDOW_NS) {
-		poses->window_ns = t_ns;
-		poses->least_ns[1] = poses->least_ns[0];
-		poses->least_ns[0] = offset_ns;
-	}
-	if (offset_ns < poses->least_ns[0])
-		poses->least_ns[0] = offset_ns;
-	least_ns = poses->least_ns[1] < poses->least_ns[0] ? poses->least_ns[1]
-							   : poses->least_ns[0];
-	if (offset_ns - least_ns <= DELAY_MAX_NS)
-		return stamp_ns + least_ns;
-	map_anew(poses, t_ns, offset_ns);
-	return t_ns;
 }
 
 /* --- poses --- */
@@ -217,7 +186,7 @@ static void take_igtl_poses(struct igtl_poses *poses, const double (*matrix)[4],
 	if (matrix)
 		note_pose(poses, matrix);
 	if (stamp_ns && !poses->coarse)
-		sample.t_ns = map(poses, stamp_ns, t_ns);
+		sample.t_ns = incise_sender_time(&poses->clock, stamp_ns, t_ns);
 	poses->stamp_ns = stamp_ns;
 	if (poses->n && sample.t_ns <= poses->last_ns)
 		sample.t_ns = poses->last_ns + 1;

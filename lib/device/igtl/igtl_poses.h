@@ -5,14 +5,8 @@
  *   bytes -> incise_igtl_stream -> TRANSFORM, POSITION or TDATA of the device -> rotation to
  *   quaternion -> time -> seq and losses -> flag, offset, mm -> ring -> reader
  *
- * Time: the sender's timestamps are of its own wall clock, and arrivals are late by the network.
- * The least of arrival less timestamp, of the last 5 to 10 s, maps the timestamps to the clock
- * here: a sample's time is that of an arrival that no network delayed. Without timestamps it is
- * the arrival.
- *
- *   arrival - timestamp |   o      o                o
- *                       | o   o o     o o  o  o  o      least of 10 s: the offset
- *                       '-------------------------------> time
+ * The sender's timestamps are mapped to the clock here, see sender_clock.h; without them a
+ * sample's time is its arrival.
  *
  * Without thread, clock or socket, so that tests have their own time, in ns.
  */
@@ -23,6 +17,7 @@
 #include <incise/tracker.h>
 #include "../../base/ring.h"
 #include "../../rig/pace.h"
+#include "../../rig/sender_clock.h"
 #include "../../rig/tracker_feed.h"
 #include "igtl_message.h"
 
@@ -47,9 +42,8 @@ struct igtl_poses {
 	/* Poses so far, and times of the first and the last one. */
 	uint64_t n;
 	int64_t first_ns, last_ns;
-	/* Timestamps: of the last pose; arrival less timestamp, least of two windows of 5 s. */
-	int64_t stamp_ns, window_ns, least_ns[2];
-	bool is_mapped;
+	int64_t stamp_ns; /* of the last pose */
+	struct incise_sender_clock clock;
 	double matrix[3][4]; /* of the last pose */
 	bool coarse; /* other poses came with an equal timestamp: arrivals are used */
 	uint64_t damaged; /* messages with a wrong CRC before igtl_poses_start() */

@@ -9,10 +9,6 @@
  * After that, and after 10 s without any message, read() returns -ENODEV for good.
  */
 #include <errno.h>
-#include <limits.h>
-#include <netdb.h>
-#include <netinet/in.h>
-#include <netinet/tcp.h>
 #include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -22,13 +18,13 @@
 #include <unistd.h>
 #include "../../base/monotonic.h"
 #include "../../rig/backends.h"
+#include "../../rig/server_link.h"
 #include "../../rig/thread.h"
 #include "../../rig/tracker_feed.h"
 #include "igtl_poses.h"
 
 #define MS INT64_C(1000000)
 #define PORT 18944
-#define CONNECT_MS 2000
 #define FIRST_MS 5000  /* for enough poses to know the rate */
 #define LEARN_NS 5e8   /* of poses */
 #define RATE_LEAST 1.0 /* of a tracker, Hz */
@@ -36,17 +32,13 @@
 #define RETRY_MS 250
 #define GONE_MS 10000
 #define CHUNK 65536
-#define HOST_MAX 256
 
 struct igtl_tracker {
 	struct tracker_feed feed; /* first */
 	struct igtl_poses poses;
-	char host[HOST_MAX], port[8];
+	struct server_link link;
 	char name[64];
-	struct sockaddr_storage address;
-	socklen_t address_n;
 	double rate_hz;
-	int fd, stop; /* socket, or -1; eventfd */
 	pthread_t thread;
 	bool runs;
 	uint8_t bytes[CHUNK];
@@ -59,80 +51,18 @@ static struct igtl_tracker *igtl_tracker_of(const struct incise_tracker *tracker
 
 /* --- connection --- */
 
-/* Until @fd has @events, it is to stop (-ECANCELED), or @ms are over (0). 1: ready. */
-static int wait_for(const struct igtl_tracker *t, int fd, short events, int64_t ms)
-{
-	struct pollfd on[2] = {{.fd = t->stop, .events = POLLIN},
-			       {.fd = fd, .events = events}};
-	int n = poll(on, 2, ms < 0 ? 0 : ms > INT_MAX ? INT_MAX : (int)ms);
-
-	if (n > 0 && on[0].revents)
-		return -ECANCELED;
-	return n > 0;
-}
-
-/* A peer that lost its power or its cable does not close: the kernel asks it, and gives up. */
-static void watch_peer(int fd)
-{
-	static const struct {
-		int level, option, value;
-	} options[] = {
-		{SOL_SOCKET, SO_KEEPALIVE, 1},	{IPPROTO_TCP, TCP_NODELAY, 1},
-		{IPPROTO_TCP, TCP_KEEPIDLE, 2}, {IPPROTO_TCP, TCP_KEEPINTVL, 1},
-		{IPPROTO_TCP, TCP_KEEPCNT, 3},
-	};
-
-	/* An error leaves the silence, which ends it later. */
-	for (size_t i = 0; i < sizeof(options) / sizeof(*options); i++)
-		setsockopt(fd, options[i].level, options[i].option, &options[i].value,
-			   sizeof(options[i].value));
-}
-
-/* 0 or -errno. */
-static int connect_server(struct igtl_tracker *t)
-{
-	int fd = socket(t->address.ss_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK,
-			0);
-	socklen_t size = sizeof(int);
-	int rc, code = 0;
-
-	if (fd < 0)
-		return -errno;
-	rc = connect(fd, (const struct sockaddr *)&t->address, t->address_n) ? -errno : 0;
-	if (rc == -EINPROGRESS) {
-		rc = wait_for(t, fd, POLLOUT, CONNECT_MS);
-		rc = rc == 1 ? 0 : rc ? rc : -ETIMEDOUT;
-		if (!rc && !getsockopt(fd, SOL_SOCKET, SO_ERROR, &code, &size))
-			rc = -code;
-	}
-	if (rc) {
-		close(fd);
-		return rc;
-	}
-	watch_peer(fd);
-	t->fd = fd;
-	return 0;
-}
-
-static void disconnect(struct igtl_tracker *t)
-{
-	if (t->fd >= 0)
-		close(t->fd);
-	t->fd = -1;
-}
-
 /*
  * Receive for at most @ms. 1: something came; 0: nothing; -ECANCELED; -EPIPE (it was closed),
  * -EPROTO, or another errno of the connection.
  */
 static int receive_igtl_tracker(struct igtl_tracker *t, int64_t ms)
 {
-	int rc = wait_for(t, t->fd, POLLIN, ms);
+	int rc = server_link_wait(&t->link, t->link.fd, POLLIN, ms);
 	ssize_t n;
 
 	if (rc <= 0)
 		return rc;
-	n = recv(t->fd, t->bytes, sizeof(t->bytes), 0);
+	n = recv(t->link.fd, t->bytes, sizeof(t->bytes), 0);
 	if (n < 0)
 		return errno == EAGAIN || errno == EINTR ? 0 : -errno;
 	if (!n)
@@ -148,12 +78,12 @@ static bool recover(struct igtl_tracker *t)
 {
 	int64_t until_ns = incise_monotonic_ns() + GONE_MS * MS;
 
-	disconnect(t);
+	server_link_close(&t->link);
 	do {
 		/* -1 is passed over by poll(). */
-		if (wait_for(t, -1, 0, RETRY_MS) < 0)
+		if (server_link_wait(&t->link, -1, 0, RETRY_MS) < 0)
 			return false;
-		if (!connect_server(t))
+		if (!server_link_connect(&t->link))
 			return !igtl_poses_reconnected(&t->poses);
 	} while (incise_monotonic_ns() < until_ns);
 	return false;
@@ -227,13 +157,13 @@ static void tracker_close(struct incise_tracker *tracker)
 	uint64_t one = 1;
 
 	if (t->runs) {
-		while (write(t->stop, &one, sizeof(one)) < 0 && errno == EINTR)
+		while (write(t->link.stop, &one, sizeof(one)) < 0 && errno == EINTR)
 			;
 		pthread_join(t->thread, NULL);
 	}
-	disconnect(t);
-	if (t->stop >= 0)
-		close(t->stop);
+	server_link_close(&t->link);
+	if (t->link.stop >= 0)
+		close(t->link.stop);
 	igtl_poses_free(&t->poses);
 	free(t);
 }
@@ -253,62 +183,23 @@ static int parse_igtl_tracker(struct igtl_tracker *t, const char *arguments,
 			      const char **device, const char *where,
 			      struct incise_error *err)
 {
-	bool bracket = *arguments == '[';
-	const char *host = arguments + bracket;
-	size_t host_n = strcspn(host, bracket ? "]" : ":");
-	const char *port = host + host_n + (bracket && host[host_n]);
-	size_t port_n = *port == ':' ? strcspn(port + 1, ":") : 0;
-	bool bad = !host_n || (bracket && !host[host_n]) || host_n >= sizeof(t->host) ||
-		   (*port && *port != ':') || (*port && !port_n) ||
-		   port_n >= sizeof(t->port);
-	long number = bad || !port_n ? PORT : strtol(port + 1, NULL, 10);
+	const char *rest = "";
+	int rc = server_link_parse(&t->link, arguments, PORT, &rest);
 
-	*device = port_n && port[1 + port_n] ? port + 2 + port_n : "";
-	if (port_n &&
-	    (strspn(port + 1, "0123456789") != port_n || number < 1 || number > 65535))
+	*device = *rest ? rest + 1 : "";
+	if (rc == -ERANGE)
 		return incise_error_set(
 			err, EINVAL,
 			"%s: \"%.80s\": the port is not a number from 1 to "
 			"65535; correct it",
 			where, arguments);
-	bad |= strlen(*device) > IGTL_HEADER_NAME_SIZE ||
-	       (port_n && port[1 + port_n] && !**device);
-	if (bad)
+	if (rc || strlen(*device) > IGTL_HEADER_NAME_SIZE || (*rest && !**device))
 		return incise_error_set(
 			err, EINVAL,
 			"%s: \"%.80s\": expected igtl:HOST:PORT:DEVICE with a name of at most "
 			"%d letters, such as igtl:localhost:18944:StylusToTracker; correct it",
 			where, arguments, IGTL_HEADER_NAME_SIZE);
-	snprintf(t->host, sizeof(t->host), "%.*s", (int)host_n, host);
-	snprintf(t->port, sizeof(t->port), "%ld", number);
 	return 0;
-}
-
-/* Each address of the host, until one accepts. */
-static int find_server(struct igtl_tracker *t, const char *where,
-		       struct incise_error *err)
-{
-	struct addrinfo hints = {.ai_socktype = SOCK_STREAM}, *found = NULL, *one;
-	int rc = getaddrinfo(t->host, t->port, &hints, &found), failed = -ENODEV;
-
-	if (rc)
-		return incise_error_set(
-			err, ENODEV,
-			"%s: the host %.100s cannot be found: %s; correct its name",
-			where, t->host, gai_strerror(rc));
-	for (one = found; one && t->fd < 0; one = one->ai_next) {
-		memcpy(&t->address, one->ai_addr, one->ai_addrlen);
-		t->address_n = one->ai_addrlen;
-		failed = connect_server(t);
-	}
-	freeaddrinfo(found);
-	return t->fd >= 0
-		       ? 0
-		       : incise_error_set(
-				 err, -failed,
-				 "%s: %.100s port %s: %s; start its OpenIGTLink server, "
-				 "and check host and port",
-				 where, t->host, t->port, strerror(-failed));
 }
 
 static int no_poses(const struct igtl_tracker *t, const char *where,
@@ -326,30 +217,31 @@ static int no_poses(const struct igtl_tracker *t, const char *where,
 			err, EBADMSG,
 			"%s: the messages of the server at %.100s port %s have a wrong "
 			"checksum (CRC-64); use another version of it",
-			where, t->host, t->port);
+			where, t->link.host, t->link.port);
 	if (!poses->messages)
 		return incise_error_set(
 			err, EIO,
 			"%s: the server at %.100s port %s sends no message within "
 			"%d s; start its transmission",
-			where, t->host, t->port, FIRST_MS / 1000);
+			where, t->link.host, t->link.port, FIRST_MS / 1000);
 	if (!*poses->device && poses->n_names > 1)
 		return incise_error_set(
 			err, EINVAL,
 			"%s: the server at %.100s port %s sends several poses: %s; "
 			"name one, as in igtl:HOST:PORT:DEVICE",
-			where, t->host, t->port, list);
+			where, t->link.host, t->link.port, list);
 	if (poses->n >= 2)
 		return incise_error_set(
 			err, EIO,
 			"%s: \"%s\" of the server at %.100s port %s sends less "
 			"than %g or more than %g poses a second; change its rate",
-			where, poses->names[0], t->host, t->port, RATE_LEAST, RATE_MOST);
+			where, poses->names[0], t->link.host, t->link.port, RATE_LEAST,
+			RATE_MOST);
 	return incise_error_set(
 		err, EIO,
 		"%s: the server at %.100s port %s sends no pose \"%s\" within %d "
 		"s; poses come of: %s",
-		where, t->host, t->port, poses->device, FIRST_MS / 1000,
+		where, t->link.host, t->link.port, poses->device, FIRST_MS / 1000,
 		*list ? list : "no device");
 }
 
@@ -360,7 +252,7 @@ static int two_senders(const struct igtl_tracker *t, const char *where,
 		err, EINVAL,
 		"%s: the poses \"%s\" of the server at %.100s port %s go to and fro "
 		"between two places, as of two senders; give each its own name",
-		where, t->poses.device, t->host, t->port);
+		where, t->poses.device, t->link.host, t->link.port);
 }
 
 /* Receive until the rate is known. */
@@ -387,13 +279,13 @@ static int learn_igtl_tracker(struct igtl_tracker *t, const char *where,
 			err, EPROTO,
 			"%s: %.100s port %s does not send OpenIGTLink; correct host "
 			"and port",
-			where, t->host, t->port);
+			where, t->link.host, t->link.port);
 	if (rc < 0)
 		return incise_error_set(
 			err, -rc,
 			"%s: %.100s port %s: the server closed the connection; see "
 			"its messages",
-			where, t->host, t->port);
+			where, t->link.host, t->link.port);
 	return no_poses(t, where, err);
 }
 
@@ -408,15 +300,16 @@ static int begin_igtl_tracker(struct igtl_tracker *t,
 
 	if (rc)
 		return rc;
-	t->stop = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
-	rc = t->stop < 0 ? -errno
-			 : igtl_poses_init(&t->poses,
-					   request->tracker ? request->tracker : &usual,
-					   device);
+	t->link.stop = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+	rc = t->link.stop < 0
+		     ? -errno
+		     : igtl_poses_init(&t->poses,
+				       request->tracker ? request->tracker : &usual,
+				       device);
 	if (rc)
 		return incise_error_set(err, -rc, "%s: %s; end other programs", where,
 					strerror(-rc));
-	rc = find_server(t, where, err);
+	rc = server_link_find(&t->link, "OpenIGTLink", where, err);
 	rc = rc ? rc : learn_igtl_tracker(t, where, err);
 	if (rc)
 		return rc;
@@ -426,7 +319,7 @@ static int begin_igtl_tracker(struct igtl_tracker *t,
 			 t->poses.device);
 	else
 		snprintf(t->name, sizeof(t->name), "OpenIGTLink %s at %.24s",
-			 t->poses.device, t->host);
+			 t->poses.device, t->link.host);
 	rc = incise_thread_start(&t->thread, run_igtl_tracker, t, &real_time);
 	t->runs = !rc;
 	return rc ? incise_error_set(err, -rc,
@@ -451,7 +344,7 @@ static void *tracker_open(const struct incise_backend_request *request,
 	memset(t, 0, sizeof(*t));
 	t->feed.tracker.ops = &ops;
 	t->feed.ring = &t->poses.ring;
-	t->fd = t->stop = -1;
+	t->link.fd = t->link.stop = -1;
 	rc = begin_igtl_tracker(t, request, err);
 	if (!rc)
 		return &t->feed.tracker;
