@@ -435,7 +435,8 @@ static int test_watchdogs(struct moteus *m, const char *where, struct incise_err
 
 /* --- the device ---------------------------------------------------------------------- */
 
-static void get_info(const struct incise_haptic *haptic, struct incise_haptic_info *info)
+static void get_moteus_info(const struct incise_haptic *haptic,
+			    struct incise_haptic_info *info)
 {
 	const struct moteus *m = (const struct moteus *)haptic;
 
@@ -457,12 +458,12 @@ static void get_info(const struct incise_haptic *haptic, struct incise_haptic_in
 		 WATCHDOG_MS);
 }
 
-static uint64_t count_lost(const struct incise_haptic *haptic)
+static uint64_t count_lost_samples(const struct incise_haptic *haptic)
 {
 	return ((const struct moteus *)haptic)->lost;
 }
 
-static int tell_cause(struct incise_haptic *haptic, char *text, size_t size)
+static int tell_moteus_cause(struct incise_haptic *haptic, char *text, size_t size)
 {
 	return snprintf(text, size, "%s", ((struct moteus *)haptic)->cause);
 }
@@ -481,10 +482,10 @@ static void close_moteus(struct incise_haptic *haptic)
 static const struct incise_haptic_ops moteus_ops = {
 	.read = read_moteus,
 	.push = push_moteus,
-	.info = get_info,
-	.lost = count_lost,
+	.info = get_moteus_info,
+	.lost = count_lost_samples,
 	.close = close_moteus,
-	.cause = tell_cause,
+	.cause = tell_moteus_cause,
 };
 
 void *moteus_open_on(const struct can_transport *transport,
