@@ -114,8 +114,8 @@ static INCISE_REALTIME bool is_sample_good(const struct incise_haptic_page_sampl
 }
 
 /* Take the next one; false: it is torn, overwritten or refused. */
-static INCISE_REALTIME bool take_sample(struct haptic_user *user,
-					struct incise_haptic_sample *to)
+static INCISE_REALTIME bool take_slot(struct haptic_user *user,
+				      struct incise_haptic_sample *to)
 {
 	const struct incise_haptic_page_sample *slot =
 		&user->page.map->ring[user->taken % INCISE_HAPTIC_PAGE_RING];
@@ -151,7 +151,7 @@ static INCISE_REALTIME int read_user(struct incise_haptic *haptic,
 	}
 	user->reads = true;
 	for (; user->taken < user->owner.samples && got < n; user->taken++) {
-		if (take_sample(user, &samples[got]))
+		if (take_slot(user, &samples[got]))
 			got++;
 		else
 			user->lost++;

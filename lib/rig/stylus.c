@@ -98,9 +98,9 @@ static INCISE_REALTIME bool is_plain(const struct incise_haptic_sample *sample)
 	return size2 > 0.98 && size2 < 1.02;
 }
 
-static INCISE_REALTIME void take_sample(struct incise_stylus *stylus,
-					const struct incise_haptic_sample *from,
-					struct incise_tracker_sample *to)
+static INCISE_REALTIME void place_sample(struct incise_stylus *stylus,
+					 const struct incise_haptic_sample *from,
+					 struct incise_tracker_sample *to)
 {
 	*to = (struct incise_tracker_sample){
 		.t_ns = from->t_ns + stylus->info.latency_ns,
@@ -134,7 +134,7 @@ static INCISE_REALTIME int read_stylus(struct incise_tracker *tracker,
 		n = SAMPLES;
 	got = incise_haptic_read(stylus->haptic, from, n);
 	for (int i = 0; i < got; i++)
-		take_sample(stylus, &from[i], &samples[i]);
+		place_sample(stylus, &from[i], &samples[i]);
 	return got;
 }
 
