@@ -127,7 +127,7 @@ check-kept: $(kept_programs) ## untrusted bytes: the fuzz targets on kept inputs
 
 # The CAN drive that tests talk to is on python-canopen, in a folder of its own.
 can-drive: ## the CAN drive of the tests, $(O)/tests/can/drive; see tests/can/README.md
-	@tests/venv tests/can $(O)/tests/can 'tests with the CAN drive are skipped' drive selftest
+	@tests/venv tests/can $(O)/tests/can 'tests with the CAN drive are skipped' drive selftest moteus_drive
 
 # The reader of MCAP's own makers, and one of ROS 2, for what is exported.
 mcap-reader: ## other readers for the tests of MCAP, $(O)/tests/mcap/check and ros2
