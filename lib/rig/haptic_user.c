@@ -210,7 +210,8 @@ static void ask_owner(struct haptic_user *user, uint32_t wants)
 
 /* --- the device -------------------------------------------------------------------------- */
 
-static void get_info(const struct incise_haptic *haptic, struct incise_haptic_info *info)
+static void describe_page(const struct incise_haptic *haptic,
+			  struct incise_haptic_info *info)
 {
 	const struct incise_haptic_page_device *from =
 		&((const struct haptic_user *)haptic)->device;
@@ -265,7 +266,7 @@ static void close_user(struct incise_haptic *haptic)
 static const struct incise_haptic_ops ops = {
 	.read = read_user,
 	.push = push_user,
-	.info = get_info,
+	.info = describe_page,
 	.lost = count_lost,
 	.close = close_user,
 	.cause = tell_cause,

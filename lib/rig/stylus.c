@@ -138,8 +138,8 @@ static INCISE_REALTIME int read_stylus(struct incise_tracker *tracker,
 	return got;
 }
 
-static void get_info(const struct incise_tracker *tracker,
-		     struct incise_tracker_info *info)
+static void describe_poses(const struct incise_tracker *tracker,
+			   struct incise_tracker_info *info)
 {
 	const struct incise_stylus *stylus = (const struct incise_stylus *)tracker;
 
@@ -175,7 +175,7 @@ static void close_face(struct incise_tracker *tracker)
 
 static const struct incise_tracker_ops poses = {
 	.read = read_stylus,
-	.info = get_info,
+	.info = describe_poses,
 	.lost = count_lost,
 	.close = close_face,
 	.cause = tell_cause,
