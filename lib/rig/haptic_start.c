@@ -84,7 +84,7 @@ int incise_haptic_start_owner(const char *spec, const char *where,
 	if (!rc) {
 		read_line(fds[0], line, sizeof(line));
 		ready = !strcmp(line, "ready");
-		/* One that is ready outlives this process, or is reaped with it. */
+		/* An owner that is ready outlives this process, or is reaped with it. */
 		while (!ready && waitpid(pid, NULL, 0) < 0 && errno == EINTR)
 			;
 	}

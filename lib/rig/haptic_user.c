@@ -114,8 +114,8 @@ static INCISE_REALTIME bool is_sample_good(const struct incise_haptic_page_sampl
 }
 
 /* Take the next one; false: it is torn, overwritten or refused. */
-static INCISE_REALTIME bool take_sample(struct haptic_user *user,
-					struct incise_haptic_sample *to)
+static INCISE_REALTIME bool take_slot(struct haptic_user *user,
+				      struct incise_haptic_sample *to)
 {
 	const struct incise_haptic_page_sample *slot =
 		&user->page.map->ring[user->taken % INCISE_HAPTIC_PAGE_RING];
@@ -151,7 +151,7 @@ static INCISE_REALTIME int read_user(struct incise_haptic *haptic,
 	}
 	user->reads = true;
 	for (; user->taken < user->owner.samples && got < n; user->taken++) {
-		if (take_sample(user, &samples[got]))
+		if (take_slot(user, &samples[got]))
 			got++;
 		else
 			user->lost++;
@@ -210,7 +210,8 @@ static void ask_owner(struct haptic_user *user, uint32_t wants)
 
 /* --- the device -------------------------------------------------------------------------- */
 
-static void get_info(const struct incise_haptic *haptic, struct incise_haptic_info *info)
+static void describe_page(const struct incise_haptic *haptic,
+			  struct incise_haptic_info *info)
 {
 	const struct incise_haptic_page_device *from =
 		&((const struct haptic_user *)haptic)->device;
@@ -265,7 +266,7 @@ static void close_user(struct incise_haptic *haptic)
 static const struct incise_haptic_ops ops = {
 	.read = read_user,
 	.push = push_user,
-	.info = get_info,
+	.info = describe_page,
 	.lost = count_lost,
 	.close = close_user,
 	.cause = tell_cause,

@@ -162,7 +162,7 @@ static INCISE_REALTIME void place_hand(const struct config *config, double t_s,
 	}
 }
 
-/* What friction leaves of a speed that other forces would give. */
+/* A speed that other forces would give, less friction. */
 static INCISE_REALTIME double rub(const struct config *config, double before, double v,
 				  double mass)
 {
@@ -252,7 +252,7 @@ static INCISE_REALTIME double measure(const struct sim_haptic *sim, int i, doubl
 }
 
 /* The sample at @t_ns of the script, within a step after the device's. */
-static INCISE_REALTIME void take_sample(struct sim_haptic *sim, int64_t t_ns)
+static INCISE_REALTIME void acquire_sample(struct sim_haptic *sim, int64_t t_ns)
 {
 	const struct config *config = &sim->config;
 	double t_s = (double)t_ns * NS, late_ms = config->latency_ms;
@@ -287,7 +287,7 @@ static INCISE_REALTIME void take_samples(struct sim_haptic *sim, int64_t before_
 	int64_t t_ns;
 
 	while ((t_ns = incise_sim_time(sim->n, sim->config.rate_hz)) < before_ns)
-		take_sample(sim, t_ns);
+		acquire_sample(sim, t_ns);
 }
 
 /* Advance to the clock's time. Returns that. */
