@@ -437,9 +437,10 @@ static int open_socket(struct socketcan *s, const struct can_bus_request *reques
 	case EPROTONOSUPPORT:
 		return incise_error_set(
 			err, EAFNOSUPPORT,
-			"%s: this kernel has no CAN sockets; run modprobe can_raw, or "
-			"use a serial adapter as slcan:/dev/ttyACM0",
-			request->where);
+			"%s: this kernel has no CAN sockets; run modprobe can_raw%s",
+			request->where,
+			request->fd ? ""
+				    : ", or use a serial adapter as slcan:/dev/ttyACM0");
 	case EACCES:
 	case EPERM:
 		return incise_error_set(err, EACCES,
