@@ -10,8 +10,8 @@ unit_scripts := udev/stepper-setup
 documents := README.md CHANGELOG.md $(O)/doc/options.md \
 	$(filter-out doc/reference.md,$(wildcard doc/*.md doc/*.svg doc/*.png))
 # Sources of examples, not what was built of them.
-example_files := $(addprefix examples/,README.md Makefile own_loop.c slow_host.c tracker_lines.c haptic_page/device.c mujoco/incise_plugin.c \
-	mujoco/scara.xml sofa/neck.py)
+example_files := $(addprefix examples/,README.md Makefile own_loop.c slow_host.c tracker_lines.c haptic_page/device.c \
+	haptic_page/owner.h openhaptics/device.c forcedimension/device.c mujoco/incise_plugin.c mujoco/scara.xml sofa/neck.py)
 example_scripts := $(addprefix examples/,capture_to_figure.sh learn.py haptic_page/device.py mujoco/robot_cuts_neck.py)
 udev_rules := $(wildcard udev/*.rules)
 sysusers := $(wildcard udev/*.sysusers)

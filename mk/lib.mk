@@ -36,6 +36,7 @@ tick.i: ## the stages of a tick for each kind of numbers, preprocessed, in build
 
 hidden := $(O)/obj/lib/hidden.a
 crypto_objects := $(O)/obj/lib/base/crypto/sha256.o
+$(crypto_objects): pc_cflags = $(shell $(PKG_CONFIG) --cflags libcrypto)
 define library
 pc_flags_$1 = $$(if $$(pc_$1),$$(shell $$(PKG_CONFIG) --cflags $$(pc_$1)))
 pc_libs_$1 = $$(if $$(pc_$1),$$(shell $$(PKG_CONFIG) --libs $$(pc_$1)))
@@ -73,6 +74,7 @@ $(hidden): $(call objects,incise) $(crypto_objects)
 #   modules := tracker_usb tracker_tty   each has all sources of the folder, but
 #   only_MODULE := polhemus_usb          those that only another one has
 #   not_MODULE := gpio_v1                or that it does not want
+#   also_MODULE := can/bus/socketcan     and those of lib/device that begin so
 #   pc_MODULE := libusb-1.0              it needs packages of pkg-config, or
 #   headers_MODULE := jpeglib.h          headers, which the compiler finds with flags_MODULE, and
 #   libs_MODULE := -ljpeg                their libraries
@@ -96,7 +98,7 @@ $(foreach file,$(wildcard lib/*/module.mk lib/*/*/module.mk),$(eval include $(fi
 define add_on
 objects_$1 := $$(patsubst %,$(O)/obj/%.o,$$(filter-out %_settings $$(addprefix $$(folder_$1),$$(not_$1) \
 	$$(foreach other,$$(beside_$1),$$(only_$$(other)))),\
-	$$(basename $$(wildcard $$(addprefix $$(folder_$1),*.c *.cc */*.c */*.cc)))))
+	$$(basename $$(wildcard $$(addprefix $$(folder_$1),*.c *.cc */*.c */*.cc) $$(also_$1:%=lib/device/%*.c)))))
 $$(objects_$1): pc_cflags += $$(flags_$1) \
 	$$(if $$(pc_$1),$$(patsubst -I%,-isystem %,$$(shell $$(PKG_CONFIG) --cflags '$$(pc_$1)')))
 

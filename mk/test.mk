@@ -99,7 +99,8 @@ rest: $(O)/tests/unit/scene/rest_3d ## SEEDS=1..500 [KEEP=FOLDER]: leans on rand
 
 # Fuzz targets by our own changes of the inputs that are kept; see tests/fuzz/mutate.c.
 fuzz_targets := $(patsubst tests/fuzz/%.c,%,$(filter-out tests/fuzz/mutate.c $(if $(filter vision_opencv,$(left_out)),%/vision_frame.c) \
-	$(if $(filter tracker_igtl,$(left_out)),%/igtl_stream.c %/igtl_poses.c),\
+	$(if $(filter tracker_igtl,$(left_out)),%/igtl_stream.c %/igtl_poses.c) \
+	$(if $(filter haptic_haply,$(left_out)),%/haply_frame.c),\
 	$(wildcard tests/fuzz/*.c)))
 kept_programs := $(fuzz_targets:%=$(O)/tests/kept/%)
 kept_objects := $(fuzz_targets:%=$(O)/obj/tests/fuzz/%.o)
@@ -126,7 +127,7 @@ check-kept: $(kept_programs) ## untrusted bytes: the fuzz targets on kept inputs
 
 # The CAN drive that tests talk to is on python-canopen, in a folder of its own.
 can-drive: ## the CAN drive of the tests, $(O)/tests/can/drive; see tests/can/README.md
-	@tests/venv tests/can $(O)/tests/can 'tests with the CAN drive are skipped' drive selftest
+	@tests/venv tests/can $(O)/tests/can 'tests with the CAN drive are skipped' drive selftest moteus_drive
 
 # The reader of MCAP's own makers, and one of ROS 2, for what is exported.
 mcap-reader: ## other readers for the tests of MCAP, $(O)/tests/mcap/check and ros2

@@ -8,7 +8,8 @@ static const struct cli_option options[] = {{0}};
 
 static const struct cli_command command = {
 	.name = "calibrate",
-	.synopsis = "force | depth | tip | delay | stepper | frame | check [OPTIONS]",
+	.synopsis =
+		"force | depth | tip | delay | stepper | frame | torque | check [OPTIONS]",
 	.summary =
 		"Measure scale factors, offsets and delays of the rig, and write them to "
 		"calibration.conf.\n"
@@ -20,6 +21,7 @@ static const struct cli_command command = {
 		"  delay    delays of tracker, force and camera, from a motion\n"
 		"  stepper  force per microstep of the actuator, its backlash and its limits\n"
 		"  frame    place of a haptic device in the scene, from touched points\n"
+		"  torque   friction and cogging of a haptic device along a line\n"
 		"  check    active calibrations, their age, and any that have expired",
 	.options = options,
 	.notes = "'incise calibrate force --help' lists the options of force, and so on.",
@@ -29,12 +31,13 @@ static const struct cli_command command = {
 
 int main(int argc, char **argv)
 {
-	static const char *const names[] = {"force",   "depth", "tip",	 "delay",
-					    "stepper", "frame", "check", NULL};
+	static const char *const names[] = {"force",  "depth",	 "tip",
+					    "delay",  "stepper", "frame",
+					    "torque", "check",	 NULL};
 
 	cli_parse(&command, argc, argv, NULL);
 	if (optind < argc)
 		cli_unknown("calibration", argv[optind], names);
 	cli_usage(
-		"missing subcommand: force, depth, tip, delay, stepper, frame or check");
+		"missing subcommand: force, depth, tip, delay, stepper, frame, torque or check");
 }

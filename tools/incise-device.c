@@ -6,29 +6,29 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
-#include <sys/wait.h>
 #include <unistd.h>
 #include <incise/haptic_owner.h>
 #include <incise/outfile.h>
 #include <incise/realtime.h>
 #include "cli/cli.h"
 
-/* A user that starts an owner is given time to attach. */
+/* A program that starts an owner is given time to attach, a person all of it. */
 #define FIRST_USER_S 5
+#define YEARS_S 1e9
 #define LOG_BUFFER (1 << 20)
 
 struct device_job {
 	const char *rig, *log;
-	bool background, no_rt;
+	bool detach, no_rt;
 };
 
 static const struct cli_option options[] = {
 	{CLI_RIG_OPTION(struct device_job, rig)},
-	{0, "background", NULL,
-	 "return when the device is ready; the owner continues in a session of its own",
-	 CLI_FLAG(struct device_job, background)},
+	{0, "detach", NULL,
+	 "for a program that starts it: print `ready` on standard error, and leave the "
+	 "terminal and its session",
+	 CLI_FLAG(struct device_job, detach)},
 	{0, "log", "FILE",
 	 "write each tick to this CSV file: the age of the user's heartbeat and the "
 	 "force given",
@@ -53,47 +53,6 @@ static const struct cli_command command = {
 	.failure = "the device cannot be opened, or failed",
 };
 
-/* --- background ------------------------------------------------------------------------- */
-
-/*
- * The caller gets the status of the owner's start: 0 when it is ready. The device is opened in the process
- * that keeps it. Returns a descriptor for tell_ready().
- */
-static int go_to_background(void)
-{
-	int fds[2], status;
-	char byte;
-	pid_t pid;
-
-	if (pipe2(fds, O_CLOEXEC))
-		cli_fail("--background: %s", strerror(errno));
-	pid = fork();
-	if (pid < 0)
-		cli_fail("--background: %s", strerror(errno));
-	if (!pid) {
-		close(fds[0]);
-		setsid();
-		return fds[1];
-	}
-	close(fds[1]);
-	if (read(fds[0], &byte, 1) == 1)
-		_exit(0);
-	waitpid(pid, &status, 0);
-	/* The owner has printed the reason. */
-	_exit(1);
-}
-
-static void tell_ready(int fd)
-{
-	int null = open("/dev/null", O_RDWR | O_CLOEXEC);
-
-	for (int i = 0; null >= 0 && i <= STDERR_FILENO; i++)
-		dup2(null, i);
-	if (write(fd, "", 1) != 1)
-		exit(1);
-	close(fd);
-}
-
 /* --- the owner --------------------------------------------------------------------------- */
 
 /* Without the privilege the owner runs all the same, and says so: a text for the user. */
@@ -115,6 +74,15 @@ static const char *prepare_real_time(const struct device_job *job,
 	return "its owner runs with normal scheduling: ticks may be late";
 }
 
+static void leave_terminal(void)
+{
+	int null = open("/dev/null", O_RDWR | O_CLOEXEC);
+
+	fputs("ready\n", stderr);
+	for (int i = 0; null >= 0 && i <= STDERR_FILENO; i++)
+		dup2(null, i);
+}
+
 static void log_tick(FILE *log, const struct incise_haptic_owner_tick *tick)
 {
 	fprintf(log, "%lld,%lld,%lld,%s", (long long)tick->t_ns, (long long)tick->age_ns,
@@ -126,42 +94,21 @@ static void log_tick(FILE *log, const struct incise_haptic_owner_tick *tick)
 	fputc('\n', log);
 }
 
-/* The reason why the owner ends; NULL: it goes on. */
-static const char *find_end(const struct device_job *job,
-			    const struct incise_haptic_owner_tick *tick, double lost_s)
-{
-	double first_s = lost_s > FIRST_USER_S ? lost_s : FIRST_USER_S;
-
-	if (cli_stop)
-		return strsignal(cli_stop);
-	if (tick->end)
-		return "its user asked for that";
-	if (tick->had_user ? tick->unused_s > lost_s
-			   : job->background && tick->unused_s > first_s)
-		return "it had no user any more";
-	return NULL;
-}
-
 /* Returns the reason for the user; NULL: the device failed. */
-static const char *serve_device(const struct device_job *job,
-				struct incise_haptic_owner *owner, FILE *log,
+static const char *serve_device(struct incise_haptic_owner *owner, FILE *log,
 				struct incise_error *err)
 {
 	struct incise_haptic_owner_tick tick = {0};
-	struct incise_haptic_setup setup;
-	const char *end = NULL;
 	int rc;
 
-	incise_haptic_owner_setup(owner, &setup);
-	while (!end) {
+	while (!cli_stop && !tick.end) {
 		rc = incise_haptic_owner_tick(owner, &tick, err);
 		if (rc && rc != -EINTR)
 			return NULL;
 		if (!rc && log)
 			log_tick(log, &tick);
-		end = find_end(job, &tick, setup.lost_s);
 	}
-	return end;
+	return cli_stop ? strsignal(cli_stop) : tick.end;
 }
 
 static FILE *begin_log(struct incise_outfile *file)
@@ -183,7 +130,6 @@ int main(int argc, char **argv)
 	struct incise_haptic_owner *owner;
 	struct incise_outfile *file = NULL;
 	const char *note, *end;
-	int ready = -1;
 
 	/* Before there is another thread. */
 	incise_realtime_prepare();
@@ -194,18 +140,21 @@ int main(int argc, char **argv)
 		cli_usage("unexpected argument '%s'; give one DEVICE", argv[optind + 1]);
 	if (optind < argc)
 		job.rig = argv[optind];
-	if (job.background)
-		ready = go_to_background();
+	if (job.detach)
+		setsid();
 	cli_catch_signals();
 	note = prepare_real_time(&job, &realtime);
 	if (job.log)
 		file = cli_require(incise_outfile_open(job.log, &err), &err);
-	owner = cli_require(incise_haptic_owner_open(cli_rig(job.rig), note, &err), &err);
+	owner = cli_require(incise_haptic_owner_open(cli_rig(job.rig), note,
+						     job.detach ? FIRST_USER_S : YEARS_S,
+						     &err),
+			    &err);
 	if (realtime && incise_realtime_enter(realtime, &err))
 		cli_warn("normal scheduling, ticks may be late: %s", err.text);
-	if (ready >= 0)
-		tell_ready(ready);
-	end = serve_device(&job, owner, file ? begin_log(file) : NULL, &err);
+	if (job.detach)
+		leave_terminal();
+	end = serve_device(owner, file ? begin_log(file) : NULL, &err);
 	incise_haptic_owner_close(owner, end);
 	incise_realtime_free(realtime);
 	if (file && incise_outfile_commit(file, end ? &err : NULL) && end)

@@ -255,9 +255,10 @@ static void add_haptic(struct doctor *doctor, struct incise_rig *rig)
 	    "incise help rig.conf", "%s; buttons: %d, pressed: %#x",
 	    handle.last.flags ? "it reports a fault, or is not ready" : "ready",
 	    handle.info.buttons, handle.last.buttons);
-	if (*handle.info.filters || *handle.info.note)
-		add(doctor, "devices", "settings", OK, NULL, "its own: %s%s%s",
-		    handle.info.filters, *handle.info.note ? "; " : "", handle.info.note);
+	if (*handle.info.filters)
+		add(doctor, "devices", "filters", OK, NULL, "%s", handle.info.filters);
+	if (*handle.info.note)
+		add(doctor, "devices", "note", OK, NULL, "%s", handle.info.note);
 	free(handle.samples);
 }
 
@@ -379,18 +380,14 @@ static void check_rig(struct doctor *doctor)
 
 static int add_attached(void *context, const struct incise_scan_device *device)
 {
-	static const char *const kinds[] = {"tracker", "force", "camera", "haptic",
-					    "stepper"};
 	bool denied = strstr(device->what, strerror(EACCES));
-	size_t kind = 0;
+	bool haptic = device->usable && !strcmp(device->kind, "haptic");
 
-	while (kind < 4 && strcmp(kinds[kind], device->kind))
-		kind++;
-	add(context, "attached", kinds[kind], device->usable ? OK : WARNING,
+	add(context, "attached", cli_text("%s", device->kind),
+	    device->usable ? OK : WARNING,
 	    denied ? "sudo usermod -aG incise $USER    # takes effect at the next login"
 		   : "incise info devices",
-	    kind == 3 && device->usable ? "haptic = \"%s\";    # %s" : "%s: %s",
-	    device->device, device->what);
+	    haptic ? "haptic = \"%s\";    # %s" : "%s: %s", device->device, device->what);
 	return 0;
 }
 
@@ -399,13 +396,9 @@ static void sysfs_text(char *text, size_t size, const char *folder, const char *
 		       const char *name)
 {
 	char *path = cli_text("%s/%s/%s", folder, device, name);
-	FILE *file = fopen(path, "r");
 
-	if (!file || !fgets(text, (int)size, file))
-		*text = '\0';
-	text[strcspn(text, "\n")] = '\0';
-	if (file)
-		fclose(file);
+	*text = '\0';
+	machine_line(path, "", text, (int)size);
 	free(path);
 }
 
@@ -549,20 +542,14 @@ static void check_calibration(struct doctor *doctor)
 		bool due = json_is_true(json_object_get(kind, "due"));
 		char *fix = cli_text("incise calibrate %s", name ? name : "");
 
-		/* The names are those of the report, which is released below. */
-		for (size_t k = 0; name && k < 6; k++) {
-			static const char *const names[] = {"force", "depth",	"tip",
-							    "delay", "stepper", "frame"};
-
-			if (strcmp(name, names[k]))
-				continue;
-			if (due)
-				add(doctor, "calibration", names[k], WARNING, fix, "%s",
-				    why ? why : "due");
-			else
-				add(doctor, "calibration", names[k], OK, NULL,
-				    "%.0f days old", floor(days));
-		}
+		/* The report, with the names, is released below. */
+		name = cli_text("%s", name ? name : "");
+		if (due)
+			add(doctor, "calibration", name, WARNING, fix, "%s",
+			    why ? why : "due");
+		else
+			add(doctor, "calibration", name, OK, NULL, "%.0f days old",
+			    floor(days));
 		free(fix);
 	}
 	json_decref(report);
@@ -629,6 +616,7 @@ static void print(const struct doctor *doctor)
 	}
 	printf("\n%s, %s\n", cli_count(count_doctor(doctor, PROBLEM), "problem"),
 	       cli_count(count_doctor(doctor, WARNING), "warning"));
+	cli_written();
 }
 
 static json_t *make_doctor_json(const struct doctor *doctor)
@@ -711,6 +699,8 @@ int main(int argc, char **argv)
 	check_display(&doctor);
 	check_calibration(&doctor);
 	check_disk(&doctor);
+	if (doctor.asked && !doctor.has_haptic)
+		cli_fail("--protocol: the rig has no haptic device; name one by --rig");
 	if (doctor.report)
 		write_report(&doctor);
 	if (doctor.json)

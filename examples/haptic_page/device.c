@@ -78,7 +78,7 @@ int main(int argc, char **argv)
 	page->device.rate_hz = 1000;
 	page->device.latency_ns = PERIOD_NS;
 	page->device.peak_N = PEAK_N;
-	page->device.mass_kg = 0.1;
+	page->device.mass_kg = 0.1, page->device.damping_N_s_mm = 0.002;
 	page->device.features = INCISE_HAPTIC_PAGE_VELOCITY;
 	snprintf(page->device.name, sizeof(page->device.name), "spring in C");
 	snprintf(page->device.device, sizeof(page->device.device), "local:%s", name);

@@ -21,7 +21,7 @@ VELOCITY = 1
 # behind the sequence lock of each part, which is its first word
 OWNER_HALF = struct.Struct("=IqQQII256s24x")  # state, heartbeat, samples, lost, error, 0, reason
 USER_HALF = struct.Struct("=IIqq3d3d56x")  # seq, wants, heartbeat, period, force, torque
-SAMPLE = struct.Struct("=IQQq3d3d4dI12x")  # flags, number, sequence, time, x, v, q, buttons
+SAMPLE = struct.Struct("=IQqQ3d3d4dII8x")  # 0, number, time, sequence, x, v, q, buttons, flags
 now = time.monotonic_ns
 
 
@@ -79,8 +79,8 @@ def main(name):
     path, page = create(name)
     gate, x, v, n, stop = Gate(), 0.0, 0.0, 0, []
     signal.signal(signal.SIGTERM, lambda *_: stop.append(1))
-    struct.pack_into("=256s64s200s304s15d2q4I", page, DEVICE, f"local:{name}".encode(), b"spring in Python", b"", b"",
-                     *(6 * [0.0]), PEAK_N, 0, 0, 0.1, 0, 0, 0, 1e9 / PERIOD_NS, 0, PERIOD_NS, 0, 0, VELOCITY, 0, 0)
+    struct.pack_into("=256s64s200s304s14d2qd4I", page, DEVICE, f"local:{name}".encode(), b"spring in Python", b"", b"",
+                     *(6 * [0.0]), PEAK_N, 0, 0, 0.1, 0.002, 0, 0, 1e9 / PERIOD_NS, PERIOD_NS, 0, 0, 0, VELOCITY, 0, 0)
     put(page, OWNER, OWNER_HALF, READY, now(), 0, 0, 0, 0, b"")
     struct.pack_into("=4I16I", page, 8, 1, 0, len(page), os.getpid(), *PARTS)
     page[0:8] = b"INCISEHP"  # last: now the page is complete
@@ -88,7 +88,7 @@ def main(name):
         v += (gate.force(get(page)) - 0.2 * x - 0.002 * v) / 0.1
         x += v / 1000
         t = now()
-        put(page, RING + n % 32 * 128, SAMPLE, 0, n, n, t, x, 0, 0, v, 0, 0, 1, 0, 0, 0, 0)
+        put(page, RING + n % 32 * 128, SAMPLE, 0, n, t, n, x, 0, 0, v, 0, 0, 1, 0, 0, 0, 0, 0)
         n += 1
         put(page, OWNER, OWNER_HALF, READY, t, n, 0, 0, 0, b"")
         time.sleep(PERIOD_NS / 1e9)

@@ -4,7 +4,6 @@
  */
 #include <errno.h>
 #include <math.h>
-#include <stddef.h>
 #include <incise/calibrate_frame.h>
 #include "../base/vector.h"
 #include "dense.h"
@@ -23,6 +22,11 @@ struct side {
 	double extent[3]; /* rms along the principal axes, ascending */
 };
 
+struct solution {
+	double q[4], origin_mm[3];
+	double square[INCISE_FRAME_POINTS_MAX], sum; /* of the residuals */
+};
+
 static void center_side(struct side *side, int n)
 {
 	double scatter[9] = {0}, values[3];
@@ -39,16 +43,15 @@ static void center_side(struct side *side, int n)
 		side->extent[k] = sqrt(fmax(0, values[k]));
 }
 
-/* --- the rotation ----------------------------------------------------------------------- */
-
-/* q turns the points of @from nearest to those of @to; its sign makes q[0] at least 0. */
-static void find_turn(const struct side *from, const struct side *to, int n, double q[4])
+/* The turn that brings the device's points nearest to the scene's. */
+static void find_turn(const struct side *device, const struct side *scene, int n,
+		      double q[4])
 {
 	double s[9] = {0}, m[16], values[4], bound = 0;
 
 	for (int i = 0; i < n; i++)
 		for (int k = 0; k < 9; k++)
-			s[k] += from->point[i][k / 3] * to->point[i][k % 3];
+			s[k] += device->point[i][k / 3] * scene->point[i][k % 3];
 	for (int k = 0; k < 9; k++)
 		bound += 3 * fabs(s[k]);
 	/* The lower triangle, made positive by the bound. */
@@ -67,89 +70,75 @@ static void find_turn(const struct side *from, const struct side *to, int n, dou
 		q[k] = m[3] < 0 ? -m[4 * k + 3] : m[4 * k + 3];
 }
 
-/* Sum of squares of the residuals, each into @residual, if that is not NULL. */
-static double sum_residuals(const struct side *from, const struct side *to, int n,
-			    const double q[4], double *residual)
+static void solve_points(const struct side *device, const struct side *scene, int n,
+			 struct solution *s)
 {
-	double sum = 0, r[3];
+	double r[3];
 
+	find_turn(device, scene, n, s->q);
+	s->sum = 0;
 	for (int i = 0; i < n; i++) {
-		v3_rotate(r, q, from->point[i]);
-		v3_sub(r, to->point[i], r);
-		sum += v3_dot(r, r);
-		if (residual)
-			residual[i] = v3_length(r);
+		v3_rotate(r, s->q, device->point[i]);
+		v3_sub(r, scene->point[i], r);
+		s->square[i] = v3_dot(r, r);
+		s->sum += s->square[i];
 	}
-	return sum;
+	v3_rotate(r, s->q, device->middle);
+	v3_sub(s->origin_mm, scene->middle, r);
 }
 
 static bool fits_mirrored(struct side device, const struct side *scene, int n, double sum)
 {
-	double q[4];
+	struct solution s;
 
 	for (int i = 0; i < n; i++)
 		device.point[i][0] = -device.point[i][0];
-	find_turn(&device, scene, n, q);
-	return sum_residuals(&device, scene, n, q, NULL) <
-	       MIRROR_SHARE * MIRROR_SHARE * sum;
+	solve_points(&device, scene, n, &s);
+	return s.sum < MIRROR_SHARE * MIRROR_SHARE * sum;
 }
 
 /* --- uncertainty ------------------------------------------------------------------------ */
 
+#define MOVE_MM 1e-4 /* of a point, for derivatives */
+
 /* Half of Student's two-sided 95.45 % for 3, 6, 9, 12 degrees of freedom (GUM, table G.2). */
 static const double student[] = {1.653, 1.259, 1.160, 1.116};
 
-/* The further turn, radian, by a change of element @k of a rotation vector by 1 degree. */
-static void differentiate_turn(double to[3], const double phi[3], int k)
+/* Turn and origin; the turn on the side of @near, for half a turn has two axes. */
+static void list_values(const struct solution *s, const double near[4], double values[6])
 {
-	double axis[3] = {k == 0, k == 1, k == 2}, once[3], twice[3];
-	double angle = v3_length(phi), a = 0.5, b = 1.0 / 6;
-
-	if (angle > 1e-3) {
-		a = (1 - cos(angle)) / (angle * angle);
-		b = (angle - sin(angle)) / (angle * angle * angle);
-	}
-	v3_cross(once, phi, axis);
-	v3_cross(twice, phi, once);
-	for (int i = 0; i < 3; i++)
-		to[i] = DEG * (axis[i] + a * once[i] + b * twice[i]);
-}
-
-/* Add the equations of a point, @x away from the device's origin: p = o + x. */
-static void add_normal(double normal[36], const double phi[3], const double x[3])
-{
-	double rows[3][6] = {{0}}, turn[3], moved[3];
+	double dot = s->q[0] * near[0] + v3_dot(s->q + 1, near + 1);
+	double sign = dot < 0 ? -1 : 1, size = v3_length(s->q + 1);
 
 	for (int k = 0; k < 3; k++) {
-		differentiate_turn(turn, phi, k);
-		v3_cross(moved, turn, x);
-		for (int e = 0; e < 3; e++)
-			rows[e][k] = moved[e];
-		rows[k][3 + k] = 1;
+		values[k] = size > 0 ? 2 / DEG * atan2(size, sign * s->q[0]) * sign *
+					       s->q[1 + k] / size
+				     : 0;
+		values[3 + k] = s->origin_mm[k];
 	}
-	for (int e = 0; e < 3; e++)
-		for (int k = 0; k < 36; k++)
-			normal[k] += rows[e][k / 6] * rows[e][k % 6];
 }
 
-static void state_uncertainty(const struct incise_frame_point *points, int n,
-			      const double q[4], double sum, struct incise_frame_fit *fit)
+/* Each coordinate of each point has the same uncertainty, and its own error. */
+static void add_covariance(const struct side *device, const struct side *scene, int n,
+			   const struct solution *s, struct incise_frame_fit *fit)
 {
-	double phi[3], x[3], normal[36] = {0};
+	double at[6], moved[6];
 
-	fit->u_touch_mm = fmax(fit->spread_mm, student[n - INCISE_FRAME_POINTS_MIN] *
-						       sqrt(sum / fit->freedom));
-	for (int k = 0; k < 3; k++)
-		phi[k] = fit->turn_deg[k] * DEG;
-	for (int i = 0; i < n; i++) {
-		v3_rotate(x, q, points[i].device_mm);
-		add_normal(normal, phi, x);
-	}
-	if (!incise_cholesky(normal, 6))
-		return;
-	for (int k = 0; k < 6; k++) {
-		fit->covariance[7 * k] = fit->u_touch_mm * fit->u_touch_mm;
-		incise_cholesky_solve(normal, 6, fit->covariance + 6 * k);
+	list_values(s, s->q, at);
+	for (int i = 0; i < 3 * n; i++) {
+		struct side other = *device;
+		struct solution next;
+
+		other.point[i / 3][i % 3] += MOVE_MM;
+		other.middle[i % 3] += MOVE_MM / n;
+		for (int k = 0; k < n; k++)
+			other.point[k][i % 3] -= MOVE_MM / n;
+		solve_points(&other, scene, n, &next);
+		list_values(&next, s->q, moved);
+		for (int k = 0; k < 36; k++)
+			fit->covariance[k] += (moved[k / 6] - at[k / 6]) *
+					      (moved[k % 6] - at[k % 6]) *
+					      pow(fit->u_touch_mm / MOVE_MM, 2);
 	}
 }
 
@@ -219,7 +208,8 @@ int incise_calibrate_frame(const struct incise_frame_point *points, int n,
 			   struct incise_frame_fit *fit, struct incise_error *err)
 {
 	struct side scene = {0}, device = {0};
-	double q[4], sum, turned[3], size;
+	struct solution s;
+	double values[6];
 	int rc = check_numbers(points, n, err);
 
 	*fit = (struct incise_frame_fit){.freedom = 3 * n - 6};
@@ -237,16 +227,18 @@ int incise_calibrate_frame(const struct incise_frame_point *points, int n,
 		rc = check_shape(&device, n, "the device's frame", err);
 	if (rc)
 		return rc;
-	find_turn(&device, &scene, n, q);
-	sum = sum_residuals(&device, &scene, n, q, fit->residual_mm);
-	fit->rms_mm = sqrt(sum / n);
+	solve_points(&device, &scene, n, &s);
+	list_values(&s, s.q, values);
+	v3_copy(fit->turn_deg, values);
+	v3_copy(fit->origin_mm, s.origin_mm);
+	for (int i = 0; i < n; i++)
+		fit->residual_mm[i] = sqrt(s.square[i]);
+	fit->rms_mm = sqrt(s.sum / n);
 	fit->flat = scene.extent[0] < FLAT_SHARE * scene.extent[2];
 	fit->scale = v3_length(device.extent) / v3_length(scene.extent);
-	size = v3_length(q + 1);
-	for (int k = 0; k < 3 && size > 0; k++)
-		fit->turn_deg[k] = 2 / DEG * atan2(size, q[0]) * q[1 + k] / size;
-	v3_rotate(turned, q, device.middle);
-	v3_sub(fit->origin_mm, scene.middle, turned);
-	state_uncertainty(points, n, q, sum, fit);
-	return judge_frame(fit, !fit->flat && fits_mirrored(device, &scene, n, sum), err);
+	fit->u_touch_mm = fmax(fit->spread_mm, student[n - INCISE_FRAME_POINTS_MIN] *
+						       sqrt(s.sum / fit->freedom));
+	add_covariance(&device, &scene, n, &s, fit);
+	return judge_frame(fit, !fit->flat && fits_mirrored(device, &scene, n, s.sum),
+			   err);
 }

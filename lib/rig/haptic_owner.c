@@ -27,7 +27,7 @@ struct incise_haptic_owner {
 	uint32_t flags; /* of the last sample */
 	int64_t period_ns, next_ns;
 	int64_t look_ns, used_ns; /* next look for a user; when there was one last */
-	bool had_user;
+	double wait_s;		  /* for a user */
 };
 
 /* --- the page ---------------------------------------------------------------------------- */
@@ -52,18 +52,11 @@ static void write_half(struct incise_haptic_owner *owner)
 static void put_sample(struct incise_haptic_owner *owner,
 		       const struct incise_haptic_sample *from)
 {
-	struct incise_haptic_page_sample sample = {
-		.flags = from->flags,
-		.number = owner->half.samples,
-		.sequence = from->seq,
-		.t_ns = from->t_ns,
-		.buttons = from->buttons,
-	};
+	struct incise_haptic_page_sample sample = {.number = owner->half.samples};
 
-	v3_copy(sample.position_mm, from->position_mm);
-	if (v3_finite(from->velocity_mm_s))
-		v3_copy(sample.velocity_mm_s, from->velocity_mm_s);
-	memcpy(sample.quaternion, from->quaternion, sizeof(sample.quaternion));
+	memcpy(&sample.t_ns, from, sizeof(*from));
+	if (!v3_finite(from->velocity_mm_s))
+		memset(sample.velocity_mm_s, 0, sizeof(sample.velocity_mm_s));
 	incise_haptic_page_put(&owner->page.map->ring[sample.number % SAMPLES], &sample,
 			       sizeof(sample));
 	owner->half.samples++;
@@ -79,27 +72,12 @@ static void put_device(struct incise_haptic_owner *owner, const char *device,
 	struct incise_haptic_info info;
 
 	incise_haptic_info(owner->haptic, &info);
-	*to = (struct incise_haptic_page_device){
-		.peak_N = info.peak_N,
-		.continuous_N = info.continuous_N,
-		.torque_N_mm = info.torque_N_mm,
-		.mass_kg = info.mass_kg,
-		.damping_N_s_mm = info.damping_N_s_mm,
-		.coulomb_N = info.coulomb_N,
-		.encoder_mm = info.encoder_mm,
-		.rate_hz = info.rate_hz,
-		.deadman_s = info.deadman_s,
-		.latency_ns = info.latency_ns,
-		.force_latency_ns = info.force_latency_ns,
-		.buttons = (uint32_t)info.buttons,
-		.features =
-			(info.measures_velocity ? INCISE_HAPTIC_PAGE_VELOCITY : 0) |
-			(info.measures_orientation ? INCISE_HAPTIC_PAGE_ORIENTATION : 0) |
-			(info.own_gravity ? INCISE_HAPTIC_PAGE_GRAVITY : 0),
-		.settings = incise_haptic_page_settings(&owner->setup),
-	};
-	v3_copy(to->low_mm, info.low_mm);
-	v3_copy(to->high_mm, info.high_mm);
+	memcpy(to->low_mm, info.low_mm, HAPTIC_PAGE_MIDDLE(incise_haptic_info));
+	to->buttons = (uint32_t)info.buttons;
+	to->features = (info.measures_velocity ? INCISE_HAPTIC_PAGE_VELOCITY : 0) |
+		       (info.measures_orientation ? INCISE_HAPTIC_PAGE_ORIENTATION : 0) |
+		       (info.own_gravity ? INCISE_HAPTIC_PAGE_GRAVITY : 0);
+	to->settings = incise_haptic_page_settings(&owner->setup);
 	snprintf(to->device, sizeof(to->device), "%s", device);
 	snprintf(to->name, sizeof(to->name), "%s", info.name);
 	snprintf(to->filters, sizeof(to->filters), "%s", info.filters);
@@ -123,16 +101,19 @@ static int wait_for_device(struct incise_haptic_owner *owner)
 	return incise_clock_wait_until(owner->clock, owner->next_ns);
 }
 
-/* Look at the lock: a stopped or starting user has no heartbeat. */
-static void look_for_user(struct incise_haptic_owner *owner, int64_t now_ns)
+/* By the lock: a stopped or starting user has no heartbeat. NULL: there is a user, or was one just now. */
+static const char *find_end(struct incise_haptic_owner *owner, int64_t now_ns)
 {
-	if (now_ns < owner->look_ns)
-		return;
-	owner->look_ns = now_ns + LOOK_NS;
-	if (!incise_haptic_page_held(&owner->page, INCISE_HAPTIC_PAGE_USER_BYTE))
-		return;
-	owner->had_user = true;
-	owner->used_ns = now_ns;
+	if (now_ns >= owner->look_ns) {
+		owner->look_ns = now_ns + LOOK_NS;
+		if (incise_haptic_page_held(&owner->page, INCISE_HAPTIC_PAGE_USER_BYTE)) {
+			owner->wait_s = owner->setup.lost_s;
+			owner->used_ns = now_ns;
+		}
+	}
+	return (double)(now_ns - owner->used_ns) > owner->wait_s * INCISE_NS_PER_S
+		       ? "it had no user any more"
+		       : NULL;
 }
 
 static int give_force(struct incise_haptic_owner *owner,
@@ -151,7 +132,8 @@ static int give_force(struct incise_haptic_owner *owner,
 	tick->off = off ? off : "";
 	tick->period_ns = owner->gate.last.period_ns;
 	tick->age_ns = tick->period_ns ? tick->t_ns - owner->gate.last.heartbeat_ns : -1;
-	tick->end = owner->gate.last.wants == INCISE_HAPTIC_PAGE_END;
+	if (owner->gate.last.wants == INCISE_HAPTIC_PAGE_END)
+		tick->end = "its user asked for that";
 	return incise_haptic_push(owner->haptic, tick->force_N, tick->torque_N_mm);
 }
 
@@ -184,9 +166,8 @@ int incise_haptic_owner_tick(struct incise_haptic_owner *owner,
 	if (rc)
 		return fail(owner, rc, err);
 	write_half(owner);
-	look_for_user(owner, tick->t_ns);
-	tick->had_user = owner->had_user;
-	tick->unused_s = (double)(tick->t_ns - owner->used_ns) / INCISE_NS_PER_S;
+	if (!tick->end)
+		tick->end = find_end(owner, tick->t_ns);
 	return 0;
 }
 
@@ -242,6 +223,7 @@ static int check_plan(const struct incise_rig_plan *plan, const char *rig,
 }
 
 struct incise_haptic_owner *incise_haptic_owner_open(const char *rig, const char *note,
+						     double first_s,
 						     struct incise_error *err)
 {
 	struct incise_haptic_owner *owner = calloc(1, sizeof(*owner));
@@ -259,6 +241,7 @@ struct incise_haptic_owner *incise_haptic_owner_open(const char *rig, const char
 		rc = incise_error_set(err, ENOMEM, "%s: %s", rig, strerror(ENOMEM));
 	if (!rc) {
 		owner->setup = plan.haptic;
+		owner->wait_s = fmax(first_s, plan.haptic.lost_s);
 		snprintf(owner->where, sizeof(owner->where), "%s", plan.haptic_where);
 		rc = open_owned_device(owner, plan.haptic_device, note, err);
 	}
@@ -271,18 +254,6 @@ struct incise_haptic_owner *incise_haptic_owner_open(const char *rig, const char
 	free(owner);
 	errno = -rc;
 	return NULL;
-}
-
-void incise_haptic_owner_info(const struct incise_haptic_owner *owner,
-			      struct incise_haptic_info *info)
-{
-	incise_haptic_info(owner->haptic, info);
-}
-
-void incise_haptic_owner_setup(const struct incise_haptic_owner *owner,
-			       struct incise_haptic_setup *setup)
-{
-	*setup = owner->setup;
 }
 
 void incise_haptic_owner_close(struct incise_haptic_owner *owner, const char *reason)

@@ -111,6 +111,21 @@ void incise_haptic_page_close(struct haptic_page *page, bool remove)
 	page->fd = -1;
 }
 
+/* @busy: the meaning of -EBUSY. */
+static int report_page(const struct haptic_page *page, int rc, const char *busy,
+		       const char *where, struct incise_error *err)
+{
+	return incise_error_set(
+		err, -rc, "%s: %s: %s", where, page->path,
+		rc == -EBUSY	? busy
+		: rc == -ENOENT ? "no process serves this device; start it"
+		: rc == -EACCES ? "another user's; run as that user"
+		: rc == -EPROTO ? "not a page of version 1 of incise/haptic_page.h; "
+				  "build the device's process for it"
+		: rc == -EAGAIN ? "its owner does not get ready; end that process"
+				: strerror(-rc));
+}
+
 /* --- the owner's ------------------------------------------------------------------------ */
 
 static int remove_dead(struct haptic_page *page)
@@ -150,12 +165,11 @@ int incise_haptic_page_new(struct haptic_page *page, const char *device,
 	if (!rc)
 		return 0;
 	incise_haptic_page_close(page, false);
-	return incise_error_set(
-		err, -rc, "%s: %s: %s", where, page->path,
-		rc == -EBUSY	? "the device has an owner already; end that process, or "
-				  "use the device through it"
-		: rc == -EACCES ? "another user's; ask that user to end the owner"
-				: strerror(-rc));
+	return report_page(
+		page, rc,
+		"the device has an owner already; end that process, or use the "
+		"device through it",
+		where, err);
 }
 
 /* --- the user's ------------------------------------------------------------------------- */
@@ -210,15 +224,8 @@ int incise_haptic_page_open(struct haptic_page *page, const char *device,
 	if (!rc)
 		return 0;
 	incise_haptic_page_close(page, false);
-	return incise_error_set(
-		err, -rc, "%s: %s: %s", where, page->path,
-		rc == -ENOENT	? "no process serves this device; start it"
-		: rc == -EBUSY	? "another program uses the device; end it"
-		: rc == -EACCES ? "another user's; run as that user"
-		: rc == -EPROTO ? "not a page of version 1 of incise/haptic_page.h; "
-				  "build the device's process for it"
-		: rc == -EAGAIN ? "its owner does not get ready; end that process"
-				: strerror(-rc));
+	return report_page(page, rc, "another program uses the device; end it", where,
+			   err);
 }
 
 uint32_t incise_haptic_page_settings(const struct incise_haptic_setup *setup)

@@ -16,6 +16,18 @@
 #define HAPTIC_PAGE_LOCAL "local:"
 #define HAPTIC_PAGE_TRIES 3 /* of a torn part */
 
+/* The middle of the page's properties is that of struct incise_haptic_info; its samples end like one. */
+#define HAPTIC_PAGE_MIDDLE(part)                             \
+	(offsetof(struct part, deadman_s) + sizeof(double) - \
+	 offsetof(struct part, low_mm))
+_Static_assert(HAPTIC_PAGE_MIDDLE(incise_haptic_info) == 136 &&
+		       HAPTIC_PAGE_MIDDLE(incise_haptic_page_device) == 136,
+	       "14 numbers, 2 times, 1 number");
+_Static_assert(sizeof(struct incise_haptic_sample) == 104 &&
+		       offsetof(struct incise_haptic_page_sample, t_ns) == 16 &&
+		       offsetof(struct incise_haptic_page_sample, reserved) == 16 + 104,
+	       "a sample behind seq and number");
+
 /* An open page, and the lock of this side; with fd -1 there is none. */
 struct haptic_page {
 	char path[96];

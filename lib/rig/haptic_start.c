@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Starting the owner of a haptic device; see haptic_page.h. `incise device --background` ends when the owner,
- * a process of its own session, is ready; or fails with a line on standard error.
+ * Starting the owner of a haptic device; see haptic_page.h. `incise device --detach` prints `ready` on
+ * standard error, which it leaves then, or a line with the reason why it fails.
  */
 #include <errno.h>
-#include <fcntl.h>
+#include <fcntl.h> /* O_CLOEXEC */
 #include <limits.h>
-#include <signal.h>
 #include <spawn.h>
 #include <stdio.h>
 #include <string.h>
@@ -33,38 +32,19 @@ static void find_program(char path[PATH_MAX + 40])
 		strcpy(path, PROGRAM);
 }
 
-/* The signals of this program are not the owner's. Returns 0 or a positive errno. */
+/* Its standard error is @err_fd. Returns 0 or a positive errno. */
 static int spawn_owner(pid_t *pid, const char *path, const char *spec, int err_fd)
 {
-	char *const argv[] = {PROGRAM, "--background", "--rig", (char *)spec, NULL};
+	char *const argv[] = {PROGRAM, "--detach", "--rig", (char *)spec, NULL};
 	posix_spawn_file_actions_t files;
-	posix_spawnattr_t attributes;
-	sigset_t none, all;
-	int rc = posix_spawnattr_init(&attributes);
+	int rc = posix_spawn_file_actions_init(&files);
 
 	if (rc)
 		return rc;
-	rc = posix_spawn_file_actions_init(&files);
-	if (!rc) {
-		sigemptyset(&none);
-		sigfillset(&all);
-		posix_spawnattr_setflags(&attributes,
-					 POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
-		posix_spawnattr_setsigmask(&attributes, &none);
-		posix_spawnattr_setsigdefault(&attributes, &all);
-		rc = posix_spawn_file_actions_addopen(&files, STDIN_FILENO, "/dev/null",
-						      O_RDONLY, 0);
-		if (!rc)
-			rc = posix_spawn_file_actions_addopen(&files, STDOUT_FILENO,
-							      "/dev/null", O_WRONLY, 0);
-		if (!rc)
-			rc = posix_spawn_file_actions_adddup2(&files, err_fd,
-							      STDERR_FILENO);
-		if (!rc)
-			rc = posix_spawnp(pid, path, &files, &attributes, argv, environ);
-		posix_spawn_file_actions_destroy(&files);
-	}
-	posix_spawnattr_destroy(&attributes);
+	rc = posix_spawn_file_actions_adddup2(&files, err_fd, STDERR_FILENO);
+	if (!rc)
+		rc = posix_spawnp(pid, path, &files, NULL, argv, environ);
+	posix_spawn_file_actions_destroy(&files);
 	return rc;
 }
 
@@ -92,7 +72,8 @@ int incise_haptic_start_owner(const char *spec, const char *where,
 			      struct incise_error *err)
 {
 	char path[PATH_MAX + 40], line[2000];
-	int fds[2], status = -1, rc;
+	bool ready = false;
+	int fds[2], rc;
 	pid_t pid;
 
 	find_program(path);
@@ -102,7 +83,9 @@ int incise_haptic_start_owner(const char *spec, const char *where,
 	close(fds[1]);
 	if (!rc) {
 		read_line(fds[0], line, sizeof(line));
-		while (waitpid(pid, &status, 0) < 0 && errno == EINTR)
+		ready = !strcmp(line, "ready");
+		/* An owner that is ready outlives this process, or is reaped with it. */
+		while (!ready && waitpid(pid, NULL, 0) < 0 && errno == EINTR)
 			;
 	}
 	close(fds[0]);
@@ -113,7 +96,7 @@ int incise_haptic_start_owner(const char *spec, const char *where,
 			"be started: %s; install it beside this program or "
 			"in PATH",
 			where, strerror(rc));
-	if (!status)
+	if (ready)
 		return 0;
 	return incise_error_set(err, EIO, "%.490s",
 				*line ? line : "incise device ended without a reason");

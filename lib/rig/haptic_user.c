@@ -27,6 +27,7 @@ struct haptic_user {
 	struct incise_haptic_page_owner owner; /* the last whole one */
 	struct incise_haptic_page_user own;    /* as written last */
 	uint64_t taken, lost;
+	bool reads;	   /* has read */
 	uint32_t flags;	   /* of the last sample */
 	bool refused;	   /* a sample */
 	int rc;		   /* negative errno that ended the stream */
@@ -113,8 +114,8 @@ static INCISE_REALTIME bool is_sample_good(const struct incise_haptic_page_sampl
 }
 
 /* Take the next one; false: it is torn, overwritten or refused. */
-static INCISE_REALTIME bool take_sample(struct haptic_user *user,
-					struct incise_haptic_sample *to)
+static INCISE_REALTIME bool take_slot(struct haptic_user *user,
+				      struct incise_haptic_sample *to)
 {
 	const struct incise_haptic_page_sample *slot =
 		&user->page.map->ring[user->taken % INCISE_HAPTIC_PAGE_RING];
@@ -126,16 +127,9 @@ static INCISE_REALTIME bool take_sample(struct haptic_user *user,
 	user->refused = !is_sample_good(&from, incise_clock_now(user->clock));
 	if (user->refused)
 		return false;
-	*to = (struct incise_haptic_sample){
-		.t_ns = from.t_ns,
-		.seq = from.sequence,
-		.buttons = from.buttons,
-		.flags = from.flags,
-	};
-	v3_copy(to->position_mm, from.position_mm);
-	for (int i = 0; i < 3; i++)
-		to->velocity_mm_s[i] = velocity ? from.velocity_mm_s[i] : (double)NAN;
-	memcpy(to->quaternion, from.quaternion, sizeof(to->quaternion));
+	memcpy(to, &from.t_ns, sizeof(*to));
+	for (int i = 0; i < 3 && !velocity; i++)
+		to->velocity_mm_s[i] = (double)NAN;
 	user->flags = from.flags;
 	return true;
 }
@@ -149,13 +143,15 @@ static INCISE_REALTIME int read_user(struct incise_haptic *haptic,
 
 	if (rc)
 		return rc;
-	/* The owner may write to the slot behind the last one. */
+	/* The owner may write to the slot behind the last one. Before the first read there is no loss. */
 	if (user->owner.samples - user->taken >= kept) {
-		user->lost += user->owner.samples - user->taken - kept + 1;
+		if (user->reads)
+			user->lost += user->owner.samples - user->taken - kept + 1;
 		user->taken = user->owner.samples - kept + 1;
 	}
+	user->reads = true;
 	for (; user->taken < user->owner.samples && got < n; user->taken++) {
-		if (take_sample(user, &samples[got]))
+		if (take_slot(user, &samples[got]))
 			got++;
 		else
 			user->lost++;
@@ -214,30 +210,19 @@ static void ask_owner(struct haptic_user *user, uint32_t wants)
 
 /* --- the device -------------------------------------------------------------------------- */
 
-static void get_info(const struct incise_haptic *haptic, struct incise_haptic_info *info)
+static void describe_page(const struct incise_haptic *haptic,
+			  struct incise_haptic_info *info)
 {
 	const struct incise_haptic_page_device *from =
 		&((const struct haptic_user *)haptic)->device;
 
 	*info = (struct incise_haptic_info){
-		.peak_N = from->peak_N,
-		.continuous_N = from->continuous_N,
-		.torque_N_mm = from->torque_N_mm,
-		.mass_kg = from->mass_kg,
-		.damping_N_s_mm = from->damping_N_s_mm,
-		.coulomb_N = from->coulomb_N,
-		.encoder_mm = from->encoder_mm,
-		.rate_hz = from->rate_hz,
-		.latency_ns = from->latency_ns,
-		.force_latency_ns = from->force_latency_ns,
-		.deadman_s = from->deadman_s,
 		.buttons = (int)from->buttons,
 		.measures_velocity = from->features & INCISE_HAPTIC_PAGE_VELOCITY,
 		.measures_orientation = from->features & INCISE_HAPTIC_PAGE_ORIENTATION,
 		.own_gravity = from->features & INCISE_HAPTIC_PAGE_GRAVITY,
 	};
-	v3_copy(info->low_mm, from->low_mm);
-	v3_copy(info->high_mm, from->high_mm);
+	memcpy(info->low_mm, from->low_mm, HAPTIC_PAGE_MIDDLE(incise_haptic_info));
 	snprintf(info->name, sizeof(info->name), "%s", from->name);
 	snprintf(info->filters, sizeof(info->filters), "%s", from->filters);
 	snprintf(info->note, sizeof(info->note), "%.299s", from->note);
@@ -281,7 +266,7 @@ static void close_user(struct incise_haptic *haptic)
 static const struct incise_haptic_ops ops = {
 	.read = read_user,
 	.push = push_user,
-	.info = get_info,
+	.info = describe_page,
 	.lost = count_lost,
 	.close = close_user,
 	.cause = tell_cause,
@@ -307,9 +292,10 @@ static bool is_device_good(struct incise_haptic_page_device *device)
 		    take_text(device->filters, sizeof(device->filters)) &&
 		    take_text(device->note, sizeof(device->note));
 
-	for (const double *v = values; v <= &device->deadman_s; v++)
+	for (const double *v = values; v <= &device->rate_hz; v++)
 		good = good && isfinite(*v) && (v < values + 6 || *v >= 0);
-	return good && device->rate_hz >= 1 && device->rate_hz <= RATE_MOST_HZ &&
+	return good && isfinite(device->deadman_s) && device->deadman_s >= 0 &&
+	       device->rate_hz >= 1 && device->rate_hz <= RATE_MOST_HZ &&
 	       device->latency_ns >= 0 && device->latency_ns <= INCISE_NS_PER_S &&
 	       device->force_latency_ns >= 0 &&
 	       device->force_latency_ns <= INCISE_NS_PER_S && device->buttons <= 32 &&

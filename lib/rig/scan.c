@@ -2,12 +2,18 @@
 /*
  * Looking for devices behind a backend; see incise/scan.h.
  */
+#include <dirent.h>
 #include <errno.h>
+#include <fcntl.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
 #include <incise/scan.h>
+#include "../base/monotonic.h"
 #include "backends.h"
+#include "haptic_page.h"
 
 /* Adds the kind to each device that a backend finds. */
 struct kind_found {
@@ -73,7 +79,53 @@ static int find_any(struct incise_loaded *loaded, struct kind_found *of, const c
 			     : rc;
 }
 
-/* Each backend of each kind that needs no arguments. */
+#define PAGES "/dev/shm"
+#define PAGE "incise-"
+
+/* A page of this user, which somebody's own process serves; its owner may have died. */
+static int scan_page(const char *name, incise_scan_found *found, void *context)
+{
+	struct incise_scan_device device = {.kind = "haptic"};
+	struct incise_haptic_page page;
+	struct stat st = {0};
+	char path[300];
+	ssize_t size = 0;
+	int fd;
+
+	snprintf(path, sizeof(path), PAGES "/%.255s", name);
+	fd = open(path, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+	if (fd >= 0) {
+		if (!fstat(fd, &st) && st.st_uid == geteuid())
+			size = pread(fd, &page, sizeof(page), 0);
+		close(fd);
+	}
+	if (size != sizeof(page) ||
+	    memcmp(page.head.magic, INCISE_HAPTIC_PAGE_MAGIC, sizeof(page.head.magic)) ||
+	    strncmp(page.device.device, HAPTIC_PAGE_LOCAL, strlen(HAPTIC_PAGE_LOCAL)))
+		return 0;
+	device.usable = incise_monotonic_ns() - page.owner.heartbeat_ns <
+			INCISE_HAPTIC_PAGE_DEAD_NS;
+	snprintf(device.device, sizeof(device.device), "%.255s", page.device.device);
+	snprintf(device.what, sizeof(device.what), "%.63s%s", page.device.name,
+		 device.usable ? "" : ": its owner has died; start it again");
+	return found(context, &device);
+}
+
+static int scan_pages(incise_scan_found *found, void *context)
+{
+	DIR *folder = opendir(PAGES);
+	struct dirent *entry;
+	int rc = 0;
+
+	while (folder && !rc && (entry = readdir(folder)))
+		if (!strncmp(entry->d_name, PAGE, strlen(PAGE)))
+			rc = scan_page(entry->d_name, found, context);
+	if (folder)
+		closedir(folder);
+	return rc;
+}
+
+/* Each backend of each kind that needs no arguments, and the pages. */
 static int scan_all(incise_scan_found *found, void *context)
 {
 	char names[NAMES][32];
@@ -86,7 +138,7 @@ static int scan_all(incise_scan_found *found, void *context)
 		for (int i = 0; i < n && !rc; i++)
 			rc = scan_backend(&of, names[i]);
 	}
-	return rc;
+	return rc ? rc : scan_pages(found, context);
 }
 
 int incise_scan(const char *kind, const char *spec, incise_scan_found *found,

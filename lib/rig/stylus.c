@@ -98,9 +98,9 @@ static INCISE_REALTIME bool is_plain(const struct incise_haptic_sample *sample)
 	return size2 > 0.98 && size2 < 1.02;
 }
 
-static INCISE_REALTIME void take_sample(struct incise_stylus *stylus,
-					const struct incise_haptic_sample *from,
-					struct incise_tracker_sample *to)
+static INCISE_REALTIME void place_sample(struct incise_stylus *stylus,
+					 const struct incise_haptic_sample *from,
+					 struct incise_tracker_sample *to)
 {
 	*to = (struct incise_tracker_sample){
 		.t_ns = from->t_ns + stylus->info.latency_ns,
@@ -134,12 +134,12 @@ static INCISE_REALTIME int read_stylus(struct incise_tracker *tracker,
 		n = SAMPLES;
 	got = incise_haptic_read(stylus->haptic, from, n);
 	for (int i = 0; i < got; i++)
-		take_sample(stylus, &from[i], &samples[i]);
+		place_sample(stylus, &from[i], &samples[i]);
 	return got;
 }
 
-static void get_info(const struct incise_tracker *tracker,
-		     struct incise_tracker_info *info)
+static void describe_poses(const struct incise_tracker *tracker,
+			   struct incise_tracker_info *info)
 {
 	const struct incise_stylus *stylus = (const struct incise_stylus *)tracker;
 
@@ -175,7 +175,7 @@ static void close_face(struct incise_tracker *tracker)
 
 static const struct incise_tracker_ops poses = {
 	.read = read_stylus,
-	.info = get_info,
+	.info = describe_poses,
 	.lost = count_lost,
 	.close = close_face,
 	.cause = tell_cause,

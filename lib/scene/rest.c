@@ -91,6 +91,13 @@ static const enum incise_held held[] = {INCISE_HELD_ACROSS, INCISE_HELD_IN_HAND,
 #define DEEP_MM 80 /* … and so deep, or nearly as deep as there is tissue, it has sunk */
 
 /*
+ * A tool that rests may swing once it is pushed: where tissue unloads, a swing keeps itself up, at any lean, so that
+ * one lean of each way is enough.
+ */
+#define PUSH_MM_S 20 /* along each axis */
+#define PUSHED 10    /* of the leans */
+
+/*
  * Between the leans on a model that are tried there may be worse: forces count as so much larger, and the device's
  * damping as so much smaller. The linear check has such a reserve for springs: for a scene without a model a part of
  * it is left here.
@@ -778,6 +785,19 @@ static struct incise_force_map paid_for(const struct incise_force_map *map)
 	return springs;
 }
 
+/* Lean, and note the run. Returns as lean(). */
+static double lean_noted(struct search *s, struct rest_run *run, int way,
+			 struct incise_rest *rest, double *depth_mm)
+{
+	struct window last;
+	double settle_s = lean(s, run, &last);
+
+	rest->runs++;
+	note_rest(s, run, &last, settle_s, way, rest);
+	*depth_mm = depth_of(s, &last);
+	return settle_s;
+}
+
 /* Without a switch forces are the same on both sides, except for curvature. */
 static bool is_same(const struct incise_force_map *a, const struct incise_force_map *b)
 {
@@ -914,17 +934,20 @@ static bool judge_steps(struct search *s, const struct rest_run *run, double dep
 static bool try(struct search *s, struct rest_run *run, int lean_of, int way,
 		struct incise_rest *rest)
 {
-	struct window last;
-	double settle_s = lean(s, run, &last), depth_mm = depth_of(s, &last);
+	double depth_mm, settle_s = lean_noted(s, run, way, rest, &depth_mm);
 
-	rest->runs++;
-	note_rest(s, run, &last, settle_s, way, rest);
 	s->decides |= depth_mm >= 0;
 	if (!(settle_s > 0))
 		return false;
+	if (s->way.guided || !(depth_mm > 0))
+		return true;
+	if (lean_of == PUSHED) {
+		for (int i = 0; i < 3; i++)
+			run->device[i].velocity_mm_s += PUSH_MM_S;
+		return lean_noted(s, run, way, rest, &depth_mm) > 0;
+	}
 	/* Similar leans have similar loops. */
-	return s->way.guided || !(depth_mm > 0) || lean_of % LOOK_EVERY ||
-	       judge_steps(s, run, depth_mm, way, rest);
+	return lean_of % LOOK_EVERY || judge_steps(s, run, depth_mm, way, rest);
 }
 
 /* All leans of a way. Returns whether they rest. */

@@ -145,10 +145,16 @@ def _uncertainty(word: str) -> int:
     return words.index(word)
 
 
-def _cut_number(number: int) -> int:
-    if not isinstance(number, int) or number < 1:
-        raise Invalid(errno.EINVAL, f"cut {number!r}: cuts have numbers from 1")
-    return number
+def _words(
+    between: Optional[Tuple[float, Optional[float]]] = None, cut: Optional[int] = None
+) -> str:
+    """A part in words, behind those of what it is a part of; refuses what is none."""
+    if between is not None:
+        from_s, to_s = _times(*between)
+        return f", {from_s} s to {f'{to_s} s' if to_s else 'its end'}"
+    if not isinstance(cut, int) or cut < 1:
+        raise Invalid(errno.EINVAL, f"cut {cut!r}: cuts have numbers from 1")
+    return f", cut {cut}"
 
 
 def _limit(limits: Dict[str, Any], from_s: float, to_s: float) -> None:
@@ -191,7 +197,8 @@ class Recording:
         self._checked = False
         self._frames: Optional[int] = None
         self._start_ns: Optional[int] = None
-        self._limits: List[Dict[str, Any]] = []  # all of the part that tables are of
+        self._limits: List[Dict[str, Any]] = []  # all of the part that tables are of …
+        self._words = ""  # … and their words
         self._calibration = load_calibration(calibration) if calibration is not None else None
         self._calibration_path = (
             _library.path_bytes(calibration) if calibration is not None else None
@@ -205,8 +212,9 @@ class Recording:
         except Error as failure:
             return f"<incise.Recording {failure}>"
         seconds = (info.end_ns - info.start_ns) * 1e-9
+        part = f"{self._words}; the whole" if self._words else ""
         return (
-            f"<incise.Recording {self.path}: {info.cuts} cuts in {seconds:.3f} s, rows: "
+            f"<incise.Recording {self.path}{part}: {info.cuts} cuts in {seconds:.3f} s, rows: "
             f"{info.force} force, {info.tracker} tracker, {info.depth} depth>"
         )
 
@@ -288,20 +296,20 @@ class Recording:
     # --- tables --------------------------------------------------------------------------
 
     def _part(self, **limits: Any) -> "Recording":
+        words = self._words + _words(**limits)
         part = Recording(self.path, damaged=self._damaged)
         part._calibration, part._calibration_path = self._calibration, self._calibration_path
-        part._limits = [*self._limits, limits]
+        part._limits, part._words = [*self._limits, limits], words
         return part
 
     def between(self, from_s: float = 0, to_s: Optional[float] = None) -> "Recording":
         """The recording with tables from from_s to before to_s, seconds from its first force sample;
         its info stays that of the whole."""
-        _times(from_s, to_s)
         return self._part(between=(from_s, to_s))
 
     def cut(self, number: int) -> "Recording":
         """The recording with the tables of one cut, from 1; its info stays that of the whole."""
-        return self._part(cut=_cut_number(number))
+        return self._part(cut=number)
 
     def _span(self, number: int) -> Tuple[float, float]:
         """Begin and end of a cut, in seconds."""
@@ -335,17 +343,14 @@ class Recording:
         def part(
             between: Optional[Tuple[float, Optional[float]]] = None, cut: Optional[int] = None
         ) -> Table:
-            limits, label = dict(options), about
+            limits, label = dict(options), about + _words(between, cut)
             if cut is not None:
-                label += f", cut {_cut_number(cut)}"
                 if what == "table" and not options.get("resample"):
                     limits["cut"] = cut
                 else:  # only rows of cuts have the number of one
                     _limit(limits, *self._span(cut))
             if between is not None:
-                from_s, to_s = _times(*between)
-                label += f", {from_s} s to {f'{to_s} s' if to_s else 'its end'}"
-                _limit(limits, from_s, to_s)
+                _limit(limits, *_times(*between))
             return self._whole(what, label, limits)
 
         struct = ExportOptions()

@@ -3,14 +3,15 @@
 # $INCISE_BUILD and work in the folder of the moment.
 # shellcheck shell=sh
 
-# drive_start OPTIONS…: starts it, behind $drive_ahead; $drive is its name for rig.conf, such as
-# slcan:/dev/pts/5:0x10.
+# drive_start OPTIONS…: starts it, or $drive_program, behind $drive_ahead; $drive is its name for
+# rig.conf, such as slcan:/dev/pts/5:0x10.
 drive_start()
 {
 	drive=
-	rm -f drive.in drive.out
+	rm -f drive.in
 	mkfifo drive.in
-	${drive_ahead:-} "$INCISE_BUILD/tests/can/drive" "$@" <drive.in >drive.out 2>drive.err 3>&- &
+	: >drive.out
+	${drive_ahead:-} "$INCISE_BUILD/tests/can/${drive_program:-drive}" "$@" <drive.in >drive.out 2>drive.err 3>&- &
 	drive_pid=$!
 	exec 7>drive.in
 	drive_answer 0 || return

@@ -82,3 +82,11 @@ setup() {
 	run --separate-stderr incise calibrate frame --rig sim: --point 0,0,0 --point 50,0,0 --point 0,50,0
 	failed_with "no haptic device"
 }
+
+# bats test_tags=check
+@test "the loop places the device by the calibrated frame" {
+	# a quarter turn about x brings z = -3 to y = 3
+	printf 'frame_turn_deg = [90.0, 0.0, 0.0];\nframe_mm = [1.0, 0.0, 50.0];\n' >turned.conf
+	incise haptic wall --rig sim:haptic,clock=simulated,motion=still,z_mm=-3 --duration 500ms -c turned.conf -o t.csv
+	awk -F, 'END { exit $2 != 1 || $3 != 3 || $4 != 50 }' t.csv
+}

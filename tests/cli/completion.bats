@@ -72,7 +72,7 @@ sorted() {
 # bats test_tags=check
 @test "operands are completed as the synopsis has them" {
 	complete_words incise calibrate ""
-	[ "${COMPREPLY[*]}" = "force depth tip delay stepper check" ]
+	[ "${COMPREPLY[*]}" = "force depth tip delay stepper frame torque check" ]
 	complete_words incise calibrate depth ""
 	[ "${COMPREPLY[*]}" = "two-point line board" ]
 	complete_words incise bench ""

@@ -27,7 +27,7 @@ largest() {
 	haptic_setup = { start_s = 2.0; };
 	E
 	incise haptic wall.scene --rig rig.conf --duration 6s -o l.csv --json 2>notes >r.json
-	grep -q 'keeps its last force if its owner, the program incise device, is killed' notes
+	grep -q 'keeps its last force if its owner is killed' notes
 	[ "$(key r.json stages)" = '["pose","predict","contact","reaction","start","limit","push"]' ]
 	[ "$(key r.json haptic.lost)" = 0 ]
 	holds "$(key r.json haptic.age_most_ms) <= $(key r.json haptic.age_assumed_ms)"

@@ -122,6 +122,7 @@ calibrations() {
 	printf '%s\n' x_mm,y_mm,z_mm,device_x_mm,device_y_mm,device_z_mm 0,0,0,0,0,10 60,0,0,60,0,10 \
 		0,50,0,0,50.1,10 20,20,40,20,20,50 >touched.csv
 	report calibrate-frame calibrate frame --from touched.csv -c framed.conf
+	report calibrate-torque calibrate torque --rig sim:haptic,clock=simulated,motion=still,hand_N_mm=0,coulomb_N=0.1
 	report calibrate-check calibrate check
 	echo 'force_mV_N = 1240.0;' >none.conf
 	report calibrate-check.none calibrate check -c none.conf --only force

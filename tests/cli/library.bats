@@ -96,7 +96,7 @@ declared_by() {
 				"$root"/lib/publish/formats.h) ;;
 			"$root"/lib/base/random.h | "$root"/lib/control/plant.h)
 				[[ "$file" == "$root"/tools/bench/* ]] || complain "$file: $name" ;;
-			"$root"/lib/device/igtl/igtl_message.h)
+			"$root"/lib/device/igtl/igtl_message.h | "$root"/lib/base/ros2.h)
 				[[ "$file" == "$root"/tools/serve/* ]] || complain "$file: $name" ;;
 			*) complain "$file: $name" ;;
 			esac

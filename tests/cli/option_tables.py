@@ -52,6 +52,7 @@ VALUES = """
 --cut | 1 1000 | 0 -1 1.5 first {}
 --data | any.csv |
 --density | 7950 | 0 -1 heavy {}
+--direction | 1,0,0 0,-2.5,1e3 | 1 1,2 0,0,0 1,0,0,0 up,0,0 {}
 --due | 7d 365d 100y | soon -1d {}
 --duration | 10 30s 0.5min | 0 -1s never 10x 5m nan inf {}
 --duration bench | 1s | 0 never {}
@@ -106,7 +107,7 @@ VALUES = """
 --repeat calibrate stepper | 2 100 | 1 101 {}
 --revoked | file |
 --ridge | 0 1e12 | -1 nan small {}
---report | a.json | a.odd {}
+--report | a.json | a.odd
 --rig | sim: any.conf |
 --ros2 | neck /lab/neck_2 neck,domain=0 neck,domain=232,interface=lo | {} 2neck a//b a/ a-b neck,domain=233 neck,interface=nosuch0 neck,nosuch=1 neck,domain
 --scale | 0.5g 1kg | -1 1mm {}
@@ -117,6 +118,7 @@ VALUES = """
 --share | 1/1 2/3 mpi | 0/2 3/2 1 a/b {}
 --signers | file |
 --size | 160x120 1280x720 | 10x10 big 640x480x3 {}
+--span | 1 1000 | 0.5 1001 nan long {}
 --speed | 0.01 100 | 0 -1 fast {}
 --start-at | 2037-01-15T08:00:10Z 2037-01-15T08:00:10.5TAI | 2020-02-30T00:00:00Z 2027-01-15T08:00:10 2027-01-15T08:00:10.Z now 2027-01-15T08:00:10+01:00 2027-01-15
 --state | none a.state |

@@ -37,6 +37,8 @@ table() {
 		calibrate frame --point 0,0,0|1 point of the scene: expected 3 to 6
 		calibrate frame --from p.csv --point 0,0,0|--from does not go with --point
 		calibrate tip --rig $rig|--duration or --from
+		calibrate torque --direction 1,0|expected X,Y,Z
+		calibrate torque now|unexpected argument 'now'
 		capture -o a.csv|expected a name that ends in .rec
 		capture -o .rec|.rec
 		capture -o a.rec more|more

@@ -43,6 +43,8 @@ len(rec.cut(3).force) == len(rec.force.cut(3))      -> True
 rec.cut(3).resample(rate_hz=100)["cut"].min()       -> 3
 rec.between(1, 2).depth                             -> depth of
 rec.between(1, 2).cut(3).pairs().between(0)._about  -> 1 s to 2 s, cut 3
+rec.between(5, 10).cut(1)                           -> short.rec, 5 s to 10 s, cut 1; the whole: 14 cuts
+rec.cut(3).between(8)._repr_html_()                 -> short.rec, cut 3, 8 s to its end; the whole: 14 cuts
 rec.cut(3).between(0, 5).force["seq"]               !! the end is not behind the beginning
 len(rec.cut(3).between(8).force) == len(rec.force.cut(3).between(8))  -> True
 len(rec.between(8).cut(3).force) == len(rec.force.cut(3).between(8))  -> True

@@ -18,8 +18,7 @@
 #include <cpuid.h>
 #endif
 
-/* The first line of a small file that begins with @key, without it; else unchanged. */
-static void read_machine_line(const char *path, const char *key, char *line, int size)
+void machine_line(const char *path, const char *key, char *line, int size)
 {
 	FILE *in = fopen(path, "re");
 	char text[256];
@@ -46,7 +45,7 @@ static void read_hypervisor(char *name, size_t size)
 		snprintf(name, size, "%s", *(char *)word ? (char *)word : "unnamed");
 	}
 #else
-	read_machine_line("/sys/hypervisor/type", "", name, (int)size);
+	machine_line("/sys/hypervisor/type", "", name, (int)size);
 #endif
 }
 
@@ -60,10 +59,10 @@ static void set_kernel(json_t *machine)
 		snprintf(kernel, sizeof(kernel), "%s %s %s", name.sysname, name.release,
 			 name.machine);
 		snprintf(cpu, sizeof(cpu), "%s", name.machine);
-		read_machine_line("/sys/kernel/realtime", "", realtime, sizeof(realtime));
+		machine_line("/sys/kernel/realtime", "", realtime, sizeof(realtime));
 	}
 	/* Other than x86 has no such line. */
-	read_machine_line("/proc/cpuinfo", "model name\t: ", cpu, sizeof(cpu));
+	machine_line("/proc/cpuinfo", "model name\t: ", cpu, sizeof(cpu));
 	json_object_set_new(machine, "cpu", json_text(cpu));
 	json_object_set_new(machine, "kernel", json_string(kernel));
 	json_object_set_new(machine, "preempt_rt",
@@ -82,7 +81,7 @@ static void set_processors(json_t *machine)
 		n = CPU_COUNT(&cpus);
 	snprintf(path, sizeof(path),
 		 "/sys/devices/system/cpu/cpu%d/cpufreq/scaling_governor", cpu);
-	read_machine_line(path, "", governor, sizeof(governor));
+	machine_line(path, "", governor, sizeof(governor));
 	if (*governor)
 		json_object_set_new(machine, "governor", json_text(governor));
 	json_set_integer(machine, "processors", n);

@@ -6,6 +6,10 @@
 #define INCISE_MACHINE_H
 
 #include <jansson.h>
+
+/* The first line of a small file that begins with @key, without it; else unchanged. */
+void machine_line(const char *path, const char *key, char *line, int size);
+
 /* An object, as in incise-bench(1). Call it first, to get the load average before the run. */
 json_t *machine_json(void);
 

@@ -16,7 +16,6 @@
 
 struct frame {
 	struct calibrate common;
-	double time_s;
 	struct incise_frame_point point[N];
 	int n;
 	struct incise_frame_fit fit;
@@ -46,10 +45,6 @@ static const struct cli_option option_table[] = {
 	 "a point of the scene in mm; give three to six, in the order in which they "
 	 "are touched",
 	 CLI_PARSED_BY(parse_point)},
-	{0, "duration", "TIME",
-	 "time for which the handle is held at a point (default: "
-	 "300ms)",
-	 CLI_DURATION(struct frame, time_s, 0.05, 60)},
 	{0, "from", "FILE.csv", "take points that were touched, instead of a rig",
 	 CLI_INPUT(struct frame, common.from)},
 	{'o', "output", "FILE.csv", "write the points as CSV, for --from",
@@ -126,9 +121,7 @@ static void check_frame_options(void *run, int argc, char **argv)
 	cli_no_operands(argc, argv, "--from");
 	if (frame->common.from && frame->n)
 		cli_usage("--from does not go with --point: the file has its own");
-	/* A button ends each hold, so that no terminal is needed. */
-	calibrate_check_source(&frame->common, frame->common.from ? frame->time_s : 1,
-			       "the file");
+	calibrate_check_source(&frame->common, !frame->common.from, "the file");
 	if (!frame->common.from && frame->n < INCISE_FRAME_POINTS_MIN)
 		cli_usage(
 			"%s of the scene: expected 3 to %d; give --point X,Y,Z for each",
@@ -138,6 +131,7 @@ static void check_frame_options(void *run, int argc, char **argv)
 
 /* --- live -------------------------------------------------------------------------------- */
 
+#define HOLD_S 0.3   /* of a point */
 #define MOVED_MM 1.0 /* largest standard deviation of a handle that is held still */
 
 static void touch_points(void *run)
@@ -160,7 +154,7 @@ static void touch_points(void *run)
 			"Enter or a button\n",
 			i + 1, frame->n, at[0], at[1], at[2]);
 		if (handle_await_press(&handle, &err) ||
-		    handle_record(&handle, frame->time_s > 0 ? frame->time_s : 0.3, &err))
+		    handle_record(&handle, HOLD_S, &err))
 			cli_fail_with(&err);
 		point->sd_mm = handle_mean(&handle, point->device_mm);
 		if (point->sd_mm <= MOVED_MM)

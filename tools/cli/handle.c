@@ -23,10 +23,8 @@ void handle_begin(struct handle *handle, struct incise_rig *rig)
 	handle->seen_ns = incise_clock_now(handle->clock);
 }
 
-/* Read the samples that have arrived, show life without a force, and wait for some more. */
-static int poll_handle(struct handle *handle, bool keep, struct incise_error *err)
+int handle_poll(struct handle *handle, bool keep, struct incise_error *err)
 {
-	static const double none[3];
 	struct incise_haptic_sample poses[READ];
 	int64_t now_ns = incise_clock_now(handle->clock);
 	int n = incise_haptic_read(handle->haptic, poses, READ), rc = n;
@@ -44,7 +42,7 @@ static int poll_handle(struct handle *handle, bool keep, struct incise_error *er
 			(struct handle_sample){poses[i], now_ns - poses[i].t_ns};
 	}
 	if (n >= 0)
-		rc = incise_haptic_push(handle->haptic, none, NULL);
+		rc = incise_haptic_push(handle->haptic, handle->force_N, NULL);
 	if (rc >= 0 && now_ns - handle->seen_ns > SILENT_NS)
 		rc = -ETIMEDOUT;
 	if (cli_stop)
@@ -65,11 +63,15 @@ int handle_await_press(struct handle *handle, struct incise_error *err)
 
 	setvbuf(stdin, NULL, _IONBF, 0);
 	for (handle->pressed = false; !rc && !handle->pressed;) {
-		rc = poll_handle(handle, false, err);
+		rc = handle_poll(handle, false, err);
 		if (handle->pressed || poll(&input, 1, 0) <= 0)
 			continue;
 		handle->pressed = fgets(line, sizeof(line), stdin);
-		input.fd = handle->pressed ? input.fd : -1;
+		input.fd = -1; /* not read again at its end */
+		if (!handle->pressed && !handle->info.buttons)
+			rc = incise_error_set(err, ENODATA,
+					      "the input ended, and %s has no button",
+					      handle->info.name);
 	}
 	return rc;
 }
@@ -77,13 +79,13 @@ int handle_await_press(struct handle *handle, struct incise_error *err)
 int handle_record(struct handle *handle, double time_s, struct incise_error *err)
 {
 	/* Samples from before are left out. */
-	int rc = poll_handle(handle, false, err);
+	int rc = handle_poll(handle, false, err);
 	int64_t end_ns =
 		incise_clock_now(handle->clock) + llround(time_s * INCISE_NS_PER_S);
 
 	handle->n = 0;
 	while (!rc && (incise_clock_now(handle->clock) < end_ns || handle->n < 2))
-		rc = poll_handle(handle, true, err);
+		rc = handle_poll(handle, true, err);
 	return rc;
 }
 

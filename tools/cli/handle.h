@@ -18,6 +18,7 @@ struct handle {
 	struct incise_haptic_info info;
 	struct incise_haptic_sample last;
 	int64_t seen_ns;
+	double force_N[3];	       /* that handle_poll() pushes */
 	bool pressed;		       /* a button or Enter, in handle_await_press() */
 	struct handle_sample *samples; /* of handle_record(); free(3) */
 	int n;
@@ -25,6 +26,12 @@ struct handle {
 
 /* @rig: with its haptic device, which must outlive it. */
 void handle_begin(struct handle *handle, struct incise_rig *rig);
+
+/*
+ * Read the samples that have arrived, or keep them, too, push the force, and wait a millisecond. 0; errno
+ * of the device.
+ */
+int handle_poll(struct handle *handle, bool keep, struct incise_error *err);
 
 /* Wait for a button, or for Enter; after the end of the input for a button only. 0; errno of the device. */
 int handle_await_press(struct handle *handle, struct incise_error *err);

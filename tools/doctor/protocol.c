@@ -25,8 +25,7 @@ static const struct {
 	[AGE_MOST] = {"latency", "age of a sample, largest", "ms", 10},
 	[JITTER] = {"latency", "period of samples, standard deviation", "ms", 0},
 	[LOST] = {"latency", "samples lost", "%", 0.1},
-	[DRIFT] = {"weight", "drift in 5 s under a weight that a static force holds",
-		   "mm", 5},
+	[WEIGHT] = {"weight", "force commanded for a hung weight, deviation", "%", 10},
 	[SWING] = {"wall", "swing at the plan's limit of stiffness", "mm", 0.1},
 };
 

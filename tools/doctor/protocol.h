@@ -16,7 +16,7 @@ enum protocol_step {
 	AGE_MOST,
 	JITTER,
 	LOST,
-	DRIFT,
+	WEIGHT,
 	SWING,
 	PROTOCOL_STEPS
 };

@@ -86,8 +86,8 @@ void haptic_begin_device(struct haptic *haptic)
 	incise_scene_limits(haptic->scene, &limits);
 	if (!(info.deadman_s > 0))
 		cli_warn(
-			"%s keeps its last force if its owner, the program incise device, "
-			"is killed: keep its switch at hand",
+			"%s keeps its last force if its owner is killed: keep its switch "
+			"at hand",
 			info.name);
 	if (info.continuous_N > 0 && limits.force_N > info.continuous_N)
 		cli_note("%s stands %g N for ever; limits.force_N is %g N", info.name,

@@ -4,7 +4,6 @@
  */
 #include <errno.h>
 #include <fcntl.h>
-#include <limits.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -72,17 +71,6 @@ static pid_t start_feeder(char **argv)
 	_exit(127);
 }
 
-/* "…/bin/incise-feed" of "…/bin/incise-haptic". */
-static char *program(void)
-{
-	char own[PATH_MAX];
-	ssize_t n = readlink("/proc/self/exe", own, sizeof(own) - 1);
-
-	own[n > 0 ? n : 0] = 0;
-	n = strrchr(own, '/') ? strrchr(own, '/') - own : 0;
-	return cli_text("%.*s/incise-feed", (int)n, own);
-}
-
 static int await(struct feeder *feeder, struct incise_error *err)
 {
 	const struct timespec pause = {.tv_nsec = LOOK_NS};
@@ -129,7 +117,7 @@ int feeder_begin(struct feeder *feeder, char **argv, struct incise_error *err)
 		return incise_error_set(err, ESRCH,
 					"a service does not start incise feed; start "
 					"incise-feed@.service of that scene");
-	argv[0] = program();
+	argv[0] = cli_text("%s/incise-feed", cli_folder());
 	feeder->pid = start_feeder(argv);
 	feeder->own = true;
 	rc = feeder->pid < 0

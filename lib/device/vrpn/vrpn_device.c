@@ -498,9 +498,9 @@ static void send_names(struct vrpn_device *device)
 	send_bytes(device, bytes, n);
 }
 
-static int open_device(struct vrpn_device *device,
-		       const struct incise_backend_request *request, bool forces,
-		       struct incise_error *err)
+static int open_vrpn(struct vrpn_device *device,
+		     const struct incise_backend_request *request, bool forces,
+		     struct incise_error *err)
 {
 	static const uint8_t cookie[COOKIE] = VERSION "38  0";
 	int rc = parse_device(device, request->arguments, request->where, err);
@@ -535,7 +535,7 @@ struct vrpn_device *vrpn_device_new(const struct incise_backend_request *request
 		return NULL;
 	}
 	vrpn_device_init(device, sensors, silent_ns);
-	rc = open_device(device, request, forces, err);
+	rc = open_vrpn(device, request, forces, err);
 	if (!rc)
 		return device;
 	vrpn_device_free(device);

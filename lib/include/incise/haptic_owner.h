@@ -10,7 +10,6 @@
 #ifndef INCISE_HAPTIC_OWNER_H
 #define INCISE_HAPTIC_OWNER_H
 
-#include <stdbool.h>
 #include <stdint.h>
 #include <incise/error.h>
 #include <incise/export.h>
@@ -28,9 +27,7 @@ struct incise_haptic_owner_tick {
 	const char *off;   /**< why there is no force, or less: one word; "": there is */
 	double force_N[3]; /**< given */
 	double torque_N_mm[3]; /**< given */
-	bool had_user;	       /**< a user has been attached */
-	bool end;	       /**< the user asks for the end of the owner */
-	double unused_s;       /**< since the last user, or since the start */
+	const char *end;       /**< why the owner should end; NULL: it goes on */
 };
 
 /**
@@ -38,20 +35,14 @@ struct incise_haptic_owner_tick {
  *
  * @param rig  file rig.conf, or BACKEND:ARGUMENTS
  * @param note added to the note of the device, for its user; or ""
+ * @param first_s the owner waits so long for its first user, or lost_s of haptic_setup if that is longer
  * @return owner; NULL with errno of incise_rig_open() and incise_haptic_open(), EBUSY (the device has
  *         an owner)
  */
 INCISE_API struct incise_haptic_owner *incise_haptic_owner_open(const char *rig,
 								const char *note,
+								double first_s,
 								struct incise_error *err);
-
-/** Properties of the device. */
-INCISE_API void incise_haptic_owner_info(const struct incise_haptic_owner *owner,
-					 struct incise_haptic_info *info);
-
-/** Settings of the device in the rig. */
-INCISE_API void incise_haptic_owner_setup(const struct incise_haptic_owner *owner,
-					  struct incise_haptic_setup *setup);
 
 /**
  * Wait for the device, or for the next period; publish its samples; give the user's force, or none.

@@ -70,8 +70,8 @@ struct incise_haptic_page_device {
 	double mass_kg, damping_N_s_mm, coulomb_N;
 	double encoder_mm;
 	double rate_hz; /**< 1 … 20000; never 0 */
-	double deadman_s;
 	int64_t latency_ns, force_latency_ns;
+	double deadman_s;
 	uint32_t buttons;  /**< number, 0 … 32 */
 	uint32_t features; /**< incise_haptic_page_feature bits */
 	uint32_t settings; /**< CRC of those of an owner of incise; else 0 */
@@ -118,16 +118,17 @@ struct incise_haptic_page_user {
 
 /** An element of the ring: sample number n is in element n % 32. */
 struct incise_haptic_page_sample {
-	uint32_t seq;	   /**< sequence lock: odd while it is written */
-	uint32_t flags;	   /**< enum incise_haptic_flag bits */
+	uint32_t seq; /**< sequence lock: odd while it is written */
+	uint32_t reserved0;
 	uint64_t number;   /**< of this page's samples, from 0 */
-	uint64_t sequence; /**< the device's own count; a gap: it lost samples */
 	int64_t t_ns;	   /**< of the acquisition */
+	uint64_t sequence; /**< the device's own count; a gap: it lost samples */
 	double position_mm[3];
 	double velocity_mm_s[3]; /**< 0 without INCISE_HAPTIC_PAGE_VELOCITY */
 	double quaternion[4];	 /**< w first; 1 0 0 0 without …_ORIENTATION */
 	uint32_t buttons;	 /**< pressed ones; the first is bit 0 */
-	uint32_t reserved[3];
+	uint32_t flags;		 /**< enum incise_haptic_flag bits */
+	uint32_t reserved[2];
 };
 
 /** The page. */

@@ -11,19 +11,11 @@
 #include <unistd.h>
 #include <incise/infile.h>
 #include <openssl/err.h>
+#include <openssl/http.h>
 #include <openssl/pem.h>
 #include <openssl/ts.h>
 #include "../../base/control_character.h"
 #include "prove.h"
-
-/* OpenSSL 1.1 has no HTTP, and other names for these. */
-#if OPENSSL_VERSION_NUMBER >= 0x30000000L
-#include <openssl/http.h>
-#else
-#define ERR_SYSTEM_ERROR(code) (ERR_GET_LIB(code) == ERR_LIB_SYS)
-#define ERR_peek_last_error_data(data, flags) \
-	ERR_peek_last_error_line_data(NULL, NULL, data, flags)
-#endif
 
 #define NONCE_BYTES 8
 #define WAIT_S 30
@@ -82,7 +74,6 @@ int incise_timestamp_query(const uint8_t digest[INCISE_SHA256_BYTES],
 
 /* --- server ---------------------------------------------------------------------------- */
 
-#if OPENSSL_VERSION_NUMBER >= 0x30000000L
 /* The reply, which libcrypto has read into memory. Returns 0 or -errno. */
 static int copy_reply(BIO *bio, struct incise_bytes *to)
 {
@@ -171,17 +162,6 @@ int incise_timestamp_ask(const char *server, const uint8_t query[INCISE_TIMESTAM
 	OPENSSL_free(path);
 	return rc;
 }
-#else
-int incise_timestamp_ask(const char *server, const uint8_t query[INCISE_TIMESTAMP_QUERY],
-			 struct incise_bytes *reply, struct incise_error *err)
-{
-	*reply = (struct incise_bytes){0};
-	return incise_error_set(err, EOPNOTSUPP,
-				"%s: this incise was built with OpenSSL 1.1, which asks "
-				"no server; send a query FILE.tsq yourself",
-				server);
-}
-#endif
 
 /* --- trust ----------------------------------------------------------------------------- */
 

@@ -1023,9 +1023,15 @@ static inline void drive_close(struct can_bus *bus)
 /* The factory state, one second after power-on of the logic. */
 static inline void drive_init(struct drive *d)
 {
-	static const struct can_bus_ops ops = {drive_now,  drive_send,	 drive_receive,
-					       drive_wait, drive_filter, drive_can_state,
-					       drive_close};
+	static const struct can_bus_ops ops = {
+		.now = drive_now,
+		.send = drive_send,
+		.receive = drive_receive,
+		.wait = drive_wait,
+		.filter = drive_filter,
+		.state = drive_can_state,
+		.close = drive_close,
+	};
 	static const struct drive_object objects[] = {
 #define X(name, index, sub, size, access, value) \
 	{index, sub, size, access, value, value, false, false},

@@ -6,6 +6,8 @@
  */
 #include "../unit.h"
 #include <poll.h>
+#include <net/if.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <time.h>
@@ -32,14 +34,17 @@ static struct {
 	struct can_filter filter[64];
 	int n_filters;
 	can_err_mask_t errors;
-	int overflow_on, timestamps;
+	int overflow_on, timestamps, fd_frames;
+	int mtu;
 	/* send */
 	int send_error, send_interrupts;
 	struct can_frame sent;
+	struct canfd_frame sent_fd;
 	ssize_t send_takes;
 	/* receive */
 	int receive_error;
 	struct can_frame frames[64];
+	struct canfd_frame frame_fd; /* of size 72 */
 	ssize_t size[64];
 	struct timespec timestamp;
 	uint32_t lost;
@@ -102,9 +107,20 @@ int __wrap_setsockopt(int fd, int level, int name, const void *value, socklen_t 
 		memcpy(&kernel.overflow_on, value, size);
 	} else if (level == SOL_SOCKET && name == SO_TIMESTAMPING) {
 		memcpy(&kernel.timestamps, value, size);
+	} else if (level == SOL_CAN_RAW && name == CAN_RAW_FD_FRAMES) {
+		memcpy(&kernel.fd_frames, value, size);
 	} else {
 		return answer(ENOPROTOOPT);
 	}
+	return 0;
+}
+
+int __wrap_ioctl(int fd, unsigned long request, struct ifreq *link)
+{
+	assert_int_equal(fd, FD);
+	assert_int_equal(request, SIOCGIFMTU);
+	assert_string_equal(link->ifr_name, "can0");
+	link->ifr_mtu = kernel.mtu;
 	return 0;
 }
 
@@ -134,13 +150,16 @@ int __wrap_can_netlink_query(const char *name, struct can_netlink *link)
 ssize_t __wrap_send(int fd, const void *bytes, size_t n, int flags)
 {
 	assert_int_equal(fd, FD);
-	assert_int_equal(n, sizeof(struct can_frame));
+	assert_true(n == CAN_MTU || (n == CANFD_MTU && kernel.fd_frames));
 	assert_true(flags & MSG_DONTWAIT);
 	if (kernel.send_interrupts-- > 0)
 		return answer(EINTR);
 	if (kernel.send_error)
 		return answer(kernel.send_error);
-	memcpy(&kernel.sent, bytes, n);
+	if (n == CANFD_MTU)
+		memcpy(&kernel.sent_fd, bytes, n);
+	else
+		memcpy(&kernel.sent, bytes, n);
 	return kernel.send_takes ? kernel.send_takes : (ssize_t)n;
 }
 
@@ -156,8 +175,11 @@ ssize_t __wrap_recvmsg(int fd, struct msghdr *msg, int flags)
 		return answer(kernel.receive_error ? kernel.receive_error : EAGAIN);
 	n = kernel.size[kernel.next] ? kernel.size[kernel.next]
 				     : (ssize_t)sizeof(struct can_frame);
-	memcpy(msg->msg_iov->iov_base, &kernel.frames[kernel.next++],
-	       sizeof(struct can_frame));
+	if (n == CANFD_MTU)
+		memcpy(msg->msg_iov->iov_base, &kernel.frame_fd, CANFD_MTU);
+	else
+		memcpy(msg->msg_iov->iov_base, &kernel.frames[kernel.next], CAN_MTU);
+	kernel.next++;
 	/* As the kernel does: the timestamp first, the loss only if there was one. */
 	c = CMSG_FIRSTHDR(msg);
 	c->cmsg_level = SOL_SOCKET;
@@ -495,6 +517,57 @@ TEST(an_invalid_frame_is_skipped, setup, teardown)
 	kernel.next = 0;
 	assert_int_equal(bus->ops->receive(bus, &frame, &t_ns), 0);
 	assert_true(kernel.next < 64);
+}
+
+/* A bus with CAN FD; NULL: refused. */
+static struct can_bus *open_fd(int mtu)
+{
+	const struct can_bus_request request = {
+		.where = "rig.conf:1: haptic", .device = "adapter", .fd = true};
+
+	kernel_init();
+	kernel.mtu = mtu;
+	bus = NULL;
+	return can_transport_socketcan.open(&bus, &request, &err) ? NULL : bus;
+}
+
+TEST(can_fd)
+{
+	struct canfd_frame frame = {.can_id = 0x8003 | CAN_EFF_FLAG,
+				    .len = 64,
+				    .flags = CANFD_BRS,
+				    .data = {[0] = 1, [63] = 0x50}};
+	struct canfd_frame got;
+	int64_t t_ns;
+
+	assert_null(open_fd(CAN_MTU));
+	assert_non_null(strstr(err.text, "can0 takes no CAN FD frames; run ip link"));
+	assert_int_equal(kernel.opened, 0);
+	err = (struct incise_error){0};
+	succeeds(open_fd(CANFD_MTU));
+	assert_int_equal(kernel.fd_frames, 1);
+	assert_int_equal(bus->ops->send_fd(bus, &frame), 0);
+	assert_memory_equal(&kernel.sent_fd, &frame, sizeof(frame));
+	frame.len = 65;
+	assert_int_equal(bus->ops->send_fd(bus, &frame), -EINVAL);
+	/* too long, whole, a classic one, an error frame */
+	kernel.frame_fd = frame;
+	kernel.size[0] = CANFD_MTU;
+	kernel.n_frames = 1;
+	assert_int_equal(bus->ops->receive_fd(bus, &got, &t_ns), 0);
+	kernel.frame_fd.len = frame.len = 64;
+	kernel.next = 0;
+	kernel.frames[1] = (struct can_frame){.can_id = 0x100, .can_dlc = 8};
+	kernel.frames[2] = (struct can_frame){.can_id = CAN_ERR_FLAG | CAN_ERR_BUSOFF,
+					      .can_dlc = CAN_ERR_DLC};
+	kernel.n_frames = 3;
+	assert_int_equal(bus->ops->receive_fd(bus, &got, &t_ns), 1);
+	assert_memory_equal(&got, &frame, sizeof(frame));
+	assert_int_equal(bus->ops->receive_fd(bus, &got, &t_ns), 1);
+	assert_true(got.can_id == 0x100 && got.len == 8);
+	assert_int_equal(bus->ops->receive_fd(bus, &got, &t_ns), 1);
+	assert_int_equal(bus->ops->state(bus), CAN_STATE_BUS_OFF);
+	bus->ops->close(bus);
 }
 
 TEST(receiving_finds_a_lost_interface, setup, teardown)

@@ -10,6 +10,7 @@
 #include "../message.h"
 #include "../../../lib/base/random.h"
 #include "../../../lib/base/vector.h"
+#include "../../../lib/scene/plan.h"
 #include "fed.h"
 
 #define TICK_NS 1000000
@@ -460,6 +461,54 @@ TEST(test_a_slow_host_bears_less)
 		end();
 	}
 	assert_true(before < 0.7 * first);
+}
+
+/* A slanting groove of few facets. */
+static void write_groove(const char *path)
+{
+	FILE *out = fopen(path, "w");
+
+	fprintf(out, "ncols 5\nnrows 5\nxllcenter -40\nyllcenter -40\ncellsize 20\n");
+	for (int y = 40; y >= -40; y -= 20)
+		for (int x = -40; x <= 40; x += 20)
+			fprintf(out, "%.2f%c", fabs(0.45 * y - 0.6 * x),
+				x == 40 ? '\n' : ' ');
+	fclose(out);
+}
+
+/*
+ * Each step of a host up to the longest is judged from where the lean came to rest: a state that must be kicked is so at
+ * 8, 6, 4, 3, 2 and 1 ticks, and rests again after each. From what a kick left behind the next one would swing.
+ */
+TEST(test_a_kick_at_one_step_is_none_at_the_next)
+{
+	static const char groove[] =
+		"surface = { kind = \"heights\"; file = \"hill.asc\"; }; rate_hz = 250.0;"
+		"device = { mass_kg = 0.025; damping_N_s_mm = 0.004; };"
+		"limits = { force_N = 0.6; pose_age_ms = 1000.0; };"
+		"effects = { average_ticks = 40; }; tissue = { reaction_N_mm = 0.12; };";
+	static const struct incise_tracker_info poses = {.name = "host", .rate_hz = 250};
+	static const struct {
+		int ticks, kicks;
+	} longest[] = {{1, 1}, {8, 6}};
+
+	fed_folder_make(&folder);
+	write_groove(folder.heights);
+	scene = fed_scene(&folder, groove, &err);
+	succeeds(scene);
+	for (int i = 0; i < 2; i++) {
+		struct incise_host_hold hold = {.ticks = longest[i].ticks};
+		struct incise_plan *plan =
+			incise_plan_new_held(scene, &poses, &hold, &err);
+		struct incise_plan_stability s;
+
+		succeeds(plan);
+		incise_plan_stability(plan, &s);
+		assert_int_equal(s.weakest.paid, longest[i].kicks);
+		incise_plan_free(plan);
+	}
+	incise_scene_free(scene);
+	fed_folder_remove(&folder);
 }
 
 TEST(test_options_are_checked)

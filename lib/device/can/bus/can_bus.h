@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
  * A CAN bus over any transport: a socket of the kernel, a serial adapter, or a test's
- * simulation. Frames are the kernel's struct can_frame; error frames (CAN_ERR_FLAG, see
- * linux/can/error.h) come in between them.
+ * simulation. Frames are the kernel's struct can_frame, or struct canfd_frame of a bus that was
+ * opened for both; error frames (CAN_ERR_FLAG, see linux/can/error.h) come in between them.
  *
  *   canopen, can_axis ─▶ bus ─┬─▶ socketcan   can0       kernel
  *                             ╰─▶ slcan       /dev/ttyACM0
@@ -12,6 +12,7 @@
 #ifndef INCISE_CAN_BUS_H
 #define INCISE_CAN_BUS_H
 
+#include <stdbool.h>
 #include <stdint.h>
 #include <linux/can.h>
 #include <incise/error.h>
@@ -48,6 +49,9 @@ struct can_bus_ops {
 	 */
 	int (*state)(struct can_bus *bus);
 	void (*close)(struct can_bus *bus);
+	/* As send and receive, of a bus that was opened for CAN FD; or NULL. */
+	int (*send_fd)(struct can_bus *bus, const struct canfd_frame *frame);
+	int (*receive_fd)(struct can_bus *bus, struct canfd_frame *frame, int64_t *t_ns);
 };
 
 /* Counts of this side since the bus was opened. */
@@ -80,6 +84,7 @@ struct can_bus_request {
 	 * may have a serial line open). 0: only watch.
 	 */
 	uint8_t node;
+	bool fd; /* the interface must take CAN FD frames */
 };
 
 /* A module has one transport. */

@@ -17,6 +17,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <time.h>
@@ -36,6 +37,7 @@
 struct socketcan {
 	struct can_bus bus;
 	int fd;
+	bool fd_frames;	 /* takes CAN FD */
 	int owner;	 /* socket that holds the node; -1: no socket */
 	int gone;	 /* -ENETDOWN, -ENODEV; permanent */
 	int state;	 /* enum can_state; -EOPNOTSUPP: unknown */
@@ -74,19 +76,18 @@ static int failed_socketcan(struct socketcan *s, int code)
 	return s->gone;
 }
 
-static int socketcan_send(struct can_bus *bus, const struct can_frame *frame)
+/* A frame of either kind, which @size tells. */
+static int send_one(struct can_bus *bus, const void *frame, size_t size)
 {
 	struct socketcan *s = socketcan_of(bus);
 	ssize_t n;
 
 	if (s->gone)
 		return s->gone;
-	if (frame->can_id & CAN_ERR_FLAG || frame->can_dlc > CAN_MAX_DLEN)
-		return -EINVAL;
 	do
-		n = send(s->fd, frame, sizeof(*frame), MSG_DONTWAIT);
+		n = send(s->fd, frame, size, MSG_DONTWAIT);
 	while (n < 0 && errno == EINTR);
-	if (n == sizeof(*frame)) {
+	if (n == (ssize_t)size) {
 		bus->counts.sent++;
 		return 0;
 	}
@@ -98,6 +99,20 @@ static int socketcan_send(struct can_bus *bus, const struct can_frame *frame)
 		return -ENOBUFS;
 	}
 	return failed_socketcan(s, errno);
+}
+
+static int socketcan_send(struct can_bus *bus, const struct can_frame *frame)
+{
+	return frame->can_id & CAN_ERR_FLAG || frame->can_dlc > CAN_MAX_DLEN
+		       ? -EINVAL
+		       : send_one(bus, frame, sizeof(*frame));
+}
+
+static int socketcan_send_fd(struct can_bus *bus, const struct canfd_frame *frame)
+{
+	return frame->can_id & CAN_ERR_FLAG || frame->len > CANFD_MAX_DLEN
+		       ? -EINVAL
+		       : send_one(bus, frame, sizeof(*frame));
 }
 
 /* Timestamps are wall time, which may be set meanwhile: an impossible one counts as now. */
@@ -116,7 +131,7 @@ static int64_t timestamp(struct socketcan *s, const struct timespec *wall)
 	return s->last_ns;
 }
 
-static void note_state(struct socketcan *s, const struct can_frame *frame)
+static void note_state(struct socketcan *s, const struct canfd_frame *frame)
 {
 	if (s->state == -EOPNOTSUPP)
 		return;
@@ -137,7 +152,7 @@ static void note_state(struct socketcan *s, const struct can_frame *frame)
 }
 
 /* Read one message; returns as recvmsg(). *wall: its timestamp, 0 without one. */
-static ssize_t read_one(struct socketcan *s, struct can_frame *frame,
+static ssize_t read_one(struct socketcan *s, struct canfd_frame *frame,
 			struct timespec *wall)
 {
 	union {
@@ -177,7 +192,16 @@ static ssize_t read_one(struct socketcan *s, struct can_frame *frame,
 	return n;
 }
 
-static int socketcan_receive(struct can_bus *bus, struct can_frame *frame, int64_t *t_ns)
+static bool is_frame(const struct socketcan *s, const struct canfd_frame *frame,
+		     ssize_t n)
+{
+	return n == CAN_MTU
+		       ? frame->len <= CAN_MAX_DLEN
+		       : s->fd_frames && n == CANFD_MTU && frame->len <= CANFD_MAX_DLEN;
+}
+
+static int socketcan_receive_fd(struct can_bus *bus, struct canfd_frame *frame,
+				int64_t *t_ns)
 {
 	struct socketcan *s = socketcan_of(bus);
 
@@ -189,7 +213,7 @@ static int socketcan_receive(struct can_bus *bus, struct can_frame *frame, int64
 
 		if (n < 0)
 			return errno == EAGAIN ? 0 : failed_socketcan(s, errno);
-		if (n != sizeof(*frame) || frame->can_dlc > CAN_MAX_DLEN) {
+		if (!is_frame(s, frame, n)) {
 			bus->counts.broken++;
 			continue;
 		}
@@ -203,6 +227,17 @@ static int socketcan_receive(struct can_bus *bus, struct can_frame *frame, int64
 		return 1;
 	}
 	return 0;
+}
+
+static int socketcan_receive(struct can_bus *bus, struct can_frame *frame, int64_t *t_ns)
+{
+	struct canfd_frame any;
+	int rc = socketcan_receive_fd(bus, &any, t_ns);
+
+	/* The begin of the one is the other. */
+	if (rc > 0)
+		memcpy(frame, &any, sizeof(*frame));
+	return rc;
 }
 
 static int socketcan_wait(struct can_bus *bus, int64_t until_ns)
@@ -252,6 +287,8 @@ static const struct can_bus_ops socketcan_ops = {
 	.now = socketcan_now,
 	.send = socketcan_send,
 	.receive = socketcan_receive,
+	.send_fd = socketcan_send_fd,
+	.receive_fd = socketcan_receive_fd,
 	.wait = socketcan_wait,
 	.filter = socketcan_filter,
 	.state = socketcan_state,
@@ -317,6 +354,27 @@ static int look_up(struct socketcan *s, const struct can_bus_request *request,
 	return rc ? rc : link.index;
 }
 
+/* An interface takes CAN FD frames if its largest frame is one. */
+static int require_fd(struct socketcan *s, const struct can_bus_request *request,
+		      struct incise_error *err)
+{
+	static const int on = 1;
+	const char *name = s->bus.name;
+	struct ifreq link = {0};
+
+	snprintf(link.ifr_name, sizeof(link.ifr_name), "%.15s", name);
+	s->fd_frames =
+		!ioctl(s->fd, SIOCGIFMTU, &link) && link.ifr_mtu == CANFD_MTU &&
+		!setsockopt(s->fd, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, &on, sizeof(on));
+	if (s->fd_frames)
+		return 0;
+	return incise_error_set(
+		err, EINVAL,
+		"%s: %s takes no CAN FD frames; run ip link set %s down, then ip link "
+		"set %s up type can bitrate 1000000 dbitrate 5000000 fd on",
+		request->where, name, name, name);
+}
+
 static int set_up_socketcan(struct socketcan *s, const struct can_bus_request *request,
 			    int index, struct incise_error *err)
 {
@@ -335,7 +393,7 @@ static int set_up_socketcan(struct socketcan *s, const struct can_bus_request *r
 		return incise_error_set(err, code, "%s: %s: %s", request->where,
 					request->device, strerror(errno));
 	}
-	return 0;
+	return request->fd ? require_fd(s, request, err) : 0;
 }
 
 /*
@@ -379,9 +437,10 @@ static int open_socket(struct socketcan *s, const struct can_bus_request *reques
 	case EPROTONOSUPPORT:
 		return incise_error_set(
 			err, EAFNOSUPPORT,
-			"%s: this kernel has no CAN sockets; run modprobe can_raw, or "
-			"use a serial adapter as slcan:/dev/ttyACM0",
-			request->where);
+			"%s: this kernel has no CAN sockets; run modprobe can_raw%s",
+			request->where,
+			request->fd ? ""
+				    : ", or use a serial adapter as slcan:/dev/ttyACM0");
 	case EACCES:
 	case EPERM:
 		return incise_error_set(err, EACCES,
