@@ -5,7 +5,6 @@
  */
 #include <endian.h>
 #include <errno.h>
-#include <fcntl.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -114,21 +113,19 @@ static struct incise_model *bare_model(const struct incise_model *from,
 	for (int i = 0; i < info->n_inputs; i++) {
 		inputs[i] = info->input[i];
 		for (int k = 0; k < info->n_mfs[i]; k++)
-			if (incise_model_mf(from, i, k)->type != type) {
-				incise_error_set(err, ENOTSUP,
-						 "the premises have functions of several "
-						 "kinds; expected one kind");
-				return NULL;
-			}
+			if (incise_model_mf(from, i, k)->type != type)
+				return INCISE_ERROR_NULL(
+					err, ENOTSUP,
+					"the premises have functions of several "
+					"kinds; expected one kind");
 		if (strchr(inputs[i].name, '\n'))
 			inputs[i].name[strcspn(inputs[i].name, "\n")] = 0;
 	}
-	if (!(info->output.min < info->output.max)) {
-		incise_error_set(err, EINVAL,
-				 "the premises' output has no range; give a model that "
-				 "incise train wrote");
-		return NULL;
-	}
+	if (!(info->output.min < info->output.max))
+		return INCISE_ERROR_NULL(
+			err, EINVAL,
+			"the premises' output has no range; give a model that "
+			"incise train wrote");
 	model = incise_model_new_grid(info->n_inputs, inputs, info->n_mfs, type,
 				      &info->output, err);
 	for (int i = 0; i < info->n_inputs && model; i++)
@@ -954,22 +951,18 @@ static struct incise_factor *decode_factor(struct decoder *in, size_t size)
 		damaged_factor(in, "expected 'incise factor'");
 		return NULL;
 	}
-	if (form == 1) {
-		incise_error_set(
+	if (form == 1)
+		return INCISE_ERROR_NULL(
 			in->err, ENOTSUP,
 			"%s: is of form 1, whose small parts reveal their pairs: "
 			"delete it, and write it again by incise train -o FILE.fac",
 			in->name);
-		return NULL;
-	}
-	if (form != FORM) {
-		incise_error_set(
+	if (form != FORM)
+		return INCISE_ERROR_NULL(
 			in->err, ENOTSUP,
 			"%s: is of form %llu, and this incise reads form %d; use "
 			"the same version of incise everywhere",
 			in->name, (unsigned long long)form, FORM);
-		return NULL;
-	}
 	memcpy(&crc, in->end, sizeof(crc));
 	*line = '\n';
 	if (le32toh(crc) !=
@@ -982,13 +975,12 @@ static struct incise_factor *decode_factor(struct decoder *in, size_t size)
 		damaged_factor(in, "expected a version");
 		return NULL;
 	}
-	if (strcmp(line, incise_version())) {
-		incise_error_set(in->err, ENOTSUP,
-				 "%s: is of incise %s, and this is %s; use the same "
-				 "version everywhere",
-				 in->name, line, incise_version());
-		return NULL;
-	}
+	if (strcmp(line, incise_version()))
+		return INCISE_ERROR_NULL(
+			in->err, ENOTSUP,
+			"%s: is of incise %s, and this is %s; use the same "
+			"version everywhere",
+			in->name, line, incise_version());
 	line = next_factor_line(in, "premises");
 	if (!line || !is_hash(line) || line[64]) {
 		damaged_factor(in, "expected the premises' hash");

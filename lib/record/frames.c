@@ -55,10 +55,8 @@ struct incise_frames_reader *incise_frames_reader_new(const char *path,
 	struct stat st;
 
 	/* libavformat would wait for a pipe. */
-	if (!stat(path, &st) && !S_ISREG(st.st_mode)) {
-		incise_error_set(err, EINVAL, "%.300s: not a regular file", path);
-		return NULL;
-	}
+	if (!stat(path, &st) && !S_ISREG(st.st_mode))
+		return INCISE_ERROR_NULL(err, EINVAL, "%.300s: not a regular file", path);
 	return module ? module->open(path, err) : NULL;
 }
 
