@@ -250,9 +250,7 @@ static json_t *run_command(const struct demo *demo, char *const *argv)
 	argv = handed_on(argv);
 	if (!demo->quiet)
 		print_command(argv);
-	report = read_report(argv, demo->folder, &err);
-	if (!report)
-		cli_fail_with(&err);
+	report = cli_require(read_report(argv, demo->folder, &err), &err);
 	return report;
 }
 
@@ -398,8 +396,7 @@ static void run_view(char *const *argv, const char *folder)
 
 	argv = handed_on(argv);
 	print_command(argv);
-	if (wait_for(start_demo(argv, -1), argv, folder, &err))
-		cli_fail_with(&err);
+	cli_check(wait_for(start_demo(argv, -1), argv, folder, &err), &err);
 }
 
 /* Leave NAME.mkv and NAME.png in the folder, by incise view. */

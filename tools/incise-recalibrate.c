@@ -165,9 +165,9 @@ int main(int argc, char **argv)
 		file_expect(job.calibration, FILE_CALIBRATION);
 	/* Where the active one is damaged, the way to another must work. */
 	known = read_values(path, &before, &was, &err);
-	if (incise_recalibrate(path, job.calibration, &made, &err) ||
-	    !read_values(path, &now, &is, &err))
-		cli_fail_with(&err);
+	cli_check(incise_recalibrate(path, job.calibration, &made, &err) ||
+			  !read_values(path, &now, &is, &err),
+		  &err);
 	if (!known) {
 		before = now;
 		was = is;
