@@ -9,21 +9,11 @@
 #include "../base/module.h"
 #include "frames.h"
 
-#define FILE_NAME "frames_mkv.so"
-
 static const struct incise_frames_module *load_frames(struct incise_error *err)
 {
-	const struct incise_frames_module *frames;
-	struct incise_module module;
-
-	if (incise_module_find(&module, FILE_NAME, INCISE_FRAMES_SYMBOL, "camera",
-			       "libavformat-dev and libavcodec-dev are", err))
-		return NULL;
-	frames = module.symbol;
-	if (frames->abi == INCISE_FRAMES_ABI)
-		return frames;
-	errno = -incise_module_refuse(&module, FILE_NAME, "camera", err);
-	return NULL;
+	return incise_module_load("frames_mkv.so", INCISE_FRAMES_SYMBOL,
+				  INCISE_FRAMES_ABI, "camera",
+				  "libavformat-dev and libavcodec-dev are", err);
 }
 
 struct incise_frames_writer *incise_frames_writer_new(

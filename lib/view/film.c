@@ -12,8 +12,6 @@
 #include "../base/module.h"
 #include "film.h"
 
-#define FILE_NAME "film_mkv.so"
-
 struct incise_film {
 	const struct incise_film_module *module;
 	struct incise_film_coder *coder;
@@ -27,17 +25,8 @@ struct incise_film {
 /* The module stays loaded. */
 static const struct incise_film_module *load_film(struct incise_error *err)
 {
-	const struct incise_film_module *film;
-	struct incise_module module;
-
-	if (incise_module_find(&module, FILE_NAME, INCISE_FILM_SYMBOL, "film",
-			       "libavformat-dev and libavcodec-dev are", err))
-		return NULL;
-	film = module.symbol;
-	if (film->abi == INCISE_FILM_ABI)
-		return film;
-	errno = -incise_module_refuse(&module, FILE_NAME, "film", err);
-	return NULL;
+	return incise_module_load("film_mkv.so", INCISE_FILM_SYMBOL, INCISE_FILM_ABI,
+				  "film", "libavformat-dev and libavcodec-dev are", err);
 }
 
 /* Keeps errno. */
