@@ -16,6 +16,7 @@
 #include "../base/c_locale.h"
 #include "../base/crc32c.h"
 #include "../base/crypto/sha256.h"
+#include "../base/grow.h"
 #include "../base/random.h"
 #include "design.h"
 #include "factor.h"
@@ -42,8 +43,9 @@ struct incise_factor {
 	char hash[65];
 	double min[INCISE_MODEL_INPUTS_MAX + 1], max[INCISE_MODEL_INPUTS_MAX + 1];
 	struct incise_factor_source *sources;
-	int n_sources, capacity;
-	int at; /* the source that pairs are added to */
+	int n_sources;
+	size_t capacity; /* of sources */
+	int at;		 /* the source that pairs are added to */
 	char version[40], options[INCISE_FACTOR_TEXT_MAX];
 };
 
@@ -229,16 +231,9 @@ static int insert_source(struct incise_factor *factor,
 {
 	int at = factor->n_sources;
 
-	if (factor->n_sources == factor->capacity) {
-		int capacity = factor->capacity ? 2 * factor->capacity : 16;
-		void *sources =
-			realloc(factor->sources, capacity * sizeof(*factor->sources));
-
-		if (!sources)
-			return -1;
-		factor->sources = sources;
-		factor->capacity = capacity;
-	}
+	if (!grow_array(&factor->sources, (size_t)at, &factor->capacity, 16,
+			sizeof(*factor->sources)))
+		return -1;
 	for (; at > 0 && strcmp(factor->sources[at - 1].hash, source->hash) > 0; at--)
 		factor->sources[at] = factor->sources[at - 1];
 	factor->sources[at] = *source;
