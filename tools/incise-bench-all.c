@@ -206,7 +206,6 @@ int main(int argc, char **argv)
 	struct bench_all_job job;
 
 	parse_bench_all(&job, argc, argv);
-	if (report_script("check", NULL, NULL, NULL, &err))
-		cli_fail_with(&err);
+	cli_check(report_script("check", NULL, NULL, NULL, &err), &err);
 	run_script(describe_job(&job));
 }

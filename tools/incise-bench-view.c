@@ -60,8 +60,7 @@ static void open_run(struct bench_view_run *run, const char *path)
 		run->rig = incise_rig_open(PROCEDURE_RIG, INCISE_RIG_TRACKER, &err);
 	if (run->rig)
 		run->plan = incise_plan_new(run->scene, run->rig, &err);
-	if (!run->plan)
-		cli_fail_with(&err);
+	cli_require(run->plan, &err);
 	procedure_begin(&run->procedure, run->rig, run->plan, run->scene);
 }
 
@@ -84,8 +83,9 @@ static void view_script_begin(struct view_script *script, const char *scene,
 		cli_fail("not enough memory for %.3g s of ticks; give a shorter "
 			 "--duration",
 			 seconds);
-	if (incise_loop_run(run.plan, incise_rig_clock(run.rig), &loop, stats, &err) < 0)
-		cli_fail_with(&err);
+	cli_check(incise_loop_run(run.plan, incise_rig_clock(run.rig), &loop, stats,
+				  &err) < 0,
+		  &err);
 	*script = (struct view_script){
 		.scene = scene, .tick = loop.log, .n = (int)stats->logged};
 	free(stats);
@@ -119,8 +119,7 @@ static void fed_view_open(struct fed_view *fed, const struct view_script *script
 		fed->plan = incise_plan_new(fed->scene, NULL, &err);
 	if (fed->plan)
 		fed->view = incise_view_new(fed->scene, fed->plan, &setup, &err);
-	if (!fed->view)
-		cli_fail_with(&err);
+	cli_require(fed->view, &err);
 }
 
 /* Give the view all ticks up to a time since the first; times ascend. */
@@ -141,8 +140,7 @@ static void fed_view_frame(struct fed_view *fed)
 {
 	struct incise_error err = {0};
 
-	if (incise_view_frame(fed->view, NULL, &err))
-		cli_fail_with(&err);
+	cli_check(incise_view_frame(fed->view, NULL, &err), &err);
 }
 
 static void fed_view_close(struct fed_view *fed)

@@ -218,8 +218,7 @@ static void record_rig(const struct capture_options *options, struct incise_rig 
 	rc = incise_capture_run(target, rig, &options->capture, result, &err);
 	/* The recording is closed: now the terminal may block. */
 	capture_view_end();
-	if (rc && (rc != -ECANCELED || !cli_overwrite()))
-		cli_fail_with(&err);
+	cli_check(rc && (rc != -ECANCELED || !cli_overwrite()), &err);
 	if (!cli_overwrite() || stats->force || stats->tracker || stats->frames)
 		return;
 	recording_remove(target);
@@ -286,8 +285,8 @@ int main(int argc, char **argv)
 	if (signing.err.code)
 		cli_error("%s: recorded, but not signed: %s; 'incise sign' signs it",
 			  options.output, signing.err.text);
-	if (incise_capture_judge(options.output, &options.capture, &result, &err))
-		cli_fail_with(&err);
+	cli_check(incise_capture_judge(options.output, &options.capture, &result, &err),
+		  &err);
 	incise_wall_free(result.wall);
 	return !!signing.err.code;
 }

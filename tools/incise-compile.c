@@ -109,8 +109,7 @@ static void write_c(const struct incise_fixed *fx, const char *path)
 	struct incise_error err = {0};
 	char *symbol = symbol_of(path);
 
-	if (incise_fixed_write_c(fx, path, symbol, &err))
-		cli_fail_with(&err);
+	cli_check(incise_fixed_write_c(fx, path, symbol, &err), &err);
 	free(symbol);
 }
 
@@ -149,8 +148,7 @@ static void compile_model(const struct compile_job *job, const char *path)
 
 	if (!fx)
 		cli_fail("%s: %s", path, err.text);
-	if (incise_fixed_save(fx, job->output, &err))
-		cli_fail_with(&err);
+	cli_check(incise_fixed_save(fx, job->output, &err), &err);
 	if (job->c_source)
 		write_c(fx, job->c_source);
 	report_compile(fx, path, job->output, job->json);
@@ -185,8 +183,7 @@ static void compile_scene(const struct compile_job *job)
 			 "calibrate tip",
 			 calibration.path);
 	file = cli_require(incise_plan_file_new(plan, &err), &err);
-	if (incise_plan_file_save(file, job->output, &err))
-		cli_fail_with(&err);
+	cli_check(incise_plan_file_save(file, job->output, &err), &err);
 	incise_plan_file_info(file, &info);
 	if (job->json) {
 		json_print(plan_report_json(&info));

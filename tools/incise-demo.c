@@ -10,17 +10,15 @@
  */
 #include <errno.h>
 #include <fcntl.h>
-#include <signal.h>
-#include <spawn.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
-#include <sys/wait.h>
-#include <time.h>
 #include <unistd.h>
+#include "cli/child.h"
 #include "cli/cli.h"
+#include "cli/file.h"
 #include "cli/json.h"
 #include "cli/plot.h"
 #include "cli/scene_argument.h"
@@ -112,7 +110,7 @@ static void print_step(const struct demo *demo, const char *what)
 /* --- commands ------------------------------------------------------------------------ */
 
 /* The command, with --overwrite if this one has it; lives as long as the program. */
-static char *const *handed_on(char *const *argv)
+static char **handed_on(char *const *argv)
 {
 	size_t n = 0;
 	char **more;
@@ -131,48 +129,21 @@ static void print_command(char *const *argv)
 	fputs("$ incise", stdout);
 	for (char *const *arg = argv; *arg; arg++)
 		printf(" %s", *arg);
-	putchar('\n');
+	puts(cli_overwrite() ? " --overwrite" : "");
 }
 
-/* @out: descriptor of its output, or -1 for ours. */
-static pid_t start_demo(char *const *argv, int out)
+/* Run a command to its end. @out: descriptor of its output. */
+static int run_child(char *const *argv, int out, const char *folder,
+		     struct incise_error *err)
 {
-	posix_spawn_file_actions_t files;
-	char *program = cli_text("%s/incise-%s", cli_folder(), argv[0]);
-	pid_t pid;
-	int rc;
-
-	if (posix_spawn_file_actions_init(&files))
-		cli_fail("no memory");
-	if (out >= 0)
-		posix_spawn_file_actions_adddup2(&files, out, STDOUT_FILENO);
-	fflush(stdout);
-	rc = posix_spawn(&pid, program, &files, NULL, argv, environ);
-	if (rc)
-		cli_fail("%s: %s", program, strerror(rc));
-	posix_spawn_file_actions_destroy(&files);
-	free(program);
-	return pid;
-}
-
-/* A signal to this process alone is handed on; by Ctrl-C all have got it. */
-static void stop_with(pid_t pid)
-{
-	static pid_t stopped;
-
-	if (!cli_stop || stopped == pid)
-		return;
-	stopped = pid;
-	kill(pid, SIGTERM);
-}
-
-static int wait_for(pid_t pid, char *const *argv, const char *folder,
-		    struct incise_error *err)
-{
+	char **own = handed_on(argv);
 	int status;
 
-	while (waitpid(pid, &status, 0) < 0 && errno == EINTR)
-		stop_with(pid);
+	own[0] = cli_text("%s/incise-%s", cli_folder(), argv[0]);
+	fflush(stdout);
+	status = child_run(own, STDIN_FILENO, out, STDERR_FILENO);
+	if (status < 0)
+		cli_fail("%s: %s", own[0], strerror(errno));
 	/* However it ended. */
 	if (cli_stop)
 		demo_interrupted(folder);
@@ -185,55 +156,22 @@ static int wait_for(pid_t pid, char *const *argv, const char *folder,
 		argv[0], folder);
 }
 
-/* Read the output of a command to its end, which comes after its last signal. */
-static char *read_output(int fd, pid_t pid)
-{
-	size_t size = 0, n = 0;
-	char *text = NULL;
-	ssize_t got;
-
-	do {
-		if (n + 1 >= size) {
-			size = size ? 2 * size : 65536;
-			text = realloc(text, size);
-			if (!text)
-				cli_fail("no memory");
-		}
-		got = read(fd, text + n, size - 1 - n);
-		if (got < 0 && errno == EINTR)
-			stop_with(pid);
-		else if (got > 0)
-			n += (size_t)got;
-	} while (got > 0 || (got < 0 && errno == EINTR));
-	text[n] = 0;
-	return text;
-}
-
-/* Run a command to its end, and read the JSON that it prints; NULL with the error. */
+/* Run a command, and read the JSON that it prints; NULL with the error. */
 static json_t *read_report(char *const *argv, const char *folder,
 			   struct incise_error *err)
 {
+	struct memory_file said = memory_file_begin("said");
 	json_error_t why = {.text = "no memory"};
-	json_t *report;
-	int pipe_fd[2];
-	char *text;
-	pid_t pid;
+	json_t *report = NULL;
 
-	if (pipe2(pipe_fd, O_CLOEXEC))
-		cli_fail("pipe: %s", strerror(errno));
-	pid = start_demo(argv, pipe_fd[1]);
-	close(pipe_fd[1]);
-	text = read_output(pipe_fd[0], pid);
-	close(pipe_fd[0]);
-	if (wait_for(pid, argv, folder, err)) {
-		free(text);
-		return NULL;
+	if (!run_child(argv, fileno(said.file), folder, err)) {
+		rewind(said.file);
+		report = json_loadf(said.file, 0, &why);
+		if (!report)
+			incise_error_set(err, EINVAL, "'incise %s' printed no report: %s",
+					 argv[0], why.text);
 	}
-	report = json_loads(text, 0, &why);
-	if (!report)
-		incise_error_set(err, EINVAL, "'incise %s' printed no report: %s",
-				 argv[0], why.text);
-	free(text);
+	fclose(said.file);
 	return report;
 }
 
@@ -245,15 +183,10 @@ static json_t *read_report(char *const *argv, const char *folder,
 static json_t *run_command(const struct demo *demo, char *const *argv)
 {
 	struct incise_error err = {0};
-	json_t *report;
 
-	argv = handed_on(argv);
 	if (!demo->quiet)
 		print_command(argv);
-	report = read_report(argv, demo->folder, &err);
-	if (!report)
-		cli_fail_with(&err);
-	return report;
+	return cli_require(read_report(argv, demo->folder, &err), &err);
 }
 
 #define RUN(demo, ...) run_command(demo, (char *const[]){__VA_ARGS__, NULL})
@@ -396,10 +329,8 @@ static void run_view(char *const *argv, const char *folder)
 {
 	struct incise_error err = {0};
 
-	argv = handed_on(argv);
 	print_command(argv);
-	if (wait_for(start_demo(argv, -1), argv, folder, &err))
-		cli_fail_with(&err);
+	cli_check(run_child(argv, STDOUT_FILENO, folder, &err), &err);
 }
 
 /* Leave NAME.mkv and NAME.png in the folder, by incise view. */
@@ -430,7 +361,7 @@ int main(int argc, char **argv)
 	struct demo *demo = &options.demo;
 	struct incise_model *model;
 	char *plot;
-	struct timespec begin, end;
+	int64_t begin_ns;
 	double seconds;
 
 	cli_parse(&command, argc, argv, &options);
@@ -447,7 +378,7 @@ int main(int argc, char **argv)
 		cli_fail(
 			"gnuplot is not installed, it draws the pictures: apt-get install "
 			"gnuplot-nox, or run 'make demo'");
-	clock_gettime(CLOCK_MONOTONIC, &begin);
+	begin_ns = cli_now_ns();
 	begin_folder(demo->folder);
 	plot = demo_path(demo, "plot");
 	make_folder(plot, true);
@@ -460,8 +391,7 @@ int main(int argc, char **argv)
 	demo_worth(demo, model);
 	demo_figures(demo, model);
 	json_object_set_new(demo->summary, "pictures", demo->pictures);
-	clock_gettime(CLOCK_MONOTONIC, &end);
-	seconds = end.tv_sec - begin.tv_sec + (end.tv_nsec - begin.tv_nsec) * 1e-9;
+	seconds = (double)(cli_now_ns() - begin_ns) * 1e-9;
 	json_set_number(demo->summary, "seconds", seconds);
 	demo_summary_save(demo, seconds);
 	end_folder(demo->folder);

@@ -295,8 +295,7 @@ static void eval_file(struct evaluator *e, const char *path)
 			cli_fail("%s:%lu: %s", name, line, err.text);
 		evaluate(e, x, outside, false);
 	}
-	if (rc)
-		cli_fail_with(&err);
+	cli_check(rc, &err);
 	incise_infile_close(in);
 }
 

@@ -208,11 +208,10 @@ static void export(char **paths, int n, const struct export_job *job,
 		recordings[i] = recording_open(paths[i]);
 		/* Where a part is exported, the blocks that are read are compared with their checksums. */
 		recording_intact(paths[i], !is_part(job), job->damaged, &err);
-		if (err.code)
-			cli_fail_with(&err);
+		cli_check(err.code, &err);
 	}
-	if (incise_export(recordings, n, &job->how, job->output, report, &err))
-		cli_fail_with(&err);
+	cli_check(incise_export(recordings, n, &job->how, job->output, report, &err),
+		  &err);
 	cli_progress_end();
 	for (int i = 0; i < n; i++)
 		incise_recording_close(recordings[i]);

@@ -421,8 +421,7 @@ static void add_calibrations(json_t *to, const char *path, const char *member)
 	char *folder = *member ? cli_text("%s/%s", path, member) : cli_text("%s", path);
 	int n = incise_recalibrations(folder, &list, &err);
 
-	if (n < 0)
-		cli_fail_with(&err);
+	cli_check(n < 0, &err);
 	for (int i = 0; i < n; i++) {
 		const struct incise_recalibration *at = &list[i];
 		char *file = cli_text("%s%s%s", member, *member && *at->file ? "/" : "",
@@ -550,15 +549,13 @@ static void show_recording(const char *path, bool json, bool damaged)
 	free(any);
 	n = incise_session_members(recording, &members);
 
-	if (incise_recording_info(recording, &info, &err))
-		cli_fail_with(&err);
+	cli_check(incise_recording_info(recording, &info, &err), &err);
 	wall = incise_recording_wall(recording, &err);
 	if (!wall && err.code != ENODATA)
 		cli_fail_with(&err);
 	err = (struct incise_error){0};
 	codec = camera_codec(recording);
-	if (incise_prove(path, &listed, &proof, &err))
-		cli_fail_with(&err);
+	cli_check(incise_prove(path, &listed, &proof, &err), &err);
 	intact = recording_intact(path, !info.summary, damaged, &err);
 	if (json)
 		recording_json(&info, codec, intact, wall,
@@ -573,8 +570,7 @@ static void show_recording(const char *path, bool json, bool damaged)
 	incise_proof_free(&proof);
 	incise_wall_free(wall);
 	incise_recording_close(recording);
-	if (err.code)
-		cli_fail_with(&err);
+	cli_check(err.code, &err);
 }
 
 /* --- devices on a bus ---------------------------------------------------------------- */
@@ -742,8 +738,7 @@ static void show_bus(const char *what, bool json)
 	cli_progress("looking on %s", what);
 	rc = incise_scan(NULL, what, keep_info, &found, &err);
 	cli_progress_end();
-	if (rc)
-		cli_fail_with(&err);
+	cli_check(rc, &err);
 	/* A failure, as a file that is missing. */
 	if (!found.n)
 		cli_fail("%s: no answer; check power and cable; on a bus also the node "
@@ -847,9 +842,9 @@ static void show_keys(const char *path, bool scene, const struct info_job *job)
 	struct keys keys = {0};
 	json_t *passed = NULL;
 
-	if (scene ? incise_scene_keys(path, keys_add, &keys, &err)
-		  : incise_rig_keys(rig, keys_add, &keys, &err))
-		cli_fail_with(&err);
+	cli_check(scene ? incise_scene_keys(path, keys_add, &keys, &err)
+			: incise_rig_keys(rig, keys_add, &keys, &err),
+		  &err);
 	if (here)
 		passed = passed_over(rig, job->json);
 	if (job->json)

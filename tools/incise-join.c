@@ -82,8 +82,7 @@ int main(int argc, char **argv)
 	for (int i = optind; i < argc; i++) {
 		argv[i] = (char *)file_operand(argv[i], FILE_RECORDING);
 		recording_intact(argv[i], true, job.damaged, &err);
-		if (err.code)
-			cli_fail_with(&err);
+		cli_check(err.code, &err);
 	}
 	target = recording_target(job.output);
 	if (incise_session_join((const char *const *)argv + optind, argc - optind,

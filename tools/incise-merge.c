@@ -121,9 +121,9 @@ int main(int argc, char **argv)
 		file_expect(options.paths[i], FILE_FACTOR);
 	end = cli_ends_with(options.output, ".fac") ? INCISE_TRAIN_TO_FACTOR
 						    : INCISE_TRAIN_TO_MODEL;
-	if (incise_train_factors((const char *const *)options.paths, options.n,
-				 options.ridge, end, &trained, &err))
-		cli_fail_with(&err);
+	cli_check(incise_train_factors((const char *const *)options.paths, options.n,
+				       options.ridge, end, &trained, &err),
+		  &err);
 	if (trained.model)
 		save_model(&options, &trained);
 	else if (incise_factor_save(trained.factor, options.output, &err))

@@ -310,8 +310,9 @@ int main(int argc, char **argv)
 	path = cli_operand(argc, argv, "FILE", "figure, model or export");
 	if (job.recording)
 		file_expect(job.recording, FILE_RECORDING);
-	if (incise_origins_read(&origins, path, file_kind_of(path) == FILE_MODEL, &err))
-		cli_fail_with(&err);
+	cli_check(incise_origins_read(&origins, path, file_kind_of(path) == FILE_MODEL,
+				      &err),
+		  &err);
 	cli_catch_signals();
 	if (!origins.n)
 		fail_without(path);

@@ -71,51 +71,14 @@ static bool differ(double a, double b)
 	return isnan(a) ? !isnan(b) : !(a == b);
 }
 
-static void print_number(double value)
+/* Nothing, if a value is as it was. */
+static void add_change(json_t *list, const char *key, const char *unit, double before,
+		       double now)
 {
-	if (isnan(value))
-		fputs("unknown", stdout);
-	else
-		printf("%.6g", value);
-}
-
-static void print_change(const char *name, double before, double now, const char *unit,
-			 bool *any)
-{
-	if (!differ(before, now))
-		return;
-	printf("%-18s ", name);
-	print_number(before);
-	fputs(" -> ", stdout);
-	print_number(now);
-	printf(" %s\n", unit);
-	*any = true;
-}
-
-static void print_changes(const struct values *before, const struct values *now,
-			  const struct incise_recording_info *was,
-			  const struct incise_recording_info *is)
-{
-	bool any = false;
-
-	for (size_t i = 0; i < KEYS; i++)
-		print_change(keys[i].key, before->numbers[i], now->numbers[i],
-			     keys[i].unit, &any);
-	for (int i = 0; i < is->n_streams; i++) {
-		char name[40];
-
-		snprintf(name, sizeof(name), "%s_delay_ms", is->streams[i].name);
-		print_change(name, was->streams[i].delay_ms, is->streams[i].delay_ms,
-			     "ms", &any);
-	}
-	if (!any)
-		puts("no value differs from those before");
-}
-
-static json_t *change_json(const char *key, const char *unit, double before, double now)
-{
-	return json_pack("{ss ss so so}", "key", key, "unit", unit, "before",
-			 json_number(before), "now", json_number(now));
+	if (differ(before, now))
+		json_array_append_new(list, json_pack("{ss ss so so}", "key", key, "unit",
+						      unit, "before", json_number(before),
+						      "now", json_number(now)));
 }
 
 static json_t *changes_json(const struct values *before, const struct values *now,
@@ -125,20 +88,39 @@ static json_t *changes_json(const struct values *before, const struct values *no
 	json_t *list = json_array();
 
 	for (size_t i = 0; i < KEYS; i++)
-		if (differ(before->numbers[i], now->numbers[i]))
-			json_array_append_new(list, change_json(keys[i].key, keys[i].unit,
-								before->numbers[i],
-								now->numbers[i]));
+		add_change(list, keys[i].key, keys[i].unit, before->numbers[i],
+			   now->numbers[i]);
 	for (int i = 0; i < is->n_streams; i++) {
 		char name[40];
 
 		snprintf(name, sizeof(name), "%s_delay_ms", is->streams[i].name);
-		if (differ(was->streams[i].delay_ms, is->streams[i].delay_ms))
-			json_array_append_new(list, change_json(name, "ms",
-								was->streams[i].delay_ms,
-								is->streams[i].delay_ms));
+		add_change(list, name, "ms", was->streams[i].delay_ms,
+			   is->streams[i].delay_ms);
 	}
 	return list;
+}
+
+static void print_number(const json_t *value)
+{
+	if (json_is_null(value))
+		fputs("unknown", stdout);
+	else
+		printf("%.6g", json_number_value(value));
+}
+
+static void print_changes(const json_t *changes)
+{
+	for (size_t i = 0; i < json_array_size(changes); i++) {
+		const json_t *change = json_array_get(changes, i);
+
+		printf("%-18s ", json_string_value(json_object_get(change, "key")));
+		print_number(json_object_get(change, "before"));
+		fputs(" -> ", stdout);
+		print_number(json_object_get(change, "now"));
+		printf(" %s\n", json_string_value(json_object_get(change, "unit")));
+	}
+	if (!json_array_size(changes))
+		puts("no value differs from those before");
 }
 
 int main(int argc, char **argv)
@@ -149,6 +131,7 @@ int main(int argc, char **argv)
 	struct incise_error err = {0};
 	struct recalibrate_job job = {0};
 	const char *path;
+	json_t *changes;
 	bool known;
 
 	cli_parse(&command, argc, argv, &job);
@@ -165,21 +148,22 @@ int main(int argc, char **argv)
 		file_expect(job.calibration, FILE_CALIBRATION);
 	/* Where the active one is damaged, the way to another must work. */
 	known = read_values(path, &before, &was, &err);
-	if (incise_recalibrate(path, job.calibration, &made, &err) ||
-	    !read_values(path, &now, &is, &err))
-		cli_fail_with(&err);
+	cli_check(incise_recalibrate(path, job.calibration, &made, &err) ||
+			  !read_values(path, &now, &is, &err),
+		  &err);
 	if (!known) {
 		before = now;
 		was = is;
 	}
+	changes = changes_json(&before, &now, &was, &is);
 	if (job.json) {
 		json_print(json_pack("{so ss ss so so}", "path", json_text(path), "file",
 				     made.file, "date", made.date, "sha256",
-				     json_text_or_null(made.sha256), "changes",
-				     changes_json(&before, &now, &was, &is)));
+				     json_text_or_null(made.sha256), "changes", changes));
 	} else {
 		if (known)
-			print_changes(&before, &now, &was, &is);
+			print_changes(changes);
+		json_decref(changes);
 		printf("wrote %s/%s\n", path, made.file);
 	}
 	cli_finish();

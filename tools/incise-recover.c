@@ -75,15 +75,13 @@ int main(int argc, char **argv)
 		cli_fail(
 			"%s; 'incise verify %s' lists all; --damaged converts it as it is",
 			err.text, path);
-	if (rc)
-		cli_fail_with(&err);
+	cli_check(rc, &err);
 	if (*made.altered)
 		cli_warn("%s: not as it was recorded: %s", path, made.altered);
 	recording_replace(target, job.output);
 	free(target);
 	recording = cli_require(incise_recording_open(job.output, &err), &err);
-	if (incise_recording_info(recording, &info, &err))
-		cli_fail_with(&err);
+	cli_check(incise_recording_info(recording, &info, &err), &err);
 	incise_recording_close(recording);
 	converted = made.converted;
 	if (job.json)

@@ -310,8 +310,7 @@ int main(int argc, char **argv)
 		incise_outfile_abort(file);
 	else if (file)
 		rc = incise_outfile_commit(file, &err);
-	if (rc)
-		cli_fail_with(&err);
+	cli_check(rc, &err);
 	if (cli_stop)
 		cli_fail("%s: interrupted %.1f s after its beginning%s", job.recording,
 			 report.seconds, job.csv ? "; nothing was written" : "");

@@ -122,8 +122,7 @@ int main(int argc, char **argv)
 	rc = incise_prove(path, &job.prove, &proof, &err);
 	if (!job.json)
 		proof_print(&proof, true);
-	if (rc)
-		cli_fail_with(&err);
+	cli_check(rc, &err);
 	last = &proof.seals[proof.n - 1];
 	if (job.json)
 		print_sign_json(path, &proof);

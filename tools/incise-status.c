@@ -155,8 +155,7 @@ static bool state_follow(const struct state_page_file *page, bool json)
 	}
 	if (view && look.now)
 		screen(false);
-	if (err.code)
-		cli_fail_with(&err);
+	cli_check(err.code, &err);
 	/* A loop that had ended before is shown once; a view shows its last state. */
 	if (view || !look.now) {
 		look.now = &looks[i];

@@ -389,8 +389,7 @@ static void join_job(void)
 {
 	struct incise_error err = {0};
 
-	if (incise_ranks_open(&job, &err))
-		cli_fail_with(&err);
+	cli_check(incise_ranks_open(&job, &err), &err);
 	atexit(leave_job);
 	if (job->rank &&
 	    (!freopen("/dev/null", "w", stdout) || !freopen("/dev/null", "w", stderr)))
@@ -809,8 +808,7 @@ static void save_factor(const struct train_options *options, struct incise_facto
 	struct incise_factor_info info;
 	struct incise_error err = {0};
 
-	if (incise_factor_save(factor, options->factor, &err))
-		cli_fail_with(&err);
+	cli_check(incise_factor_save(factor, options->factor, &err), &err);
 	incise_factor_info(factor, &info);
 	if (!strcmp(options->factor, "-"))
 		return;

@@ -289,8 +289,7 @@ int main(int argc, char **argv)
 	sink.path = file_operand(argv[optind], FILE_RECORDING);
 	sink.list = job.json ? json_array() : NULL;
 	cli_catch_signals();
-	if (incise_prove(sink.path, &job.prove, &proof, &err))
-		cli_fail_with(&err);
+	cli_check(incise_prove(sink.path, &job.prove, &proof, &err), &err);
 	cli_progress_end();
 	if (job.json) {
 		print_verify_json(&proof.report, &sink, proof_json(&proof));

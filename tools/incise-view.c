@@ -204,8 +204,7 @@ static void end_files(struct view_job *job)
 				 cli_stop ? strsignal(cli_stop) : job->fault, &err);
 
 	view_output_end(&job->output);
-	if (rc)
-		cli_fail_with(&err);
+	cli_check(rc, &err);
 }
 
 int main(int argc, char **argv)

@@ -4,7 +4,6 @@
  * PATH, so that anyone can add a command. Where there is a program
  * incise-COMMAND-SUBCOMMAND next to this one, incise COMMAND SUBCOMMAND … runs that.
  */
-#include <dirent.h>
 #include <dlfcn.h>
 #include <errno.h>
 #include <limits.h>

@@ -6,7 +6,6 @@
 #ifndef INCISE_CONF_H
 #define INCISE_CONF_H
 
-#include <stdbool.h>
 #include <libconfig.h>
 #include <incise/error.h>
 

@@ -2,6 +2,7 @@
 /*
  * Errors as values; see incise/error.h.
  */
+#include <ctype.h>
 #include <errno.h>
 #include <stdarg.h>
 #include <stdbool.h>
@@ -25,11 +26,6 @@ int incise_error_set(struct incise_error *err, int code, const char *fmt, ...)
 	}
 	errno = code;
 	return -code;
-}
-
-static bool is_error_digit(char c)
-{
-	return c >= '0' && c <= '9';
 }
 
 /*
@@ -65,7 +61,7 @@ static bool package_of(const char *soname, size_t length, char *package, size_t 
 		return false;
 	for (const char *c = soname; c < so; c++)
 		package[n++] = *c == '_' ? '-' : *c >= 'A' && *c <= 'Z' ? *c + 32 : *c;
-	if (is_error_digit(so[-1]))
+	if (isdigit((unsigned char)so[-1]))
 		package[n++] = '-';
 	for (const char *c = so + 4; c < soname + length; c++)
 		package[n++] = *c;

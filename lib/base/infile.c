@@ -127,8 +127,8 @@ struct incise_infile *incise_infile_open(const char *path,
 	if (!file || !data) {
 		free(file);
 		free(data);
-		incise_error_set(err, ENOMEM, "%.200s: no memory to read it", path);
-		return NULL;
+		return INCISE_ERROR_NULL(err, ENOMEM, "%.200s: no memory to read it",
+					 path);
 	}
 	*file = (struct incise_infile){.path = path,
 				       .kind = kind,

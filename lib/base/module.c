@@ -77,12 +77,19 @@ int incise_module_absent(const char *file, const char *where, const char *packag
 				packages);
 }
 
-int incise_module_refuse(struct incise_module *module, const char *file,
-			 const char *where, struct incise_error *err)
+const void *incise_module_load(const char *file, const char *symbol, unsigned int abi,
+			       const char *where, const char *packages,
+			       struct incise_error *err)
 {
-	dlclose(module->handle);
-	return incise_error_set(err, ENOEXEC,
-				"%s: %s was built for another version of incise; build "
-				"it again",
-				where, file);
+	struct incise_module module;
+
+	if (incise_module_find(&module, file, symbol, where, packages, err))
+		return NULL;
+	if (*(const unsigned int *)module.symbol == abi)
+		return module.symbol;
+	dlclose(module.handle);
+	return INCISE_ERROR_NULL(err, ENOEXEC,
+				 "%s: %s was built for another version of incise; build "
+				 "it again",
+				 where, file);
 }

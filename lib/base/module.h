@@ -35,8 +35,12 @@ int incise_module_find(struct incise_module *module, const char *file, const cha
 int incise_module_absent(const char *file, const char *where, const char *packages,
 			 struct incise_error *err);
 
-/* -ENOEXEC: unload a module that was made for another version. */
-int incise_module_refuse(struct incise_module *module, const char *file,
-			 const char *where, struct incise_error *err);
+/*
+ * Its symbol, a struct that begins with the version of its interface, for good. NULL with errno of
+ * incise_module_find(), and ENOEXEC for another version.
+ */
+const void *incise_module_load(const char *file, const char *symbol, unsigned int abi,
+			       const char *where, const char *packages,
+			       struct incise_error *err);
 
 #endif

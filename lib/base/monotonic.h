@@ -20,12 +20,17 @@
 #endif
 #endif
 
-static INCISE_REALTIME inline int64_t incise_monotonic_ns(void)
+static INCISE_REALTIME inline int64_t incise_read_clock_ns(clockid_t clock)
 {
 	struct timespec now;
 
-	clock_gettime(CLOCK_MONOTONIC, &now);
+	clock_gettime(clock, &now);
 	return now.tv_sec * INT64_C(1000000000) + now.tv_nsec;
+}
+
+static INCISE_REALTIME inline int64_t incise_monotonic_ns(void)
+{
+	return incise_read_clock_ns(CLOCK_MONOTONIC);
 }
 
 /* A signal may end the sleep early. */

@@ -10,7 +10,6 @@
 #include <math.h>
 #include <stddef.h>
 #include <stdint.h>
-#include <incise/export.h>
 
 /* Streams of the virtual rig. */
 enum incise_random_purpose {

@@ -2,6 +2,7 @@
 /*
  * Reading a text file word by word; see text.h.
  */
+#include <ctype.h>
 #include <errno.h>
 #include <math.h>
 #include <stdint.h>
@@ -83,11 +84,6 @@ bool text_next_word(struct text *text, const char **word, size_t *length)
 	return true;
 }
 
-static bool is_text_digit(char c)
-{
-	return c >= '0' && c <= '9';
-}
-
 /* For numbers that the fast way cannot round correctly. */
 static bool slow_number(const char *word, size_t length, double *value)
 {
@@ -116,7 +112,8 @@ bool text_number(const char *word, size_t length, double *value)
 
 	if (at < end && (*at == '-' || *at == '+'))
 		negative = *at++ == '-';
-	for (; at < end && (is_text_digit(*at) || (*at == '.' && !fraction)); at++) {
+	for (; at < end && (isdigit((unsigned char)*at) || (*at == '.' && !fraction));
+	     at++) {
 		if (*at == '.') {
 			fraction = true;
 			continue;
@@ -133,7 +130,7 @@ bool text_number(const char *word, size_t length, double *value)
 		at++;
 		if (at < end && (*at == '-' || *at == '+'))
 			down = *at++ == '-';
-		for (; at < end && is_text_digit(*at); at++, exponent_digits++)
+		for (; at < end && isdigit((unsigned char)*at); at++, exponent_digits++)
 			exponent = exponent < 10000 ? exponent * 10 + (*at - '0') : 10000;
 		if (!exponent_digits)
 			return false;
@@ -159,7 +156,7 @@ const char *text_integer(const char *word, const char *end, long long *value)
 
 	at += negative;
 	*value = 0;
-	for (; at < end && is_text_digit(*at); at++) {
+	for (; at < end && isdigit((unsigned char)*at); at++) {
 		if (++digits > 10)
 			return NULL;
 		*value = *value * 10 + (*at - '0');

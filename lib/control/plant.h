@@ -24,7 +24,6 @@
 #define INCISE_PLANT_H
 
 #include <stdbool.h>
-#include <incise/export.h>
 
 /* Zero it, then set its members; all of them may be changed between two steps. */
 struct incise_plant {

@@ -14,7 +14,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <incise/clock.h>
-#include "../base/units.h"
 #include "../base/vector.h"
 #include "eigenvalues.h"
 #include "pose_loop.h"

@@ -25,7 +25,6 @@
 #ifndef INCISE_PREDICT_H
 #define INCISE_PREDICT_H
 
-#include <stdbool.h>
 #include <stdint.h>
 #include <incise/export.h>
 #include <incise/tracker.h>

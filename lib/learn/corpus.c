@@ -12,6 +12,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include "../base/grow.h"
 #include "../base/random.h"
 #include "corpus.h"
 #include "pairs.h"
@@ -41,9 +42,9 @@ struct incise_corpus {
 	bool grouped;
 	uint64_t seed;
 	struct incise_corpus_survey *surveys;
-	int n_surveys, survey_capacity;
+	int n_surveys;
 	struct candidate *rows; /* those of the smallest keys first, then more */
-	size_t n_rows, capacity, sample;
+	size_t n_rows, capacity, survey_capacity, sample;
 	uint64_t limit; /* keys above it are not in the sample */
 	uint64_t *bins; /* rows by their number for checking; NULL with groups */
 	struct incise_propagation *propagation; /* or NULL */
@@ -326,16 +327,9 @@ static int add_survey(struct incise_corpus *corpus, const char *name, const char
 				"%.199s: has the same content as %s; give each "
 				"recording once",
 				name, corpus->surveys[i].name);
-	if (corpus->n_surveys == corpus->survey_capacity) {
-		int capacity = corpus->survey_capacity ? 2 * corpus->survey_capacity : 16;
-		void *surveys =
-			realloc(corpus->surveys, capacity * sizeof(*corpus->surveys));
-
-		if (!surveys)
-			return incise_error_set(err, ENOMEM, "no memory");
-		corpus->surveys = surveys;
-		corpus->survey_capacity = capacity;
-	}
+	if (!grow_array(&corpus->surveys, (size_t)corpus->n_surveys,
+			&corpus->survey_capacity, 16, sizeof(*corpus->surveys)))
+		return incise_error_set(err, ENOMEM, "no memory");
 	corpus->surveys[corpus->n_surveys] = (struct incise_corpus_survey){0};
 	snprintf(corpus->surveys[corpus->n_surveys].name, sizeof(corpus->surveys->name),
 		 "%s", name);

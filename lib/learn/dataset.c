@@ -10,17 +10,18 @@
 #include <stdlib.h>
 #include <string.h>
 #include <incise/arrow.h>
+#include "../base/grow.h"
 #include "../base/lines.h"
 #include "pairs.h"
 
 #define FIELDS_MAX 256
 
 struct incise_dataset {
-	size_t rows, capacity;
+	size_t rows, capacity, group_capacity;
 	int columns;
 	double *values; /* row by row */
 	int *group;	/* per row, or NULL */
-	int n_groups, group_capacity;
+	int n_groups;
 	char **names; /* of groups */
 };
 
@@ -166,20 +167,12 @@ static int read_dataset_number(struct dataset_reader *in, int field, const char 
 /* Most rows belong to the group of the row before, or to the last few. */
 static int find_group(struct incise_dataset *data, const char *name)
 {
-	char **names;
-
 	for (int i = data->n_groups - 1; i >= 0; i--)
 		if (!strcmp(data->names[i], name))
 			return i;
-	if (data->n_groups == data->group_capacity) {
-		int capacity = data->group_capacity ? 2 * data->group_capacity : 64;
-
-		names = realloc(data->names, capacity * sizeof(*names));
-		if (!names)
-			return -ENOMEM;
-		data->names = names;
-		data->group_capacity = capacity;
-	}
+	if (!grow_array(&data->names, (size_t)data->n_groups, &data->group_capacity, 64,
+			sizeof(*data->names)))
+		return -ENOMEM;
 	data->names[data->n_groups] = strdup(name);
 	return data->names[data->n_groups] ? data->n_groups++ : -ENOMEM;
 }

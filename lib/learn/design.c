@@ -62,11 +62,6 @@ int incise_design_add_to(struct incise_design *design, struct incise_gram *gram,
 	return rc;
 }
 
-int incise_design_add(struct incise_design *design, const double *raw)
-{
-	return incise_design_add_to(design, design->gram, raw, 1);
-}
-
 void incise_design_target(const struct incise_design *design, struct incise_gram *gram,
 			  struct incise_scaling *scaling, double *mean, double *scale)
 {

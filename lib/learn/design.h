@@ -27,12 +27,9 @@ int incise_design_init(struct incise_design *design, const struct incise_model *
 		       double min, double max);
 void incise_design_free(struct incise_design *design);
 
-/* Add a raw pair; -ERANGE if it is a whole range or more outside, -EOVERFLOW (gram.h). */
-int incise_design_add(struct incise_design *design, const double *raw);
-
 /*
- * The same with the gram of another design of these premises, of the same width, and with a weight
- * above 0 and at most 1 of its square.
+ * Add a raw pair to the gram of a design of these premises, of the same width, with a weight above 0
+ * and at most 1 of its square; -ERANGE if it is a whole range or more outside, -EOVERFLOW (gram.h).
  */
 int incise_design_add_to(struct incise_design *design, struct incise_gram *gram,
 			 const double *raw, double weight);

@@ -5,7 +5,6 @@
  */
 #include <endian.h>
 #include <errno.h>
-#include <fcntl.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -17,6 +16,7 @@
 #include "../base/c_locale.h"
 #include "../base/crc32c.h"
 #include "../base/crypto/sha256.h"
+#include "../base/grow.h"
 #include "../base/random.h"
 #include "design.h"
 #include "factor.h"
@@ -43,8 +43,9 @@ struct incise_factor {
 	char hash[65];
 	double min[INCISE_MODEL_INPUTS_MAX + 1], max[INCISE_MODEL_INPUTS_MAX + 1];
 	struct incise_factor_source *sources;
-	int n_sources, capacity;
-	int at; /* the source that pairs are added to */
+	int n_sources;
+	size_t capacity; /* of sources */
+	int at;		 /* the source that pairs are added to */
 	char version[40], options[INCISE_FACTOR_TEXT_MAX];
 };
 
@@ -114,21 +115,19 @@ static struct incise_model *bare_model(const struct incise_model *from,
 	for (int i = 0; i < info->n_inputs; i++) {
 		inputs[i] = info->input[i];
 		for (int k = 0; k < info->n_mfs[i]; k++)
-			if (incise_model_mf(from, i, k)->type != type) {
-				incise_error_set(err, ENOTSUP,
-						 "the premises have functions of several "
-						 "kinds; expected one kind");
-				return NULL;
-			}
+			if (incise_model_mf(from, i, k)->type != type)
+				return INCISE_ERROR_NULL(
+					err, ENOTSUP,
+					"the premises have functions of several "
+					"kinds; expected one kind");
 		if (strchr(inputs[i].name, '\n'))
 			inputs[i].name[strcspn(inputs[i].name, "\n")] = 0;
 	}
-	if (!(info->output.min < info->output.max)) {
-		incise_error_set(err, EINVAL,
-				 "the premises' output has no range; give a model that "
-				 "incise train wrote");
-		return NULL;
-	}
+	if (!(info->output.min < info->output.max))
+		return INCISE_ERROR_NULL(
+			err, EINVAL,
+			"the premises' output has no range; give a model that "
+			"incise train wrote");
 	model = incise_model_new_grid(info->n_inputs, inputs, info->n_mfs, type,
 				      &info->output, err);
 	for (int i = 0; i < info->n_inputs && model; i++)
@@ -232,16 +231,9 @@ static int insert_source(struct incise_factor *factor,
 {
 	int at = factor->n_sources;
 
-	if (factor->n_sources == factor->capacity) {
-		int capacity = factor->capacity ? 2 * factor->capacity : 16;
-		void *sources =
-			realloc(factor->sources, capacity * sizeof(*factor->sources));
-
-		if (!sources)
-			return -1;
-		factor->sources = sources;
-		factor->capacity = capacity;
-	}
+	if (!grow_array(&factor->sources, (size_t)at, &factor->capacity, 16,
+			sizeof(*factor->sources)))
+		return -1;
 	for (; at > 0 && strcmp(factor->sources[at - 1].hash, source->hash) > 0; at--)
 		factor->sources[at] = factor->sources[at - 1];
 	factor->sources[at] = *source;
@@ -954,22 +946,18 @@ static struct incise_factor *decode_factor(struct decoder *in, size_t size)
 		damaged_factor(in, "expected 'incise factor'");
 		return NULL;
 	}
-	if (form == 1) {
-		incise_error_set(
+	if (form == 1)
+		return INCISE_ERROR_NULL(
 			in->err, ENOTSUP,
 			"%s: is of form 1, whose small parts reveal their pairs: "
 			"delete it, and write it again by incise train -o FILE.fac",
 			in->name);
-		return NULL;
-	}
-	if (form != FORM) {
-		incise_error_set(
+	if (form != FORM)
+		return INCISE_ERROR_NULL(
 			in->err, ENOTSUP,
 			"%s: is of form %llu, and this incise reads form %d; use "
 			"the same version of incise everywhere",
 			in->name, (unsigned long long)form, FORM);
-		return NULL;
-	}
 	memcpy(&crc, in->end, sizeof(crc));
 	*line = '\n';
 	if (le32toh(crc) !=
@@ -982,13 +970,12 @@ static struct incise_factor *decode_factor(struct decoder *in, size_t size)
 		damaged_factor(in, "expected a version");
 		return NULL;
 	}
-	if (strcmp(line, incise_version())) {
-		incise_error_set(in->err, ENOTSUP,
-				 "%s: is of incise %s, and this is %s; use the same "
-				 "version everywhere",
-				 in->name, line, incise_version());
-		return NULL;
-	}
+	if (strcmp(line, incise_version()))
+		return INCISE_ERROR_NULL(
+			in->err, ENOTSUP,
+			"%s: is of incise %s, and this is %s; use the same "
+			"version everywhere",
+			in->name, line, incise_version());
 	line = next_factor_line(in, "premises");
 	if (!line || !is_hash(line) || line[64]) {
 		damaged_factor(in, "expected the premises' hash");

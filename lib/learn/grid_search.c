@@ -279,13 +279,11 @@ struct incise_model *incise_train_start(const struct incise_pairs *pairs,
 		v->min = options->ranges[i].min;
 		v->max = options->ranges[i].max;
 	}
-	if (!isfinite(out.max - out.min)) {
-		incise_error_set(
+	if (!isfinite(out.max - out.min))
+		return INCISE_ERROR_NULL(
 			err, EINVAL,
 			"column %s spans %g to %g, too wide for a double; scale it",
 			out.name, out.min, out.max);
-		return NULL;
-	}
 	if (!(out.min < out.max))
 		out.max = out.min + fmax(fabs(out.min), 1) * 1e-6;
 	if (!*n_mfs && incise_choose_grid(pairs, in, type, options, n_mfs, err))

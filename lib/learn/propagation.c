@@ -60,10 +60,8 @@ struct incise_propagation *incise_propagation_new(
 {
 	struct incise_propagation *p = calloc(1, sizeof(*p));
 
-	if (!p) {
-		incise_error_set(err, ENOMEM, "no memory for uncertainties");
-		return NULL;
-	}
+	if (!p)
+		return INCISE_ERROR_NULL(err, ENOMEM, "no memory for uncertainties");
 	p->n_inputs = n_inputs;
 	p->n_parts = n < 0 ? 0 : n;
 	for (int i = 0; i < n; i++)

@@ -2,17 +2,13 @@
 /*
  * A small file of /proc or /sys; see proc_file.h.
  */
+#include <ctype.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <unistd.h>
 #include "proc_file.h"
-
-static bool is_proc_file_digit(char c)
-{
-	return c >= '0' && c <= '9';
-}
 
 static bool is_blank(char c)
 {
@@ -67,7 +63,7 @@ bool proc_file_integer(const char *text, long long *value)
 	const char *digits = text + (*text == '-');
 	char *end;
 
-	if (!is_proc_file_digit(*digits))
+	if (!isdigit((unsigned char)*digits))
 		return false;
 	errno = 0;
 	*value = strtoll(text, &end, 10);
@@ -80,9 +76,9 @@ static const char *read_proc_number(const char *text, int *value)
 	int length = 0;
 
 	*value = 0;
-	while (is_proc_file_digit(text[length]) && length < 9)
+	while (isdigit((unsigned char)text[length]) && length < 9)
 		*value = *value * 10 + (text[length++] - '0');
-	return length && !is_proc_file_digit(text[length]) ? text + length : NULL;
+	return length && !isdigit((unsigned char)text[length]) ? text + length : NULL;
 }
 
 bool proc_file_lists(const char *list, int cpu)

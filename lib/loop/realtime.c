@@ -321,10 +321,8 @@ struct incise_realtime *incise_realtime_new(const struct incise_realtime_setup *
 	if (require(setup, err))
 		return NULL;
 	realtime = malloc(sizeof(*realtime));
-	if (!realtime) {
-		incise_error_set(err, ENOMEM, "real time: no memory");
-		return NULL;
-	}
+	if (!realtime)
+		return INCISE_ERROR_NULL(err, ENOMEM, "real time: no memory");
 	*realtime = (struct incise_realtime){.setup = *setup};
 	if (mlockall(MCL_CURRENT | MCL_FUTURE)) {
 		incise_error_set(err, errno,

@@ -150,8 +150,7 @@ struct incise_state *incise_state_open(const char *path, struct incise_error *er
 	close(state->fd);
 no_memory:
 	free(state);
-	incise_error_set(err, ENOMEM, "%s: no memory to read it", path);
-	return NULL;
+	return INCISE_ERROR_NULL(err, ENOMEM, "%s: no memory to read it", path);
 failed:
 	close(state->fd);
 	free(state);

@@ -172,10 +172,7 @@ static struct state_part part(size_t offset, size_t size, size_t count)
 
 static void put_head(struct state_head *head, const struct incise_state_setup *setup)
 {
-	struct timespec now;
-
-	clock_gettime(CLOCK_REALTIME, &now);
-	head->start_realtime_ns = now.tv_sec * INCISE_NS_PER_S + now.tv_nsec;
+	head->start_realtime_ns = incise_read_clock_ns(CLOCK_REALTIME);
 	head->start_ns = incise_monotonic_ns();
 	head->major = STATE_MAJOR;
 	head->minor = STATE_MINOR;
@@ -406,12 +403,10 @@ struct incise_state_writer *incise_state_new(const char *path,
 	struct mirror *m;
 	int rc;
 
-	if (!(setup->rate_hz > 0) || !isfinite(setup->rate_hz)) {
-		incise_error_set(err, EINVAL,
-				 "the loop's rate is %g Hz: expected more than 0",
-				 setup->rate_hz);
-		return NULL;
-	}
+	if (!(setup->rate_hz > 0) || !isfinite(setup->rate_hz))
+		return INCISE_ERROR_NULL(err, EINVAL,
+					 "the loop's rate is %g Hz: expected more than 0",
+					 setup->rate_hz);
 	w = aligned_alloc(64, sizeof(*w));
 	if (!w)
 		goto no_memory;

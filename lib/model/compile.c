@@ -169,10 +169,8 @@ static struct incise_fixed *image_finish(struct image *image, struct incise_erro
 	struct incise_fx_header *head;
 	int rc;
 
-	if (!owned) {
-		incise_error_set(err, ENOMEM, "no memory for a compiled model");
-		return NULL;
-	}
+	if (!owned)
+		return INCISE_ERROR_NULL(err, ENOMEM, "no memory for a compiled model");
 	head = (struct incise_fx_header *)owned->blob;
 	memcpy(owned->blob, &image->head, front);
 	memcpy((uint8_t *)owned->blob + front, image->data, image->size);
@@ -201,11 +199,10 @@ static struct incise_fixed *image_finish(struct image *image, struct incise_erro
 	rc = incise_fixed_open(&owned->fx, owned->blob, (uint32_t)size);
 	if (rc) {
 		free(owned);
-		incise_error_set(
+		return INCISE_ERROR_NULL(
 			err, ERANGE,
 			"fixed point: the model's numbers exceed all number formats; "
 			"use double");
-		return NULL;
 	}
 	return &owned->fx;
 }
@@ -597,10 +594,8 @@ struct incise_fixed *incise_fixed_compile(const struct incise_model *model,
 	incise_fixed_options_init(&o);
 	if (options)
 		o = *options;
-	if (!grid) {
-		incise_error_set(err, ENOMEM, "no memory to compile a model");
-		return NULL;
-	}
+	if (!grid)
+		return INCISE_ERROR_NULL(err, ENOMEM, "no memory to compile a model");
 	if (o.arithmetic > INCISE_FIXED_FORCE || o.cells > cell_counts[N_COUNTS - 1]) {
 		incise_error_set(err, EINVAL,
 				 "fixed point: unknown arithmetic, or more than %d cells",
@@ -674,14 +669,14 @@ struct incise_fixed *incise_fixed_load(const char *path, struct incise_error *er
 	if (!rc)
 		return &owned->fx;
 	free(owned);
-	incise_error_set(err, -rc,
-			 rc == -EINVAL	  ? "%s: not a .fx file, or damaged; compile "
-					    "the model again"
-			 : rc == -ENOTSUP ? "%s: a .fx file of another version; compile "
-					    "the model again"
-					  : "%s: no memory to read it",
-			 path);
-	return NULL;
+	return INCISE_ERROR_NULL(
+		err, -rc,
+		rc == -EINVAL	 ? "%s: not a .fx file, or damaged; compile "
+				   "the model again"
+		: rc == -ENOTSUP ? "%s: a .fx file of another version; compile "
+				   "the model again"
+				 : "%s: no memory to read it",
+		path);
 }
 
 int incise_fixed_save(const struct incise_fixed *fx, const char *path,

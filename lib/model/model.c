@@ -112,49 +112,38 @@ struct incise_model *incise_model_new_grid(int n_inputs,
 	struct incise_model *model;
 	int n_rules = 1;
 
-	if (n_inputs < 1 || n_inputs > INCISE_MODEL_INPUTS_MAX) {
-		incise_error_set(err, EINVAL, "%d inputs: a model has 1 to %d", n_inputs,
-				 INCISE_MODEL_INPUTS_MAX);
-		return NULL;
-	}
-	if (!incise_mf_type_known(type) || type == INCISE_MF_SIG) {
-		incise_error_set(err, EINVAL, "%s does not make a grid: it has no centre",
-				 type == INCISE_MF_SIG ? "sigmf" : "an unknown function");
-		return NULL;
-	}
+	if (n_inputs < 1 || n_inputs > INCISE_MODEL_INPUTS_MAX)
+		return INCISE_ERROR_NULL(err, EINVAL, "%d inputs: a model has 1 to %d",
+					 n_inputs, INCISE_MODEL_INPUTS_MAX);
+	if (!incise_mf_type_known(type) || type == INCISE_MF_SIG)
+		return INCISE_ERROR_NULL(
+			err, EINVAL, "%s does not make a grid: it has no centre",
+			type == INCISE_MF_SIG ? "sigmf" : "an unknown function");
 	for (int i = 0; i < n_inputs; i++) {
 		const struct incise_variable *in = &inputs[i];
 
-		if (!isfinite(in->max - in->min) || !(in->min < in->max)) {
-			incise_error_set(
+		if (!isfinite(in->max - in->min) || !(in->min < in->max))
+			return INCISE_ERROR_NULL(
 				err, EINVAL,
 				"input %s: its range is %g to %g: it must be finite "
 				"and not empty; check whether the column is constant",
 				in->name, in->min, in->max);
-			return NULL;
-		}
-		if (n_mfs[i] < 1 || n_mfs[i] > INCISE_MODEL_MFS_MAX) {
-			incise_error_set(
+		if (n_mfs[i] < 1 || n_mfs[i] > INCISE_MODEL_MFS_MAX)
+			return INCISE_ERROR_NULL(
 				err, EINVAL,
 				"input %s: %d membership functions: it can have 1 to %d",
 				in->name, n_mfs[i], INCISE_MODEL_MFS_MAX);
-			return NULL;
-		}
 		n_rules *= n_mfs[i];
-		if (n_rules > INCISE_MODEL_RULES_MAX) {
-			incise_error_set(
+		if (n_rules > INCISE_MODEL_RULES_MAX)
+			return INCISE_ERROR_NULL(
 				err, E2BIG,
 				"the grid has %d rules or more: at most %d; give fewer "
 				"membership functions",
 				n_rules, INCISE_MODEL_RULES_MAX);
-			return NULL;
-		}
 	}
 	model = calloc(1, sizeof(*model));
-	if (!model) {
-		incise_error_set(err, ENOMEM, "no memory for a model");
-		return NULL;
-	}
+	if (!model)
+		return INCISE_ERROR_NULL(err, ENOMEM, "no memory for a model");
 	snprintf(model->info.name, sizeof(model->info.name), "incise");
 	model->info.n_inputs = n_inputs;
 	model->info.n_rules = n_rules;

@@ -112,10 +112,9 @@ struct incise_uncertainty *incise_uncertainty_new(const struct incise_model *mod
 	bool good = isfinite(noise) && noise >= 0;
 	double *to;
 
-	if (!u) {
-		incise_error_set(err, ENOMEM, "no memory for the standard deviation");
-		return NULL;
-	}
+	if (!u)
+		return INCISE_ERROR_NULL(err, ENOMEM,
+					 "no memory for the standard deviation");
 	u->noise = noise;
 	to = u->factor;
 	for (int i = 0; i < u->n; i++)
@@ -126,10 +125,10 @@ struct incise_uncertainty *incise_uncertainty_new(const struct incise_model *mod
 		}
 	if (!good) {
 		incise_uncertainty_free(u);
-		incise_error_set(err, EINVAL,
-				 "no standard deviation: its factor is singular or not "
-				 "finite; use a ridge");
-		return NULL;
+		return INCISE_ERROR_NULL(
+			err, EINVAL,
+			"no standard deviation: its factor is singular or not "
+			"finite; use a ridge");
 	}
 	return u;
 }
@@ -516,10 +515,8 @@ struct incise_uncertainty *incise_uncertainty_load(const char *path,
 	struct incise_lines in;
 	int rc;
 
-	if (!u) {
-		incise_error_set(err, ENOMEM, "%s: no memory to read it", path);
-		return NULL;
-	}
+	if (!u)
+		return INCISE_ERROR_NULL(err, ENOMEM, "%s: no memory to read it", path);
 	rc = incise_lines_open(&in, path, &sd, err);
 	if (!rc) {
 		rc = read_uncertainty_file(&in, u);

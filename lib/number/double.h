@@ -8,7 +8,6 @@
 #include <float.h>
 #include "../base/vector.h"
 #include <incise/clock.h>
-#include <incise/export.h>
 #include <stdint.h>
 #include "double_kind.h"
 #include "both.h"

@@ -795,10 +795,9 @@ struct incise_budget *incise_budget_open(struct incise_recording *recording,
 	};
 	int rc;
 
-	if (!budget) {
-		incise_error_set(err, ENOMEM, "%s: out of memory", recording->path);
-		return NULL;
-	}
+	if (!budget)
+		return INCISE_ERROR_NULL(err, ENOMEM, "%s: out of memory",
+					 recording->path);
 	for (int i = 0; i < INCISE_BUDGET_SOURCES; i++) {
 		budget->u[i] = NAN;
 		for (int k = 0; k < INCISE_BUDGET_SOURCES; k++)

@@ -56,22 +56,15 @@ static const struct format *find_format(const char *path)
 static const struct incise_table_format *load_format(const struct format *format,
 						     struct incise_error *err)
 {
-	const struct incise_table_format *loaded = format->built_in;
-	struct incise_module module;
 	char file[40], symbol[40], package[40];
 
-	if (loaded)
-		return loaded;
+	if (format->built_in)
+		return format->built_in;
 	snprintf(file, sizeof(file), "export_%s.so", format->id);
 	snprintf(symbol, sizeof(symbol), "incise_table_%s", format->id);
 	snprintf(package, sizeof(package), "%s is", format->package);
-	if (incise_module_find(&module, file, symbol, format->name, package, err))
-		return NULL;
-	loaded = module.symbol;
-	if (loaded->abi == INCISE_TABLE_ABI)
-		return loaded;
-	errno = -incise_module_refuse(&module, file, format->name, err);
-	return NULL;
+	return incise_module_load(file, symbol, INCISE_TABLE_ABI, format->name, package,
+				  err);
 }
 
 void incise_export_options_init(struct incise_export_options *options)

@@ -8,6 +8,7 @@
 #include <string.h>
 #include <incise/tracker.h>
 #include <incise/uncertainty.h>
+#include "../base/grow.h"
 #include "../base/vector.h"
 #include "../tissue/tick.h"
 #include "interpolators.h"
@@ -90,16 +91,9 @@ int incise_force_interpolator_more(struct incise_force_interpolator *force,
 
 	if (rc <= 0)
 		return rc;
-	if (force->n == force->capacity) {
-		size_t capacity = force->capacity ? 2 * force->capacity : 1024;
-		struct incise_force_code *samples =
-			realloc(force->samples, capacity * sizeof(*samples));
-
-		if (!samples)
-			return incise_error_set(err, ENOMEM, "out of memory");
-		force->samples = samples;
-		force->capacity = capacity;
-	}
+	if (!grow_array(&force->samples, force->n, &force->capacity, 1024,
+			sizeof(*force->samples)))
+		return incise_error_set(err, ENOMEM, "out of memory");
 	code = incise_rows_int(&force->rows, 2);
 	if (code < 0 || code > force->scale.top)
 		return incise_error_set(err, EINVAL,

@@ -694,10 +694,8 @@ static struct stream *make_stream(const char *path, const char *what,
 {
 	struct stream *stream = calloc(1, sizeof(*stream));
 
-	if (!stream) {
-		incise_error_set(err, ENOMEM, "%s: out of memory", path);
-		return NULL;
-	}
+	if (!stream)
+		return INCISE_ERROR_NULL(err, ENOMEM, "%s: out of memory", path);
 	*stream = (struct stream){
 		.format = {.abi = INCISE_TABLE_ABI,
 			   .open = stream_open,

@@ -2,7 +2,6 @@
 /*
  * The streams of a recording as rows; see streams.h.
  */
-#include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

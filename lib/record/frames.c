@@ -9,21 +9,11 @@
 #include "../base/module.h"
 #include "frames.h"
 
-#define FILE_NAME "frames_mkv.so"
-
 static const struct incise_frames_module *load_frames(struct incise_error *err)
 {
-	const struct incise_frames_module *frames;
-	struct incise_module module;
-
-	if (incise_module_find(&module, FILE_NAME, INCISE_FRAMES_SYMBOL, "camera",
-			       "libavformat-dev and libavcodec-dev are", err))
-		return NULL;
-	frames = module.symbol;
-	if (frames->abi == INCISE_FRAMES_ABI)
-		return frames;
-	errno = -incise_module_refuse(&module, FILE_NAME, "camera", err);
-	return NULL;
+	return incise_module_load("frames_mkv.so", INCISE_FRAMES_SYMBOL,
+				  INCISE_FRAMES_ABI, "camera",
+				  "libavformat-dev and libavcodec-dev are", err);
 }
 
 struct incise_frames_writer *incise_frames_writer_new(
@@ -55,10 +45,8 @@ struct incise_frames_reader *incise_frames_reader_new(const char *path,
 	struct stat st;
 
 	/* libavformat would wait for a pipe. */
-	if (!stat(path, &st) && !S_ISREG(st.st_mode)) {
-		incise_error_set(err, EINVAL, "%.300s: not a regular file", path);
-		return NULL;
-	}
+	if (!stat(path, &st) && !S_ISREG(st.st_mode))
+		return INCISE_ERROR_NULL(err, EINVAL, "%.300s: not a regular file", path);
 	return module ? module->open(path, err) : NULL;
 }
 

@@ -2,9 +2,7 @@
 /*
  * The group `actuator` of rig.conf; see incise/backend.h.
  */
-#include <errno.h>
 #include <math.h>
-#include <stddef.h>
 #include <string.h>
 #include "actuator.h"
 #include "motor.h"

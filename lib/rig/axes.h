@@ -13,8 +13,6 @@
 #ifndef INCISE_AXES_H
 #define INCISE_AXES_H
 
-#include <incise/rig.h>
-
 /*
  * The duals of @n linearly independent unit directions, 1 … INCISE_RIG_AXES_MAX. 1 / |dual[i]| is
  * the sine of the angle between direction i and the span of the others.

@@ -11,9 +11,13 @@
 #include <incise/backend.h>
 
 /*
- * Export a backend from its module as `incise_backend`; weak, as tests may link several, by
- * their own names.
+ * INCISE_BACKEND(incise_stepper_mine, "stepper", "mine", .open = f): a backend, which its module
+ * exports as `incise_backend`; weak, as tests may link several, by their own names.
  */
+#define INCISE_BACKEND(backend, kind_, name_, ...)                                     \
+	const struct incise_backend backend = {                                        \
+		.abi = INCISE_BACKEND_ABI, .kind = kind_, .name = name_, __VA_ARGS__}; \
+	INCISE_MODULE(backend)
 #define INCISE_MODULE(backend)                                       \
 	INCISE_API extern const struct incise_backend incise_backend \
 		__attribute__((weak, alias(#backend)))

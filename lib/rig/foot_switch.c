@@ -170,10 +170,8 @@ struct incise_foot_switch *incise_foot_switch_open(
 	struct incise_foot_switch *foot = calloc(1, sizeof(*foot));
 	int rc;
 
-	if (!foot) {
-		incise_error_set(err, ENOMEM, "no memory for a foot switch");
-		return NULL;
-	}
+	if (!foot)
+		return INCISE_ERROR_NULL(err, ENOMEM, "no memory for a foot switch");
 	foot->fd = -1;
 	foot->key = setup->key <= KEY_MAX ? setup->key : KEY_RESERVED;
 	rc = open_device(foot, setup, err);

@@ -289,10 +289,8 @@ static struct incise_plan *new_plan(const struct incise_scene *scene,
 	struct incise_plan *plan = calloc(1, sizeof(*plan));
 	int rc;
 
-	if (!plan) {
-		incise_error_set(err, ENOMEM, "no memory for a plan");
-		return NULL;
-	}
+	if (!plan)
+		return INCISE_ERROR_NULL(err, ENOMEM, "no memory for a plan");
 	plan->scene = scene;
 	plan->hold = *hold;
 	rc = take_rig(plan, rig, &tracker, *place, err);

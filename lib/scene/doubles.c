@@ -2,7 +2,6 @@
 /*
  * A plan in double: its numbers, from the scene and the rig, and its ticks.
  */
-#include <errno.h>
 #include <math.h>
 #include "../base/monotonic.h"
 #include "../base/vector.h"

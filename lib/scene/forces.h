@@ -6,7 +6,6 @@
 #ifndef INCISE_FORCES_H
 #define INCISE_FORCES_H
 
-#include <incise/export.h>
 #include "../tissue/tick.h"
 
 #define INCISE_FORCE_NUMBERS 3

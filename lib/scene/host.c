@@ -129,10 +129,10 @@ static struct incise_plan *new_host_plan(const struct incise_scene *scene,
 		      !incise_plan_set_tool(plan, options->tool)))
 		return plan;
 	incise_plan_free(plan);
-	incise_error_set(err, EINVAL,
-			 "a host's tip_mm must be finite and within 1e6 mm, and its tool "
-			 "an incise_tool");
-	return NULL;
+	return INCISE_ERROR_NULL(
+		err, EINVAL,
+		"a host's tip_mm must be finite and within 1e6 mm, and its tool "
+		"an incise_tool");
 }
 
 struct incise_host *incise_host_new(const struct incise_scene *scene,
@@ -144,19 +144,15 @@ struct incise_host *incise_host_new(const struct incise_scene *scene,
 
 	if (options &&
 	    !(options->host_period_s >= 0 &&
-	      options->host_period_s * incise_scene_rate_hz(scene) <= HOLD_MOST)) {
-		incise_error_set(
+	      options->host_period_s * incise_scene_rate_hz(scene) <= HOLD_MOST))
+		return INCISE_ERROR_NULL(
 			err, EINVAL,
 			"host_period_s %g: expected 0 or more, up to %d ticks at "
 			"the scene's rate_hz, %g",
 			options->host_period_s, HOLD_MOST, incise_scene_rate_hz(scene));
-		return NULL;
-	}
 	host = calloc(1, sizeof(*host));
-	if (!host) {
-		incise_error_set(err, ENOMEM, "no memory for a host");
-		return NULL;
-	}
+	if (!host)
+		return INCISE_ERROR_NULL(err, ENOMEM, "no memory for a host");
 	if (options)
 		host->options = *options;
 	host->tick_ns = INCISE_NS_PER_S / incise_scene_rate_hz(scene);

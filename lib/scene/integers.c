@@ -438,10 +438,8 @@ struct incise_integers *incise_integers_new(const struct incise_plan *plan,
 	struct incise_integers *integers = calloc(1, sizeof(*integers));
 	int rc;
 
-	if (!integers) {
-		incise_error_set(err, ENOMEM, "no memory for a plan");
-		return NULL;
-	}
+	if (!integers)
+		return INCISE_ERROR_NULL(err, ENOMEM, "no memory for a plan");
 	rc = set_fixed_numbers(plan, &integers->plan.numbers, err);
 	if (rc) {
 		free(integers);

@@ -21,11 +21,10 @@ struct incise_sim *incise_sim_new(const struct incise_sim_config *config,
 	if (incise_settings_check(incise_sim_settings, "sim", config, err))
 		return NULL;
 	sim = calloc(1, sizeof(*sim));
-	if (!sim) {
-		incise_error_set(err, ENOMEM, "simulated rig: %s; free some memory",
-				 strerror(ENOMEM));
-		return NULL;
-	}
+	if (!sim)
+		return INCISE_ERROR_NULL(err, ENOMEM,
+					 "simulated rig: %s; free some memory",
+					 strerror(ENOMEM));
 	sim->config = *config;
 	sim->clock = clock;
 	sim->start_ns = incise_clock_now(clock);

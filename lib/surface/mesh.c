@@ -6,7 +6,6 @@
  * around it, weighted by their angles: with it the sign of (p - nearest) · normal shows inside from
  * outside exactly (Bærentzen & Aanæs 2005), which a face's does not.
  */
-#include <stdlib.h>
 #include "mesh.h"
 
 size_t mesh_memory(const struct mesh *mesh)

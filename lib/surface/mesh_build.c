@@ -478,16 +478,14 @@ struct mesh *mesh_new(const struct mesh_draft *draft, struct incise_error *err)
 	size_t n = draft->n_triangles;
 	int rc = 0;
 
-	if (!n) {
-		incise_error_set(err, EINVAL, "%s: no triangle: expected at least one",
-				 draft->path);
-		return NULL;
-	}
-	if (n > INCISE_SURFACE_TRIANGLES_MAX) {
-		incise_error_set(err, E2BIG, "%s: %zu triangles: expected at most %d",
-				 draft->path, n, INCISE_SURFACE_TRIANGLES_MAX);
-		return NULL;
-	}
+	if (!n)
+		return INCISE_ERROR_NULL(err, EINVAL,
+					 "%s: no triangle: expected at least one",
+					 draft->path);
+	if (n > INCISE_SURFACE_TRIANGLES_MAX)
+		return INCISE_ERROR_NULL(err, E2BIG,
+					 "%s: %zu triangles: expected at most %d",
+					 draft->path, n, INCISE_SURFACE_TRIANGLES_MAX);
 	b.n = (uint32_t)n;
 	mesh = b.mesh = calloc(1, sizeof(*mesh));
 	b.corner = malloc(n * sizeof(*b.corner));

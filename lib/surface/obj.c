@@ -22,6 +22,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
+#include "../base/grow.h"
 #include "../base/text.h"
 #include "mesh.h"
 
@@ -49,18 +50,10 @@ struct obj {
 /* Room for one more of @each bytes. */
 static int grow_obj(struct obj *obj, void *array, size_t n, size_t *capacity, size_t each)
 {
-	void **old = array;
-	void *more;
-
-	if (n < *capacity)
-		return 0;
-	*capacity = *capacity ? 2 * *capacity : 1024;
-	more = realloc(*old, *capacity * each);
-	if (!more)
-		return incise_error_set(obj->err, ENOMEM, "%s: no memory to read it",
-					obj->text.path);
-	*old = more;
-	return 0;
+	return grow_array(array, n, capacity, 1024, each)
+		       ? 0
+		       : incise_error_set(obj->err, ENOMEM, "%s: no memory to read it",
+					  obj->text.path);
 }
 
 static int too_many(struct obj *obj, const char *what, size_t most)

@@ -31,8 +31,7 @@ static struct incise_surface *surface_new(enum incise_surface_kind kind,
 static struct incise_surface *refuse_surface(struct incise_error *err, const char *what,
 					     const char *expected)
 {
-	incise_error_set(err, EINVAL, "%s: expected %s", what, expected);
-	return NULL;
+	return INCISE_ERROR_NULL(err, EINVAL, "%s: expected %s", what, expected);
 }
 
 static const char coordinates[] = "numbers of mm, at most 1e5";

@@ -30,11 +30,10 @@ struct incise_incision *incise_incision_make(
 {
 	struct incise_incision *incision = calloc(1, size_of_incision(setup));
 
-	if (!incision) {
-		incise_error_set(err, ENOMEM, "no memory for an incision of %d cuts",
-				 setup->cuts_most);
-		return NULL;
-	}
+	if (!incision)
+		return INCISE_ERROR_NULL(err, ENOMEM,
+					 "no memory for an incision of %d cuts",
+					 setup->cuts_most);
 	incision->setup = *setup;
 	v3_copy(incision->side, side);
 	incision->cuts = (struct incise_double_incision *)(void *)(incision + 1);

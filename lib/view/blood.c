@@ -601,8 +601,7 @@ struct blood *blood_new(const struct uv_map *map,
 
 	if (!blood || !film_init(&blood->film, map, picture)) {
 		blood_free(blood);
-		incise_error_set(err, ENOMEM, "view: no memory for blood");
-		return NULL;
+		return INCISE_ERROR_NULL(err, ENOMEM, "view: no memory for blood");
 	}
 	blood->key = incise_random_bits(0x626c6f6f64, (uint64_t)(int64_t)picture->seed);
 	blood->ul_s_mm2 = picture->blood_ul_s_mm2;

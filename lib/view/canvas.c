@@ -100,13 +100,12 @@ struct incise_canvas *incise_canvas_new(int size, const uint8_t *base_rgba,
 	struct incise_canvas *canvas;
 	bool there;
 
-	if (size < CANVAS_TILE || size > 16384 || (size & (size - 1)) || !base_rgba) {
-		incise_error_set(err, EINVAL,
-				 "canvas: a side of %d texels: expected a power of 2, "
-				 "32 … 16384",
-				 size);
-		return NULL;
-	}
+	if (size < CANVAS_TILE || size > 16384 || (size & (size - 1)) || !base_rgba)
+		return INCISE_ERROR_NULL(
+			err, EINVAL,
+			"canvas: a side of %d texels: expected a power of 2, "
+			"32 … 16384",
+			size);
 	canvas = calloc(1, sizeof(*canvas));
 	if (!canvas)
 		goto no_memory;
@@ -127,8 +126,8 @@ struct incise_canvas *incise_canvas_new(int size, const uint8_t *base_rgba,
 
 no_memory:
 	incise_canvas_free(canvas);
-	incise_error_set(err, ENOMEM, "canvas: no memory for %d × %d texels", size, size);
-	return NULL;
+	return INCISE_ERROR_NULL(err, ENOMEM, "canvas: no memory for %d × %d texels",
+				 size, size);
 }
 
 void incise_canvas_free(struct incise_canvas *canvas)

@@ -466,9 +466,8 @@ static struct texture *texture_new(const struct incise_draw_setup *setup,
 
 out_memory:
 	texture_free(texture);
-	incise_error_set(err, ENOMEM, "image: no memory for a texture of %d texels",
-			 size);
-	return NULL;
+	return INCISE_ERROR_NULL(err, ENOMEM,
+				 "image: no memory for a texture of %d texels", size);
 }
 
 static unsigned texture_image(unsigned image, const uint8_t *bgra, int w, int h)
@@ -592,10 +591,8 @@ struct incise_draw *incise_draw_new(const struct incise_draw_setup *setup,
 	if (!has_library(err))
 		return NULL;
 	draw = calloc(1, sizeof(*draw));
-	if (!draw) {
-		incise_error_set(err, ENOMEM, "image: no memory");
-		return NULL;
-	}
+	if (!draw)
+		return INCISE_ERROR_NULL(err, ENOMEM, "image: no memory");
 	if (epoxy_gl_version() < 33) {
 		incise_error_set(err, ENOTSUP,
 				 "image: OpenGL %d.%d, but 3.3 is required; install "

@@ -93,10 +93,8 @@ struct incise_egl *incise_egl_new(struct incise_error *err)
 	struct incise_egl *egl = calloc(1, sizeof(*egl));
 	EGLint why;
 
-	if (!egl) {
-		incise_error_set(err, ENOMEM, "image: no memory");
-		return NULL;
-	}
+	if (!egl)
+		return INCISE_ERROR_NULL(err, ENOMEM, "image: no memory");
 	egl->surface = EGL_NO_SURFACE;
 	egl->context = EGL_NO_CONTEXT;
 	if (open_display(egl, surfaceless()) && open_context(egl))
@@ -107,10 +105,9 @@ struct incise_egl *incise_egl_new(struct incise_error *err)
 	why = eglGetError();
 	shut(egl);
 	free(egl);
-	incise_error_set(err, ENOTSUP,
-			 "image: EGL has no OpenGL 3.3 here (error 0x%x); " HINT,
-			 (unsigned)why);
-	return NULL;
+	return INCISE_ERROR_NULL(err, ENOTSUP,
+				 "image: EGL has no OpenGL 3.3 here (error 0x%x); " HINT,
+				 (unsigned)why);
 }
 
 int incise_egl_current(struct incise_egl *egl, struct incise_error *err)

@@ -12,8 +12,6 @@
 #include "../base/module.h"
 #include "film.h"
 
-#define FILE_NAME "film_mkv.so"
-
 struct incise_film {
 	const struct incise_film_module *module;
 	struct incise_film_coder *coder;
@@ -27,17 +25,8 @@ struct incise_film {
 /* The module stays loaded. */
 static const struct incise_film_module *load_film(struct incise_error *err)
 {
-	const struct incise_film_module *film;
-	struct incise_module module;
-
-	if (incise_module_find(&module, FILE_NAME, INCISE_FILM_SYMBOL, "film",
-			       "libavformat-dev and libavcodec-dev are", err))
-		return NULL;
-	film = module.symbol;
-	if (film->abi == INCISE_FILM_ABI)
-		return film;
-	errno = -incise_module_refuse(&module, FILE_NAME, "film", err);
-	return NULL;
+	return incise_module_load("film_mkv.so", INCISE_FILM_SYMBOL, INCISE_FILM_ABI,
+				  "film", "libavformat-dev and libavcodec-dev are", err);
 }
 
 /* Keeps errno. */
@@ -74,14 +63,12 @@ struct incise_film *incise_film_new(const char *path, int width, int height, int
 
 	if (width < 16 || height < 16 || width > INCISE_FILM_SIDE_MAX ||
 	    height > INCISE_FILM_SIDE_MAX || width % 2 || height % 2 || rate_hz < 1 ||
-	    rate_hz > 1000) {
-		incise_error_set(
+	    rate_hz > 1000)
+		return INCISE_ERROR_NULL(
 			err, EINVAL,
 			"%.300s: film of %d x %d at %d Hz: expected even sides from 16 "
 			"to %d and 1 to 1000 Hz",
 			path, width, height, rate_hz, INCISE_FILM_SIDE_MAX);
-		return NULL;
-	}
 	film = calloc(1, sizeof(*film));
 	if (!film)
 		goto no_memory;
@@ -96,8 +83,7 @@ struct incise_film *incise_film_new(const char *path, int width, int height, int
 	return NULL;
 no_memory:
 	forget(film);
-	incise_error_set(err, ENOMEM, "no memory for a film");
-	return NULL;
+	return INCISE_ERROR_NULL(err, ENOMEM, "no memory for a film");
 }
 
 int incise_film_add(struct incise_film *film, const uint8_t *rgb,

@@ -60,17 +60,13 @@ struct incise_injury *incise_injury_new(const struct incise_scene_picture *pictu
 {
 	struct incise_injury *injury;
 
-	if (map->size != incise_canvas_size(canvas)) {
-		incise_error_set(err, EINVAL,
-				 "view: a UV map of %d texels on a canvas of %d",
-				 map->size, incise_canvas_size(canvas));
-		return NULL;
-	}
+	if (map->size != incise_canvas_size(canvas))
+		return INCISE_ERROR_NULL(err, EINVAL,
+					 "view: a UV map of %d texels on a canvas of %d",
+					 map->size, incise_canvas_size(canvas));
 	injury = calloc(1, sizeof(*injury));
-	if (!injury) {
-		incise_error_set(err, ENOMEM, "view: no memory");
-		return NULL;
-	}
+	if (!injury)
+		return INCISE_ERROR_NULL(err, ENOMEM, "view: no memory");
 	injury->canvas = canvas;
 	if (add_injury(injury, picture, scalpel, incision, map, err)) {
 		incise_injury_free(injury);

@@ -526,12 +526,10 @@ struct uv_map *uv_map_new(const struct incise_surface *surface,
 	int size = picture->texture_px, rc;
 	struct uv_map *map;
 
-	if (size < 16 || size > 16384 || (size & (size - 1))) {
-		incise_error_set(err, EINVAL,
-				 "a texture of %d texels: expected 256, 512 … 4096",
-				 size);
-		return NULL;
-	}
+	if (size < 16 || size > 16384 || (size & (size - 1)))
+		return INCISE_ERROR_NULL(
+			err, EINVAL, "a texture of %d texels: expected 256, 512 … 4096",
+			size);
 	map = calloc(1, sizeof(*map));
 	if (map) {
 		map->surface = surface;
@@ -542,8 +540,7 @@ struct uv_map *uv_map_new(const struct incise_surface *surface,
 			return map;
 		uv_map_free(map);
 	}
-	incise_error_set(err, ENOMEM, "no memory for the image's surface");
-	return NULL;
+	return INCISE_ERROR_NULL(err, ENOMEM, "no memory for the image's surface");
 }
 
 void uv_map_free(struct uv_map *map)

@@ -170,17 +170,14 @@ struct incise_view *incise_view_new(const struct incise_scene *scene,
 	int rc;
 
 	if (setup->width < 16 || setup->height < 16 ||
-	    setup->width > INCISE_VIEW_SIDE_MAX || setup->height > INCISE_VIEW_SIDE_MAX) {
-		incise_error_set(err, EINVAL,
-				 "image: %d × %d pixels; expected 16 to %d each",
-				 setup->width, setup->height, INCISE_VIEW_SIDE_MAX);
-		return NULL;
-	}
+	    setup->width > INCISE_VIEW_SIDE_MAX || setup->height > INCISE_VIEW_SIDE_MAX)
+		return INCISE_ERROR_NULL(err, EINVAL,
+					 "image: %d × %d pixels; expected 16 to %d each",
+					 setup->width, setup->height,
+					 INCISE_VIEW_SIDE_MAX);
 	view = calloc(1, sizeof(*view));
-	if (!view) {
-		incise_error_set(err, ENOMEM, "image: no memory");
-		return NULL;
-	}
+	if (!view)
+		return INCISE_ERROR_NULL(err, ENOMEM, "image: no memory");
 	view->surface = incise_plan_surface(plan);
 	incise_scene_picture(scene, &view->picture);
 	incise_scene_scalpel(scene, &view->scalpel);

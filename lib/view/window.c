@@ -81,10 +81,8 @@ struct incise_window *incise_window_new(const char *title, int width, int height
 	struct incise_window *window = calloc(1, sizeof(*window));
 	int rc;
 
-	if (!window) {
-		incise_error_set(err, ENOMEM, "image: no memory");
-		return NULL;
-	}
+	if (!window)
+		return INCISE_ERROR_NULL(err, ENOMEM, "image: no memory");
 	set_hints();
 	rc = open_window(window, title, width, height, err);
 	if (rc) {

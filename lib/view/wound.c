@@ -560,8 +560,7 @@ struct wound *wound_new(const struct uv_map *map,
 		return wound;
 no_memory:
 	wound_free(wound);
-	incise_error_set(err, ENOMEM, "view: no memory for the wound");
-	return NULL;
+	return INCISE_ERROR_NULL(err, ENOMEM, "view: no memory for the wound");
 }
 
 void wound_free(struct wound *wound)

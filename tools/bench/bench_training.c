@@ -179,8 +179,7 @@ static struct incise_model *train(const struct row *row, const struct data *data
 		model = incise_model_new_grid(2, variables, mfs, INCISE_MF_GAUSS,
 					      &variables[2], &err);
 	cli_require(model, &err);
-	if (incise_train(model, &pairs, NULL, &options, NULL, &err))
-		cli_fail_with(&err);
+	cli_check(incise_train(model, &pairs, NULL, &options, NULL, &err), &err);
 	return model;
 }
 
@@ -245,9 +244,9 @@ static void add_baselines(struct training *t)
 		struct incise_baselines found;
 		struct incise_error err = {0};
 
-		if (incise_baselines(&pairs, t->data[s].group, &unseen, NULL, NULL,
-				     &found, &err))
-			cli_fail_with(&err);
+		cli_check(incise_baselines(&pairs, t->data[s].group, &unseen, NULL, NULL,
+					   &found, &err),
+			  &err);
 		mean->norm[NORM_RMSE][s] = found.mean;
 		linear->norm[NORM_RMSE][s] = found.linear;
 		knn->norm[NORM_RMSE][s] = found.knn;

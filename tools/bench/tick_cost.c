@@ -39,9 +39,8 @@ struct tick_stroke *tick_stroke_new(const struct incise_scene *scene,
 	timed->period_ns = llrint(1e9 / incise_scene_rate_hz(scene));
 	timed->clock_ns = stopwatch_own_ns();
 	timed->given = plan;
-	timed->plan = plan ? plan : incise_plan_new_fed(scene, timed->tracker, &err);
-	if (!timed->plan)
-		cli_fail_with(&err);
+	timed->plan = cli_require(
+		plan ? plan : incise_plan_new_fed(scene, timed->tracker, &err), &err);
 	stroke_begin(&timed->stroke, timed->plan, timed->tracker);
 	incise_plan_set_tool(timed->plan, tool);
 	stroke_pose(&timed->stroke, timed->pose, &timed->sample);

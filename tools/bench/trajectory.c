@@ -3,7 +3,6 @@
  * A trajectory, and plans on their way along it; see trajectory.h.
  */
 #include <math.h>
-#include <stdlib.h>
 #include "../../lib/base/vector.h"
 #include "../cli/cli.h"
 #include "stroke.h"

@@ -39,8 +39,7 @@ void calibration_use(struct calibration_used *used, const char *given, const cha
 	}
 	cli_input(used->path);
 	file_expect(used->path, FILE_CALIBRATION);
-	if (incise_calibration_load(used->path, &used->values, &err))
-		cli_fail_with(&err);
+	cli_check(incise_calibration_load(used->path, &used->values, &err), &err);
 	n = incise_calibration_history(used->path, &records, &err);
 	if (n > 0)
 		snprintf(used->date, sizeof(used->date), "%s", records[n - 1].date);

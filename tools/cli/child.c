@@ -84,11 +84,15 @@ int child_run(char *const argv[], int in, int out, int err)
 {
 	struct start start = {argv, in, out, err, true, getpid(), 0};
 	pid_t pid = start_child(&start);
+	bool told = false;
 	int status;
 
-	while (pid > 0 && waitpid(pid, &status, 0) != pid)
+	while (pid > 0 && waitpid(pid, &status, 0) != pid) {
 		if (errno != EINTR)
 			return -1;
+		if (cli_stop && !told)
+			told = !kill(pid, SIGTERM);
+	}
 	return pid < 0 ? -1 : status;
 }
 

@@ -21,8 +21,8 @@ bool child_possible(const char *program);
 pid_t child_start(char *const argv[], int out, int err);
 
 /*
- * Run @argv, found in PATH, until it ends, in the foreground: it may ask on the terminal, and a
- * Ctrl-C also ends it. Its input comes from descriptor @in, its output goes to @out, its errors to
+ * Run @argv, found in PATH or by its path, until it ends, in the foreground: it may ask on the
+ * terminal, and a Ctrl-C also ends it. It gets SIGTERM when this process is to stop. Its input comes from descriptor @in, its output goes to @out, its errors to
  * @err; -1: /dev/null. Returns its status as of waitpid(2), or -1 with errno if it cannot be started.
  */
 int child_run(char *const argv[], int in, int out, int err);

@@ -22,6 +22,7 @@
 #include <incise/version.h>
 #include "cli.h"
 #include "../../lib/base/control_character.h"
+#include "../../lib/base/monotonic.h"
 #include "complete.h"
 #include "file_kind.h"
 #include "help.h"
@@ -571,10 +572,15 @@ void cli_fail_with(const struct incise_error *err)
 	cli_fail("%s", err->text);
 }
 
+void cli_check(bool failed, const struct incise_error *err)
+{
+	if (failed)
+		cli_fail_with(err);
+}
+
 void *cli_require(void *result, const struct incise_error *err)
 {
-	if (!result)
-		cli_fail_with(err);
+	cli_check(!result, err);
 	return result;
 }
 
@@ -899,10 +905,7 @@ static void put_progress_end(FILE *out)
 
 int64_t cli_now_ns(void)
 {
-	struct timespec now;
-
-	clock_gettime(CLOCK_MONOTONIC, &now);
-	return now.tv_sec * INT64_C(1000000000) + now.tv_nsec;
+	return incise_monotonic_ns();
 }
 
 void cli_terminal_size(int *columns, int *lines)

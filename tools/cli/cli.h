@@ -199,8 +199,9 @@ _Noreturn void cli_fail(const char *fmt, ...) INCISE_PRINTF(1, 2);
 /* Fail with the text of an error: exit 1. */
 _Noreturn void cli_fail_with(const struct incise_error *err);
 
-/* Returns @result; NULL: fails with the text of the error. */
+/* Returns @result; NULL: fails with the text of the error. The same of a call that failed. */
 void *cli_require(void *result, const struct incise_error *err);
+void cli_check(bool failed, const struct incise_error *err);
 
 /* Bad usage: one line and a hint to --help; exit 2. */
 _Noreturn void cli_usage(const char *fmt, ...) INCISE_PRINTF(1, 2);

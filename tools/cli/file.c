@@ -13,9 +13,7 @@ FILE *whole_file_begin(const char *path, struct incise_outfile **file)
 	struct incise_error err = {0};
 
 	cli_output(path);
-	*file = incise_outfile_open(path, &err);
-	if (!*file)
-		cli_fail_with(&err);
+	*file = cli_require(incise_outfile_open(path, &err), &err);
 	return incise_outfile_stream(*file);
 }
 
@@ -23,8 +21,7 @@ void whole_file_end(struct incise_outfile *file)
 {
 	struct incise_error err = {0};
 
-	if (file && incise_outfile_commit(file, &err))
-		cli_fail_with(&err);
+	cli_check(file && incise_outfile_commit(file, &err), &err);
 }
 
 struct memory_file memory_file_begin(const char *name)

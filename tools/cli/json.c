@@ -129,16 +129,13 @@ json_t *json_parse(const char *text, size_t n, const char *path, struct incise_e
 
 	if (report)
 		return report;
-	if (!*wrong.text) {
-		incise_error_set(err, ENOMEM, "%s: out of memory", path);
-		return NULL;
-	}
+	if (!*wrong.text)
+		return INCISE_ERROR_NULL(err, ENOMEM, "%s: out of memory", path);
 	for (char *c = wrong.text; *c; c++)
 		if ((unsigned char)*c < ' ' || (unsigned char)*c >= 0x7f)
 			*c = '?';
-	incise_error_set(err, EINVAL, "%s:%d: not JSON: %s", path, wrong.line,
-			 wrong.text);
-	return NULL;
+	return INCISE_ERROR_NULL(err, EINVAL, "%s:%d: not JSON: %s", path, wrong.line,
+				 wrong.text);
 }
 
 json_t *json_read_from(FILE *file, const char *path, struct incise_error *err)
@@ -147,10 +144,8 @@ json_t *json_read_from(FILE *file, const char *path, struct incise_error *err)
 	json_t *report = NULL;
 	size_t n;
 
-	if (!text) {
-		incise_error_set(err, ENOMEM, "%s: out of memory", path);
-		return NULL;
-	}
+	if (!text)
+		return INCISE_ERROR_NULL(err, ENOMEM, "%s: out of memory", path);
 	n = fread(text, 1, READ_MOST + 1, file);
 	if (ferror(file))
 		incise_error_set(err, errno, "%s: %s", path, strerror(errno));

@@ -111,8 +111,7 @@ void recording_remove(const char *path)
 			 path);
 	remove_members(path);
 	remove_calibrations(folder, path);
-	if (incise_proof_remove(path, &err))
-		cli_fail_with(&err);
+	cli_check(incise_proof_remove(path, &err), &err);
 	for (size_t i = 0; i < sizeof(files) / sizeof(*files); i++)
 		if (unlinkat(folder, files[i], 0) && errno != ENOENT)
 			cli_fail("%s/%s: cannot be removed: %s", path, files[i],

@@ -43,9 +43,9 @@ void origins_add(struct incise_origins *origins, const char *path)
 		if (file_kind_of(whole) == FILE_RECORDING)
 			kind = FILE_RECORDING;
 	}
-	if (incise_origins_add(origins, kind == FILE_RECORDING ? whole : path,
-			       kind_of(kind), &err))
-		cli_fail_with(&err);
+	cli_check(incise_origins_add(origins, kind == FILE_RECORDING ? whole : path,
+				     kind_of(kind), &err),
+		  &err);
 	free(whole);
 }
 

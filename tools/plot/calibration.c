@@ -71,8 +71,7 @@ static struct history read_history(const char *path)
 	struct incise_error err = {0};
 
 	history.n = incise_calibration_history(path, &history.record, &err);
-	if (history.n < 0 || incise_calibration_load(path, &in_force, &err))
-		cli_fail_with(&err);
+	cli_check(history.n < 0 || incise_calibration_load(path, &in_force, &err), &err);
 	for (int i = 0; i < history.n; i++) {
 		const struct incise_calibration_record *record = &history.record[i];
 		double t_s = date_s(record->date);

@@ -67,8 +67,7 @@ static char *read_header(const char *path)
 
 	while ((rc = incise_infile_line(file, &line, &err)) > 0 && strchr("#\r", *line))
 		;
-	if (rc < 0)
-		cli_fail_with(&err);
+	cli_check(rc < 0, &err);
 	header = cli_text("%s", rc ? line : "");
 	incise_infile_close(file);
 	return header;

@@ -205,8 +205,7 @@ static struct ArrowArrayStream open_stream(struct recorded *r, const char *name)
 	struct ArrowArrayStream stream;
 	struct incise_error err = {0};
 
-	if (incise_recording_stream(r->recording, name, NULL, &stream, &err))
-		cli_fail_with(&err);
+	cli_check(incise_recording_stream(r->recording, name, NULL, &stream, &err), &err);
 	return stream;
 }
 
@@ -372,8 +371,7 @@ static void read_frames(struct recorded *r)
 	struct incise_error err = {0};
 	int rc = incise_recording_stream(r->recording, "frames", NULL, &stream, &err);
 
-	if (rc && rc != -ENOTSUP)
-		cli_fail_with(&err);
+	cli_check(rc && rc != -ENOTSUP, &err);
 	read_lines(r, rc ? NULL : &stream, &depth, NULL, NULL);
 }
 
@@ -420,8 +418,7 @@ static void find_ends(struct recorded *r, const char *name, int64_t *first, int6
 
 	if (rc == -ENOTSUP)
 		return;
-	if (rc)
-		cli_fail_with(&err);
+	cli_check(rc, &err);
 	for (; next_batch(r, &stream, &batch); batch.release(&batch)) {
 		int64_t from_ns = whole_at(&batch, 1, 0),
 			to_ns = whole_at(&batch, 1, batch.length - 1);
@@ -752,8 +749,7 @@ FILE *figure_of_recording(const struct figure *figure)
 	r->figure = figure;
 	r->percent = -1;
 	r->recording = recording_open(figure->path);
-	if (incise_recording_info(r->recording, &r->info, &err))
-		cli_fail_with(&err);
+	cli_check(incise_recording_info(r->recording, &r->info, &err), &err);
 	for (int i = 0; i < PANELS; i++)
 		r->range[i] = (struct recording_range){INFINITY, -INFINITY};
 	find_span(r);

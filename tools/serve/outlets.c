@@ -218,9 +218,8 @@ static void offer(struct outlets *outlets, enum output output,
 	gethostname(host, sizeof(host) - 1);
 	id = cli_text("%s@%s", name, host);
 	setup.source_id = id;
-	outlets->outlet[output] = outlets->functions->open(&setup, &err);
-	if (!outlets->outlet[output])
-		cli_fail_with(&err);
+	outlets->outlet[output] =
+		cli_require(outlets->functions->open(&setup, &err), &err);
 	free(id);
 	free(name);
 }
@@ -235,9 +234,9 @@ struct serve_sink *serve_outlets_new(const struct serve_outlets_options *options
 	outlets->base.ops = &ops;
 	outlets->options = options;
 	outlets->protocol = &protocols[options->protocol];
-	if (incise_outlets_open(outlets->protocol->option, options->protocol,
-				&outlets->functions, &err))
-		cli_fail_with(&err);
+	cli_check(incise_outlets_open(outlets->protocol->option, options->protocol,
+				      &outlets->functions, &err),
+		  &err);
 	/* Threads of the library are not to take this program's signals. */
 	sigfillset(&all);
 	pthread_sigmask(SIG_SETMASK, &all, &before);

@@ -80,8 +80,8 @@ static void rows_open(struct rows *rows, struct incise_recording *recording,
 	struct incise_error err = {0};
 
 	rows_close(rows);
-	if (incise_recording_stream(recording, what, NULL, &rows->stream, &err))
-		cli_fail_with(&err);
+	cli_check(incise_recording_stream(recording, what, NULL, &rows->stream, &err),
+		  &err);
 }
 
 /* From the first row on. */
@@ -294,8 +294,7 @@ struct serve_source *serve_recording_open(const struct serve_source_options *opt
 	p->recording = recording_open(options->operand);
 	p->speed = options->speed;
 	p->endless = options->endless;
-	if (incise_recording_info(p->recording, &p->info, &err))
-		cli_fail_with(&err);
+	cli_check(incise_recording_info(p->recording, &p->info, &err), &err);
 	open_frames(p, options);
 	open_rows(p);
 	if (p->first_ns == INT64_MAX)

@@ -10,6 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
+#include "../../lib/base/monotonic.h"
 #include "../../lib/base/vector.h"
 #include "../cli/cli.h"
 #include "stream.h"
@@ -45,12 +46,10 @@ struct serve_stream {
 
 int64_t serve_utc_of(int64_t t_ns)
 {
-	struct timespec utc;
-	int64_t before = cli_now_ns(), after;
+	int64_t before = cli_now_ns(), utc = incise_read_clock_ns(CLOCK_REALTIME),
+		after = cli_now_ns();
 
-	clock_gettime(CLOCK_REALTIME, &utc);
-	after = cli_now_ns();
-	return utc.tv_sec * NS + utc.tv_nsec + (t_ns - before) - (after - before) / 2;
+	return utc + (t_ns - before) - (after - before) / 2;
 }
 
 struct serve_stream *serve_stream_new(struct serve_source *source, double rate_hz)

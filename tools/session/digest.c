@@ -53,10 +53,8 @@ struct session_digest *session_digest_new(const struct incise_scene *scene,
 	struct session_digest *digest = calloc(1, sizeof(*digest));
 	struct session *s;
 
-	if (!digest) {
-		incise_error_set(err, ENOMEM, "no memory for a session");
-		return NULL;
-	}
+	if (!digest)
+		return INCISE_ERROR_NULL(err, ENOMEM, "no memory for a session");
 	digest->incision = incise_incision_new(scene, err);
 	if (!digest->incision) {
 		free(digest);

@@ -72,8 +72,7 @@ struct session_log *session_log_begin(const struct session_options *options,
 	if (!options->path)
 		return NULL;
 	log = cli_alloc(1, sizeof(*log));
-	if (incise_scene_checksum(start->scene, &crc32c, &err))
-		cli_fail_with(&err);
+	cli_check(incise_scene_checksum(start->scene, &crc32c, &err), &err);
 	log->digest = cli_require(session_digest_new(start->scene, &err), &err);
 	describe_log(log, options, start, crc32c);
 	log->file = cli_require(incise_outfile_open(options->path, &err), &err);

@@ -152,9 +152,7 @@ void state_pages_open(struct state_pages *pages, const char *asked)
 	*pages = (struct state_pages){0};
 	if (asked && !scene && (strchr(asked, '/') || name_length(asked))) {
 		file_expect(asked, FILE_STATE);
-		state = incise_state_open(asked, &err);
-		if (!state)
-			cli_fail_with(&err);
+		state = cli_require(incise_state_open(asked, &err), &err);
 		add_pages(pages, asked, state);
 		return;
 	}
@@ -198,8 +196,7 @@ void state_pages_look(const struct state_page_file *page, struct incise_state_no
 {
 	struct incise_error err = {0};
 
-	if (state_pages_try(page, now, &err))
-		cli_fail_with(&err);
+	cli_check(state_pages_try(page, now, &err), &err);
 }
 
 void state_pages_close(struct state_pages *pages)

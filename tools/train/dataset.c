@@ -213,8 +213,7 @@ void dataset_show(struct incise_train_source *sources, int n,
 
 	options->train.progress = show_source;
 	options->end = INCISE_TRAIN_TO_CORPUS;
-	if (incise_train_sources(sources, n, options, &trained, &err))
-		cli_fail_with(&err);
+	cli_check(incise_train_sources(sources, n, options, &trained, &err), &err);
 	cli_progress_end();
 	data.corpus = trained.corpus;
 	collect(&data);

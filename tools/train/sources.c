@@ -171,8 +171,7 @@ static void keep_pipe(struct incise_train_source *source)
 	own->pipe = memory_file_begin("pipe");
 	while ((rc = incise_infile_line(in, &line, &err)) > 0)
 		fprintf(own->pipe.file, "%s\n", line);
-	if (rc)
-		cli_fail_with(&err);
+	cli_check(rc, &err);
 	incise_infile_close(in);
 	memory_file_written(&own->pipe);
 	source->name = strcmp(source->path, "-") ? source->path : "standard input";

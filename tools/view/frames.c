@@ -111,9 +111,9 @@ static void write_frame(struct view_output *output, struct incise_view *view, do
 	if (output->folder) {
 		snprintf(path, sizeof(path), "%s/frame-%06llu.png", output->folder,
 			 (unsigned long long)output->frames);
-		if (image_write_png(path, output->rgb, output->width, output->height,
-				    &err))
-			cli_fail_with(&err);
+		cli_check(image_write_png(path, output->rgb, output->width,
+					  output->height, &err),
+			  &err);
 	}
 	if (output->film && incise_film_add(output->film, output->rgb, &err)) {
 		incise_film_drop(output->film);
@@ -129,8 +129,7 @@ void view_output_end(struct view_output *output)
 {
 	struct incise_error err = {0};
 
-	if (incise_film_close(output->film, &err))
-		cli_fail_with(&err);
+	cli_check(incise_film_close(output->film, &err), &err);
 	if (output->strip_path && !output->stripped)
 		cli_fail("%s: not written: the run ends before its first frame, at %g "
 			 "s; give an earlier --at",
@@ -374,8 +373,7 @@ void view_job_draw(struct view_job *job, const struct incise_view_status *status
 	if (is_due(&job->output, t_s)) {
 		if (!job->frames++)
 			job->begin_ns = cli_now_ns();
-		if (incise_view_frame(job->view, status, &err))
-			cli_fail_with(&err);
+		cli_check(incise_view_frame(job->view, status, &err), &err);
 		job->end_ns = cli_now_ns();
 		if (job->keep)
 			keep_frame(job);

@@ -639,10 +639,9 @@ static void *force_open(const struct incise_backend_request *request,
 	struct comedi_force *f = aligned_alloc(_Alignof(struct comedi_force), sizeof(*f));
 	int rc;
 
-	if (!f) {
-		incise_error_set(err, ENOMEM, "%s: out of memory", request->where);
-		return NULL;
-	}
+	if (!f)
+		return INCISE_ERROR_NULL(err, ENOMEM, "%s: out of memory",
+					 request->where);
 	memset(f, 0, sizeof(*f));
 	f->feed.force.ops = &force_ops;
 	f->feed.stop = -1;
@@ -740,12 +739,5 @@ static int force_scan(const char *arguments, incise_scan_found *found, void *con
 	return rc;
 }
 
-const struct incise_backend incise_force_comedi = {
-	.abi = INCISE_BACKEND_ABI,
-	.kind = "force",
-	.name = "comedi",
-	.open = force_open,
-	.scan = force_scan,
-};
-
-INCISE_MODULE(incise_force_comedi);
+INCISE_BACKEND(incise_force_comedi, "force", "comedi", .open = force_open,
+	       .scan = force_scan);

@@ -174,18 +174,16 @@ static void *force_open(const struct incise_backend_request *request,
 	struct iio_force *f;
 	int rc;
 
-	if (!*request->arguments) {
-		incise_error_set(err, EINVAL,
-				 "%s: expected iio:NAME, for example iio:iio:device0; "
-				 "see `incise info devices`",
-				 request->where);
-		return NULL;
-	}
+	if (!*request->arguments)
+		return INCISE_ERROR_NULL(
+			err, EINVAL,
+			"%s: expected iio:NAME, for example iio:iio:device0; "
+			"see `incise info devices`",
+			request->where);
 	f = aligned_alloc(_Alignof(struct iio_force), sizeof(*f));
-	if (!f) {
-		incise_error_set(err, ENOMEM, "%s: out of memory", request->where);
-		return NULL;
-	}
+	if (!f)
+		return INCISE_ERROR_NULL(err, ENOMEM, "%s: out of memory",
+					 request->where);
 	memset(f, 0, sizeof(*f));
 	f->feed.force.ops = &force_ops;
 	f->feed.stop = -1;
@@ -313,12 +311,4 @@ static int force_scan(const char *arguments, incise_scan_found *found, void *con
 	return rc;
 }
 
-const struct incise_backend incise_force_iio = {
-	.abi = INCISE_BACKEND_ABI,
-	.kind = "force",
-	.name = "iio",
-	.open = force_open,
-	.scan = force_scan,
-};
-
-INCISE_MODULE(incise_force_iio);
+INCISE_BACKEND(incise_force_iio, "force", "iio", .open = force_open, .scan = force_scan);

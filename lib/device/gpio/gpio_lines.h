@@ -7,7 +7,6 @@
 #define INCISE_GPIO_LINES_H
 
 #include <stdbool.h>
-#include <stddef.h>
 #include <incise/backend.h>
 
 #define GPIO_PATH_MAX 64

@@ -368,10 +368,9 @@ static void *gpio_open(const struct incise_backend_request *request,
 	struct gpio_stepper *g = aligned_alloc(64, sizeof(*g));
 	int rc;
 
-	if (!g) {
-		incise_error_set(err, ENOMEM, "%s: %s", request->where, strerror(ENOMEM));
-		return NULL;
-	}
+	if (!g)
+		return INCISE_ERROR_NULL(err, ENOMEM, "%s: %s", request->where,
+					 strerror(ENOMEM));
 	memset(g, 0, sizeof(*g));
 	g->motor.ops = &ops;
 	g->motor.in_process = true;
@@ -398,11 +397,4 @@ static void *gpio_open(const struct incise_backend_request *request,
 	return NULL;
 }
 
-const struct incise_backend incise_stepper_gpio = {
-	.abi = INCISE_BACKEND_ABI,
-	.kind = "stepper",
-	.name = "gpio",
-	.open = gpio_open,
-};
-
-INCISE_MODULE(incise_stepper_gpio);
+INCISE_BACKEND(incise_stepper_gpio, "stepper", "gpio", .open = gpio_open);

@@ -574,10 +574,9 @@ static void *kernel_open(const struct incise_backend_request *asked,
 	struct kernel_stepper *k = calloc(1, sizeof(*k));
 	int rc;
 
-	if (!k) {
-		incise_error_set(err, ENOMEM, "%s: %s", asked->where, strerror(ENOMEM));
-		return NULL;
-	}
+	if (!k)
+		return INCISE_ERROR_NULL(err, ENOMEM, "%s: %s", asked->where,
+					 strerror(ENOMEM));
 	k->fd = -1;
 	k->page = (size_t)sysconf(_SC_PAGESIZE);
 	k->motor.ops = &kernel_ops;
@@ -595,11 +594,4 @@ static void *kernel_open(const struct incise_backend_request *asked,
 	return NULL;
 }
 
-const struct incise_backend incise_stepper_kernel = {
-	.abi = INCISE_BACKEND_ABI,
-	.kind = "stepper",
-	.name = "kernel",
-	.open = kernel_open,
-};
-
-INCISE_MODULE(incise_stepper_kernel);
+INCISE_BACKEND(incise_stepper_kernel, "stepper", "kernel", .open = kernel_open);

@@ -461,11 +461,10 @@ static void *force_open(const struct incise_backend_request *request,
 	sigset_t all, before;
 	int rc;
 
-	if (!f) {
-		incise_error_set(err, ENOMEM, "%s: out of memory; end other programs",
-				 request->where);
-		return NULL;
-	}
+	if (!f)
+		return INCISE_ERROR_NULL(err, ENOMEM,
+					 "%s: out of memory; end other programs",
+					 request->where);
 	memset(f, 0, sizeof(*f));
 	f->feed.force.ops = &force_ops;
 	f->feed.stop = -1;
@@ -577,12 +576,4 @@ static int force_scan(const char *arguments, incise_scan_found *found, void *con
 	return rc;
 }
 
-const struct incise_backend incise_force_lsl = {
-	.abi = INCISE_BACKEND_ABI,
-	.kind = "force",
-	.name = "lsl",
-	.open = force_open,
-	.scan = force_scan,
-};
-
-INCISE_MODULE(incise_force_lsl);
+INCISE_BACKEND(incise_force_lsl, "force", "lsl", .open = force_open, .scan = force_scan);

@@ -51,23 +51,20 @@ static struct incise_outlet *outlet_open(const struct incise_outlet_setup *setup
 {
 	struct incise_outlet *outlet = malloc(sizeof(*outlet));
 
-	if (!outlet) {
-		incise_error_set(err, ENOMEM,
-				 "LSL stream %.60s: out of memory; end other "
-				 "programs",
-				 setup->name);
-		return NULL;
-	}
+	if (!outlet)
+		return INCISE_ERROR_NULL(err, ENOMEM,
+					 "LSL stream %.60s: out of memory; end other "
+					 "programs",
+					 setup->name);
 	outlet->outlet = offer(setup);
 	if (outlet->outlet)
 		return outlet;
 	free(outlet);
-	incise_error_set(
+	return INCISE_ERROR_NULL(
 		err, EIO,
 		"LSL stream %.60s: liblsl cannot offer it; see its configuration, and "
 		"whether ports 16572 to 16604 are free",
 		setup->name);
-	return NULL;
 }
 
 static void outlet_push(struct incise_outlet *outlet, const double *values, int64_t t_ns)

@@ -2,6 +2,7 @@
 /*
  * Commands to a tracker and its answers; see polhemus_dialogue.h.
  */
+#include <ctype.h>
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>
@@ -12,11 +13,6 @@
 /* --- parsing --- */
 
 enum { FLAG_BINARY = 1, FLAG_CM = 2, FLAG_COMPENSATED = 4, FLAG_CONTINUOUS = 8 };
-
-static bool is_polhemus_dialogue_digit(char c)
-{
-	return c >= '0' && c <= '9';
-}
 
 /* Copy @n characters without blanks at both ends; unprintable ones become '?'. */
 static void copy_text(char *to, const unsigned char *from, size_t n)
@@ -79,10 +75,10 @@ int polhemus_reply_numbers(const char *text, double *values, int most)
 			return n;
 		if (*text == '-' || *text == '+')
 			negative = *text++ == '-';
-		for (; is_polhemus_dialogue_digit(*text) && digits < 9; text++, digits++)
+		for (; isdigit((unsigned char)*text) && digits < 9; text++, digits++)
 			value = value * 10 + (*text - '0');
 		if (*text == '.')
-			for (text++; is_polhemus_dialogue_digit(*text); text++) {
+			for (text++; isdigit((unsigned char)*text); text++) {
 				if (digits++ > 15)
 					continue;
 				scale /= 10;

@@ -243,9 +243,8 @@ struct incise_tracker *polhemus_tracker_open(struct polhemus_line *line,
 
 	if (!t) {
 		line->ops->close(line);
-		incise_error_set(err, ENOMEM, "%s: out of memory; end other programs",
-				 where);
-		return NULL;
+		return INCISE_ERROR_NULL(err, ENOMEM,
+					 "%s: out of memory; end other programs", where);
 	}
 	*t = (struct polhemus_tracker){
 		.feed = {.tracker.ops = &ops, .ring = &t->stream.ring},

@@ -166,11 +166,9 @@ struct polhemus_line *polhemus_tty_open(const char *arguments, const char *where
 	struct polhemus_tty *tty = calloc(1, sizeof(*tty));
 	const char *tail;
 
-	if (!tty) {
-		incise_error_set(err, ENOMEM, "%s: out of memory; end other programs",
-				 where);
-		return NULL;
-	}
+	if (!tty)
+		return INCISE_ERROR_NULL(err, ENOMEM,
+					 "%s: out of memory; end other programs", where);
 	tty->line.ops = &ops;
 	tty->line.family = -1;
 	if (parse_polhemus_tty(tty, arguments)) {
@@ -289,12 +287,4 @@ static int scan(const char *arguments, incise_scan_found *found, void *context,
 	return found(context, &device);
 }
 
-const struct incise_backend incise_tracker_tty = {
-	.abi = INCISE_BACKEND_ABI,
-	.kind = "tracker",
-	.name = "tty",
-	.open = open_tracker,
-	.scan = scan,
-};
-
-INCISE_MODULE(incise_tracker_tty);
+INCISE_BACKEND(incise_tracker_tty, "tracker", "tty", .open = open_tracker, .scan = scan);

@@ -792,12 +792,5 @@ static void *open_tracker(const struct incise_backend_request *request,
 		    : NULL;
 }
 
-const struct incise_backend incise_tracker_usb = {
-	.abi = INCISE_BACKEND_ABI,
-	.kind = "tracker",
-	.name = "usb",
-	.open = open_tracker,
-	.scan = usb_scan,
-};
-
-INCISE_MODULE(incise_tracker_usb);
+INCISE_BACKEND(incise_tracker_usb, "tracker", "usb", .open = open_tracker,
+	       .scan = usb_scan);

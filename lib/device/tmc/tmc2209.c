@@ -220,11 +220,4 @@ static void *open_tmc2209(const struct incise_backend_request *request,
 	return tmc_driver_open(request, &model, err);
 }
 
-const struct incise_backend incise_driver_tmc2209 = {
-	.abi = INCISE_BACKEND_ABI,
-	.kind = "driver",
-	.name = "tmc2209",
-	.open = open_tmc2209,
-};
-
-INCISE_MODULE(incise_driver_tmc2209);
+INCISE_BACKEND(incise_driver_tmc2209, "driver", "tmc2209", .open = open_tmc2209);

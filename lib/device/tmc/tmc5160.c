@@ -135,11 +135,4 @@ static void *open_tmc5160(const struct incise_backend_request *request,
 	return tmc_driver_open(request, &model, err);
 }
 
-const struct incise_backend incise_driver_tmc5160 = {
-	.abi = INCISE_BACKEND_ABI,
-	.kind = "driver",
-	.name = "tmc5160",
-	.open = open_tmc5160,
-};
-
-INCISE_MODULE(incise_driver_tmc5160);
+INCISE_BACKEND(incise_driver_tmc5160, "driver", "tmc5160", .open = open_tmc5160);

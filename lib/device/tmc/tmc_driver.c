@@ -435,10 +435,9 @@ void *tmc_driver_open(const struct incise_backend_request *request,
 	struct tmc_driver *d = calloc(1, sizeof(*d));
 	int rc;
 
-	if (!d) {
-		incise_error_set(err, ENOMEM, "%s: %s", request->where, strerror(ENOMEM));
-		return NULL;
-	}
+	if (!d)
+		return INCISE_ERROR_NULL(err, ENOMEM, "%s: %s", request->where,
+					 strerror(ENOMEM));
 	d->driver.ops = &ops;
 	d->model = model;
 	d->actuator = *request->actuator;

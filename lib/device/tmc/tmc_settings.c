@@ -3,7 +3,6 @@
  * The group actuator.tmc of rig.conf: currents and modes of a driver chip. In libincise, as rig.conf is
  * read where the module is not, too.
  */
-#include <stddef.h>
 #include <string.h>
 #include "../../rig/actuator.h"
 

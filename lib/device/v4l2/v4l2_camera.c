@@ -242,10 +242,9 @@ static void *camera_open(const struct incise_backend_request *asked,
 	struct v4l2_camera *c = aligned_alloc(64, sizeof(*c));
 	int rc;
 
-	if (!c) {
-		incise_error_set(err, ENOMEM, "%s: %s", asked->where, strerror(ENOMEM));
-		return NULL;
-	}
+	if (!c)
+		return INCISE_ERROR_NULL(err, ENOMEM, "%s: %s", asked->where,
+					 strerror(ENOMEM));
 	memset(c, 0, sizeof(*c));
 	c->camera.ops = &ops;
 	c->fd = -1;
@@ -351,12 +350,5 @@ static int camera_scan(const char *arguments, incise_scan_found *found, void *co
 	return s.answer;
 }
 
-const struct incise_backend incise_camera_v4l2 = {
-	.abi = INCISE_BACKEND_ABI,
-	.kind = "camera",
-	.name = "v4l2",
-	.open = camera_open,
-	.scan = camera_scan,
-};
-
-INCISE_MODULE(incise_camera_v4l2);
+INCISE_BACKEND(incise_camera_v4l2, "camera", "v4l2", .open = camera_open,
+	       .scan = camera_scan);

@@ -29,6 +29,10 @@ struct incise_error {
 INCISE_API int incise_error_set(struct incise_error *err, int code, const char *fmt, ...)
 	INCISE_PRINTF(3, 4);
 
+/** The same in C for functions that return pointers: NULL, with errno set. */
+#define INCISE_ERROR_NULL(err, code, ...) \
+	((void)incise_error_set(err, code, __VA_ARGS__), (void *)0)
+
 /**
  * Fill in the error of a shared library or module that cannot be loaded. The line names the
  * Debian package of the missing library.

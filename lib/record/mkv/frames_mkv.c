@@ -19,7 +19,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 #include <libavcodec/avcodec.h>
 #include <libavformat/avformat.h>
@@ -27,6 +26,7 @@
 #include <libavutil/frame.h>
 #include <libavutil/intreadwrite.h>
 #include "../../base/crypto/sha256.h"
+#include "../../base/monotonic.h"
 #include "../frames.h"
 
 #define BUFFER_BYTES (1 << 20) /* one write(2) for most frames */
@@ -257,14 +257,6 @@ static int fail_frames_mkv(struct writer *w, int rc, const char *what,
 				w->path, what, strerror(code));
 }
 
-static int64_t clock_ns(void)
-{
-	struct timespec now;
-
-	clock_gettime(CLOCK_MONOTONIC, &now);
-	return now.tv_sec * 1000000000LL + now.tv_nsec;
-}
-
 /* Nearest ms after the first frame, and later than the frame before. */
 static int64_t pts_of(struct writer *w, int64_t t_ns)
 {
@@ -379,7 +371,7 @@ static int writer_put(struct incise_frames_writer *writer,
 	if (rc)
 		return fail_frames_mkv(w, rc, "cannot be written", err);
 	w->good_size = w->size;
-	now = w->sync_ns ? clock_ns() : 0;
+	now = w->sync_ns ? incise_monotonic_ns() : 0;
 	if (w->sync_ns && now - w->synced_ns >= w->sync_ns) {
 		if (fdatasync(w->fd) && errno != EINVAL)
 			return fail_frames_mkv(w, AVERROR(errno), "cannot be synced",
@@ -517,20 +509,18 @@ static struct incise_frames_writer *writer_new(
 	struct writer *w;
 	int rc;
 
-	if (!is_shape(shape)) {
-		incise_error_set(err, EINVAL,
-				 "%.300s: frames of %d × %d in this format cannot be "
-				 "recorded; set another size or format of the camera",
-				 path, shape->width, shape->height);
-		return NULL;
-	}
+	if (!is_shape(shape))
+		return INCISE_ERROR_NULL(
+			err, EINVAL,
+			"%.300s: frames of %d × %d in this format cannot be "
+			"recorded; set another size or format of the camera",
+			path, shape->width, shape->height);
 	w = calloc(1, sizeof(*w));
 	if (w)
 		w->path = strdup(path);
 	if (!w || !w->path) {
 		free(w);
-		incise_error_set(err, ENOMEM, "%.300s: out of memory", path);
-		return NULL;
+		return INCISE_ERROR_NULL(err, ENOMEM, "%.300s: out of memory", path);
 	}
 	/* Errors come back as codes; libav prints nothing. */
 	av_log_set_level(AV_LOG_QUIET);
@@ -538,7 +528,7 @@ static struct incise_frames_writer *writer_new(
 	w->writer.ops = &ops;
 	w->shape = *shape;
 	w->sync_ns = options && options->sync_ns > 0 ? options->sync_ns : 0;
-	w->synced_ns = clock_ns();
+	w->synced_ns = incise_monotonic_ns();
 	w->fd = open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
 	if (w->fd < 0) {
 		incise_error_set(err, errno, "%.300s: cannot be created: %s", path,

@@ -6,7 +6,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <incise/clock.h>
 #include "cut.h"
 #include "range.h"
 #include "source.h"

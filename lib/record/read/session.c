@@ -9,6 +9,7 @@
 #include <string.h>
 #include <incise/seal.h>
 #include "../../base/crc32c.h"
+#include "../../base/grow.h"
 #include "../ledger.h"
 #include "../old/old.h"
 #include "../schema.h"
@@ -255,24 +256,18 @@ static int read_map(struct incise_session *session, int member, sqlite3 *db,
 		return incise_schema_fail(db, folder, err);
 	sqlite3_bind_int(stmt, 1, member);
 	while (!rc && sqlite3_step(stmt) == SQLITE_ROW) {
-		struct incise_session_knot *knots = map->knots;
-
-		if (map->n == capacity) {
-			capacity = capacity ? 2 * capacity : 16;
-			knots = realloc(map->knots, capacity * sizeof(*knots));
-			if (!knots) {
-				rc = incise_schema_no_memory(folder, err);
-				break;
-			}
-			map->knots = knots;
+		if (!grow_array(&map->knots, map->n, &capacity, 16,
+				sizeof(*map->knots))) {
+			rc = incise_schema_no_memory(folder, err);
+			break;
 		}
-		knots[map->n] = (struct incise_session_knot){
+		map->knots[map->n] = (struct incise_session_knot){
 			sqlite3_column_int64(stmt, 0),
 			sqlite3_column_int64(stmt, 1),
 			sqlite3_column_double(stmt, 2),
 		};
 		if (map->n == INCISE_SESSION_KNOTS_MAX ||
-		    !good_knot(&knots[map->n], map->n))
+		    !good_knot(&map->knots[map->n], map->n))
 			rc = damaged_session(folder, "a row of table maps is invalid",
 					     err);
 		map->n++;

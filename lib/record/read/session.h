@@ -11,7 +11,6 @@
 #ifndef INCISE_SESSION_PRIVATE_H
 #define INCISE_SESSION_PRIVATE_H
 
-#include <stddef.h>
 #include <stdint.h>
 #include <incise/session.h>
 #include <incise/wall.h>

@@ -5,7 +5,7 @@
 #include <errno.h>
 #include <stdarg.h>
 #include <stdio.h>
-#include <time.h>
+#include "../../base/monotonic.h"
 #include "verify.h"
 
 #define REPORT_NS 100000000LL
@@ -70,13 +70,11 @@ int incise_verify_progress(struct incise_verification *verify, bool pages)
 	double share = verify->rows_done < verify->rows
 			       ? (double)verify->rows_done / verify->rows
 			       : 1;
-	struct timespec now;
 	int64_t now_ns;
 
 	if (!verify->watch || !verify->watch->progress)
 		return 0;
-	clock_gettime(CLOCK_MONOTONIC, &now);
-	now_ns = now.tv_sec * 1000000000LL + now.tv_nsec;
+	now_ns = incise_monotonic_ns();
 	if (now_ns - verify->reported_ns < REPORT_NS)
 		return 0;
 	verify->reported_ns = now_ns;

@@ -17,6 +17,7 @@
 #include <string.h>
 #include <time.h>
 #include <incise/camera.h>
+#include "../../base/monotonic.h"
 #include "../../base/ring.h"
 #include "../../rig/thread.h"
 #include "frame_pump.h"
@@ -520,8 +521,7 @@ struct incise_frame_pump *incise_frame_pump_new(
 
 	if (!p) {
 		incise_frames_writer_close(setup->writer, NULL);
-		incise_error_set(err, ENOMEM, "camera: out of memory");
-		return NULL;
+		return INCISE_ERROR_NULL(err, ENOMEM, "camera: out of memory");
 	}
 	memset(p, 0, sizeof(*p));
 	p->setup = *setup;
@@ -534,9 +534,8 @@ struct incise_frame_pump *incise_frame_pump_new(
 	if (!p->file_runs)
 		incise_frames_writer_close(setup->writer, NULL);
 	incise_frame_pump_free(p);
-	incise_error_set(err, -rc, "camera: its frames cannot be recorded: %s",
-			 strerror(-rc));
-	return NULL;
+	return INCISE_ERROR_NULL(err, -rc, "camera: its frames cannot be recorded: %s",
+				 strerror(-rc));
 }
 
 /*
@@ -545,15 +544,14 @@ struct incise_frame_pump *incise_frame_pump_new(
  */
 static bool wait_for_file(struct incise_frame_pump *p, int64_t patience_ns)
 {
-	struct timespec now, until;
+	struct timespec until;
 	uint64_t waiting;
 	int64_t until_ns;
 	int rc;
 
 	do {
 		waiting = slots_waiting(&p->slots);
-		clock_gettime(CLOCK_MONOTONIC, &now);
-		until_ns = now.tv_sec * INCISE_NS_PER_S + now.tv_nsec + patience_ns;
+		until_ns = incise_monotonic_ns() + patience_ns;
 		until = (struct timespec){until_ns / INCISE_NS_PER_S,
 					  until_ns % INCISE_NS_PER_S};
 		do {

@@ -6,6 +6,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "../../base/grow.h"
 #include "recorder.h"
 
 /* Without a depth for so many samples none is near them. */
@@ -27,16 +28,9 @@ void incise_recorder_follow_force(struct incise_recorder *rec, int64_t t_ns, int
 
 	if (!rec->streams[INCISE_LEDGER_TRACKER].exists)
 		return;
-	if (summary->n == summary->capacity && summary->capacity < WAITING_MAX) {
-		size_t capacity = summary->capacity ? 2 * summary->capacity : 1024;
-		void *more = reallocarray(summary->waiting, capacity,
-					  sizeof(*summary->waiting));
-
-		if (more) {
-			summary->waiting = more;
-			summary->capacity = capacity;
-		}
-	}
+	if (summary->capacity < WAITING_MAX)
+		grow_array(&summary->waiting, summary->n, &summary->capacity, 1024,
+			   sizeof(*summary->waiting));
 	if (summary->n == summary->capacity)
 		summary->n = 0;
 	if (summary->capacity)
@@ -60,18 +54,11 @@ static void take_force(struct incise_recorder_summary *summary,
 
 static void note_end(struct incise_recorder_summary *summary, int64_t t_ns)
 {
-	if (summary->n_ends == summary->ends_capacity) {
-		size_t capacity = summary->n_ends ? 2 * summary->n_ends : 64;
-		void *more = reallocarray(summary->ends_ns, capacity,
-					  sizeof(*summary->ends_ns));
-
-		summary->no_ends |= !more;
-		if (!more)
-			return;
-		summary->ends_ns = more;
-		summary->ends_capacity = capacity;
-	}
-	summary->ends_ns[summary->n_ends++] = t_ns;
+	if (grow_array(&summary->ends_ns, summary->n_ends, &summary->ends_capacity, 64,
+		       sizeof(*summary->ends_ns)))
+		summary->ends_ns[summary->n_ends++] = t_ns;
+	else
+		summary->no_ends = true;
 }
 
 static void follow_by_depth(struct incise_recorder_summary *summary,

@@ -31,22 +31,14 @@
 
 static const char list_path[] = "/usr/share/zoneinfo/leap-seconds.list";
 
-static int64_t read_clock(clockid_t id)
-{
-	struct timespec now;
-
-	clock_gettime(id, &now);
-	return now.tv_sec * INCISE_NS_PER_S + now.tv_nsec;
-}
-
 void incise_wall_read_clocks(struct incise_wall_clocks *clocks)
 {
 	clocks->half_ns = INT64_MAX;
 	for (int i = 0; i < TRIES; i++) {
 		int64_t from_ns = incise_monotonic_ns();
-		int64_t real_ns = read_clock(CLOCK_REALTIME);
-		int64_t raw_ns = read_clock(CLOCK_MONOTONIC_RAW);
-		int64_t boot_ns = read_clock(CLOCK_BOOTTIME);
+		int64_t real_ns = incise_read_clock_ns(CLOCK_REALTIME);
+		int64_t raw_ns = incise_read_clock_ns(CLOCK_MONOTONIC_RAW);
+		int64_t boot_ns = incise_read_clock_ns(CLOCK_BOOTTIME);
 		int64_t half_ns = (incise_monotonic_ns() - from_ns + 1) / 2;
 
 		if (half_ns >= clocks->half_ns)

@@ -176,10 +176,8 @@ static struct incise_film_coder *film_open(const char *path, int width, int heig
 	struct incise_film_coder *coder = calloc(1, sizeof(*coder));
 	int rc = AVERROR(ENAMETOOLONG);
 
-	if (!coder) {
-		incise_error_set(err, ENOMEM, "no memory for a film");
-		return NULL;
-	}
+	if (!coder)
+		return INCISE_ERROR_NULL(err, ENOMEM, "no memory for a film");
 	/* Warnings about the input are not for users. */
 	av_log_set_level(AV_LOG_ERROR);
 	if (strlen(path) < sizeof(coder->path)) {

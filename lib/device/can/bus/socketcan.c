@@ -50,14 +50,6 @@ static struct socketcan *socketcan_of(struct can_bus *bus)
 	return (struct socketcan *)bus;
 }
 
-static int64_t clock_ns(clockid_t clock)
-{
-	struct timespec now;
-
-	clock_gettime(clock, &now);
-	return now.tv_sec * NS_PER_S + now.tv_nsec;
-}
-
 static INCISE_REALTIME int64_t socketcan_now(struct can_bus *bus)
 {
 	(void)bus;
@@ -118,10 +110,10 @@ static int socketcan_send_fd(struct can_bus *bus, const struct canfd_frame *fram
 /* Timestamps are wall time, which may be set meanwhile: an impossible one counts as now. */
 static int64_t timestamp(struct socketcan *s, const struct timespec *wall)
 {
-	int64_t now = clock_ns(CLOCK_MONOTONIC), t = now;
+	int64_t now = incise_monotonic_ns(), t = now;
 
 	if (wall->tv_sec || wall->tv_nsec) {
-		int64_t age = clock_ns(CLOCK_REALTIME) -
+		int64_t age = incise_read_clock_ns(CLOCK_REALTIME) -
 			      (wall->tv_sec * NS_PER_S + wall->tv_nsec);
 
 		if (age > 0)
@@ -465,7 +457,7 @@ static int socketcan_open(struct can_bus **bus, const struct can_bus_request *re
 	s->bus.ops = &socketcan_ops;
 	s->fd = s->owner = -1;
 	s->state = -EOPNOTSUPP;
-	s->last_ns = clock_ns(CLOCK_MONOTONIC);
+	s->last_ns = incise_monotonic_ns();
 	rc = open_socket(s, request, err);
 	if (!rc) {
 		index = look_up(s, request, err);

@@ -564,10 +564,9 @@ void *can_stepper_open(const struct can_transport *transport,
 	struct can_stepper *c = aligned_alloc(64, sizeof(*c));
 	int rc;
 
-	if (!c) {
-		incise_error_set(err, ENOMEM, "%s: %s", request->where, strerror(ENOMEM));
-		return NULL;
-	}
+	if (!c)
+		return INCISE_ERROR_NULL(err, ENOMEM, "%s: %s", request->where,
+					 strerror(ENOMEM));
 	memset(c, 0, sizeof(*c));
 	c->sleep_until = transport->sleep_until;
 	c->motor.ops = &ops;
