@@ -90,12 +90,9 @@ static const enum incise_held held[] = {INCISE_HELD_ACROSS, INCISE_HELD_IN_HAND,
 #define AWAY_MM 40 /* so far aside it is where no search began … */
 #define DEEP_MM 80 /* … and so deep, or nearly as deep as there is tissue, it has sunk */
 
-/*
- * A tool that rests may swing once it is pushed: where tissue unloads, a swing keeps itself up, at any lean, so that
- * one lean of each way is enough.
- */
-#define PUSH_MM_S 20 /* along each axis */
-#define PUSHED 10    /* of the leans */
+/* A push, along each axis, at one of the leans: a swing that keeps itself up does so at many. */
+#define PUSH_MM_S 20
+#define PUSHED 10
 
 /*
  * Between the leans on a model that are tried there may be worse: forces count as so much larger, and the device's
@@ -140,6 +137,7 @@ struct search {
 	struct parts leaned_parts;
 	struct incise_touch place[PLACES]; /* the first one is the top */
 	int n_places;
+	double crease;		      /* angle of the sharpest edge, up to a right one */
 	struct incise_surface *plane; /* at the top, without an end */
 	struct incise_device device;
 	struct way way;
@@ -785,19 +783,6 @@ static struct incise_force_map paid_for(const struct incise_force_map *map)
 	return springs;
 }
 
-/* Lean, and note the run. Returns as lean(). */
-static double lean_noted(struct search *s, struct rest_run *run, int way,
-			 struct incise_rest *rest, double *depth_mm)
-{
-	struct window last;
-	double settle_s = lean(s, run, &last);
-
-	rest->runs++;
-	note_rest(s, run, &last, settle_s, way, rest);
-	*depth_mm = depth_of(s, &last);
-	return settle_s;
-}
-
 /* Without a switch forces are the same on both sides, except for curvature. */
 static bool is_same(const struct incise_force_map *a, const struct incise_force_map *b)
 {
@@ -930,24 +915,45 @@ static bool judge_steps(struct search *s, const struct rest_run *run, double dep
 	return rests;
 }
 
+/*
+ * As if the tool had entered beyond an edge: spread is across the normal of there, and so adds to the insertion along the
+ * normal of here. Returns whether it rests.
+ */
+static bool judge_crease(struct search *s, const struct rest_run *run, double depth_mm,
+			 int way, struct incise_rest *rest)
+{
+	double *entry = s->plan.doubles.state.entry;
+
+	if (!(s->crease > 0) || s->way.tool == INCISE_TOOL_BLADE ||
+	    s->way.held != INCISE_HELD_FREE)
+		return true;
+	s->plan = s->leaned;
+	s->parts = s->leaned_parts;
+	for (int i = 0; i < 3; i++)
+		entry[i] = cos(s->crease) * entry[i] + sin(s->crease) * s->along[i];
+	return judge_linear(s, run, depth_mm, way, rest);
+}
+
 /* Returns whether it rests. */
 static bool try(struct search *s, struct rest_run *run, int lean_of, int way,
 		struct incise_rest *rest)
 {
-	double depth_mm, settle_s = lean_noted(s, run, way, rest, &depth_mm);
+	struct window last;
+	double settle_s = lean(s, run, &last), depth_mm = depth_of(s, &last);
 
+	rest->runs++;
+	note_rest(s, run, &last, settle_s, way, rest);
 	s->decides |= depth_mm >= 0;
-	if (!(settle_s > 0))
-		return false;
-	if (s->way.guided || !(depth_mm > 0))
-		return true;
+	if (!(settle_s > 0) || s->way.guided || !(depth_mm > 0))
+		return settle_s > 0;
 	if (lean_of == PUSHED) {
 		for (int i = 0; i < 3; i++)
 			run->device[i].velocity_mm_s += PUSH_MM_S;
-		return lean_noted(s, run, way, rest, &depth_mm) > 0;
+		return try(s, run, PUSHED + 1, way, rest);
 	}
 	/* Similar leans have similar loops. */
-	return lean_of % LOOK_EVERY || judge_steps(s, run, depth_mm, way, rest);
+	return lean_of % LOOK_EVERY || (judge_steps(s, run, depth_mm, way, rest) &&
+					judge_crease(s, run, depth_mm, way, rest));
 }
 
 /* All leans of a way. Returns whether they rest. */
@@ -1161,7 +1167,8 @@ static void add_beside(struct search *s, const struct incise_surface *surface,
 
 /*
  * The top, above the membrane, and of a mesh the corners where it is the most concave along an edge, and the most
- * convex: there normals turn the most, 1/mm.
+ * convex: there normals turn the most, 1/mm. Faces that meet in a corner differ the most where one differs the most from
+ * the corner's normal.
  */
 #define LOOKS_MOST 1000
 static void set_places(struct search *s, const struct incise_plan *plan)
@@ -1169,17 +1176,23 @@ static void set_places(struct search *s, const struct incise_plan *plan)
 	const struct incise_surface *surface = plan->surface;
 	const struct mesh *mesh = surface->mesh;
 	uint32_t most[2] = {0, 0}, end[2] = {0, 0};
-	double bend[2] = {0, 0}, edge[3], turn[3];
+	double bend[2] = {0, 0}, edge[3], turn[3], face[3], least = 1;
 	int looks = 0;
 
 	set_top(s, surface);
 	add_membrane(s, surface, &plan->scene->membrane);
-	for (uint32_t i = 0; mesh && i < mesh->n_triangles; i++)
+	for (uint32_t i = 0; mesh && i < mesh->n_triangles; i++) {
+		const uint32_t *corner = mesh->corner[i];
+
+		triangle_area_normal(face, mesh->vertex[corner[0]],
+				     mesh->vertex[corner[1]], mesh->vertex[corner[2]]);
 		for (int k = 0; k < 3; k++) {
-			uint32_t a = mesh->corner[i][k], b = mesh->corner[i][(k + 1) % 3];
+			uint32_t a = corner[k], b = corner[(k + 1) % 3];
 			double per_mm;
 			int sign;
 
+			if (v3_unit(face, face, 0))
+				least = fmin(least, v3_dot(face, mesh->normal[a]));
 			if (mesh->neighbour[i][k] == MESH_NONE)
 				continue;
 			v3_sub(edge, mesh->vertex[b], mesh->vertex[a]);
@@ -1193,6 +1206,8 @@ static void set_places(struct search *s, const struct incise_plan *plan)
 				end[sign] = b;
 			}
 		}
+	}
+	s->crease = 2 * acos(fmax(least, M_SQRT1_2));
 	for (int sign = 0; sign < 2; sign++) {
 		const double *at_mm = bend[sign] > 0 ? mesh->vertex[most[sign]] : NULL;
 		struct incise_touch place;

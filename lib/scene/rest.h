@@ -16,8 +16,8 @@
  *   - of a model besides, guided along the normal of the top, on the plane that touches it there, while it goes
  *     along the skin.
  *
- * Where it comes to rest, the loop is judged as a linear one, too: by the forces that a small motion meets there; or it is
- * pushed once, and must come to rest again.
+ * Where it comes to rest, the loop is judged as a linear one, too: by the forces that a small motion meets there, also
+ * with a tube that entered beyond the sharpest edge; or it is pushed once, and must come to rest again.
  *
  * A swing goes to and fro: a hand that sinks or creeps does not swing. Where the tool slides away, or sinks where
  * the tissue does not carry the lean, a run decides nothing; a tool that sinks is followed until it rests deeper.

@@ -847,7 +847,12 @@ static void try_all(void (*try)(uint64_t), int scenes)
 
 TEST(test_an_accepted_scene_rests)
 {
+	/* These swung: once a tool at rest was pushed, and with a tube that went over an edge of a mesh. */
+	static const uint64_t swung[] = {356, 772};
+
 	try_all(try_scene, cases_are_all() ? SCENES : SCENES_FEW);
+	for (int i = 0; i < 2 && !getenv("SEEDS"); i++)
+		try_scene(swung[i]);
 	summarize();
 	assert_int_equal(sum.by[SWINGS], 0);
 	assert_int_equal(sum.advised, sum.advice_accepted);
