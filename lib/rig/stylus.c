@@ -114,8 +114,6 @@ static INCISE_REALTIME void place_sample(struct incise_stylus *stylus,
 		to->status = '~';
 		return;
 	}
-	if (from->flags & INCISE_HAPTIC_NOT_READY)
-		to->status = '!';
 	place_tool(stylus, from, to->position_mm);
 	use_clutch(stylus, from, to->position_mm);
 	multiply_turns(to->quaternion, stylus->turn, from->quaternion);
@@ -253,7 +251,7 @@ enum incise_haptic_off incise_stylus_off(struct incise_stylus *stylus, int64_t n
 const char *incise_haptic_off_text(enum incise_haptic_off off)
 {
 	static const char *const texts[] = {
-		[INCISE_HAPTIC_ON] = "on",
+		[INCISE_HAPTIC_ON] = "on, once the tool is out of the tissue",
 		[INCISE_HAPTIC_OUTSIDE] =
 			"off: move the handle to the middle of its workspace",
 		[INCISE_HAPTIC_CLUTCH] = "off: the clutch is pressed",

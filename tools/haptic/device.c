@@ -8,6 +8,7 @@
 #include "../cli/cli.h"
 #include "haptic.h"
 
+#define AGE_MOST_MS 1000
 #define AGES_S 0.5 /* for which ages are measured at the start */
 
 /* The mean age of the newest pose at the loop's ticks, ms, without a force. NAN: no pose came. */
@@ -44,13 +45,22 @@ static void check_ages(struct haptic *haptic)
 	struct incise_tracker_info info;
 	struct incise_error err = {0};
 	double assumed_ms, mean_ms, half_ms;
+	char cause[300];
 
 	incise_tracker_info(incise_rig_tracker(haptic->rig), &info);
 	half_ms = 0.5e3 / info.rate_hz;
 	assumed_ms = (double)info.latency_ns * 1e-6 + 2 * half_ms;
 	mean_ms = measure_age(haptic, &info);
-	if (isnan(mean_ms))
-		cli_fail("%s: no pose came within %g s", info.name, AGES_S);
+	if (isnan(mean_ms)) {
+		incise_tracker_cause(incise_rig_tracker(haptic->rig), cause,
+				     sizeof(cause));
+		cli_fail("%s: no pose came within %g s%s%s", info.name, AGES_S,
+			 *cause ? ": " : "", cause);
+	}
+	if (mean_ms > AGE_MOST_MS)
+		cli_fail("%s: its poses have times of %.3g ms ago: they are not of "
+			 "CLOCK_MONOTONIC; correct its owner",
+			 info.name, mean_ms);
 	cli_note("%s: poses are %.2f ms old in the mean; the plan assumes %.2f",
 		 info.name, mean_ms, assumed_ms);
 	if (mean_ms <= assumed_ms)

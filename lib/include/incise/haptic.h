@@ -109,7 +109,7 @@ enum incise_haptic_off {
 	INCISE_HAPTIC_LATE,    /**< samples are older than the plan assumed */
 };
 
-/** The same in words: "on", or "off: …" with what to do. */
+/** The same in words: "on, …", or "off: …" with what to do. */
 INCISE_API const char *incise_haptic_off_text(enum incise_haptic_off off);
 
 /** Ages of a rig's samples at the ticks of a plan. */
