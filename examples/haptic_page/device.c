@@ -42,7 +42,7 @@ static double take_force(const struct incise_haptic_page_user *half)
 		whole = incise_haptic_page_get(half, &next, sizeof(next));
 	if (whole &&
 	    (next.wants != INCISE_HAPTIC_PAGE_FORCE || !isfinite(*next.force_N) ||
-	     next.period_ns <= 0 || next.heartbeat_ns > now() ||
+	     next.period_ns <= 0 || next.heartbeat_ns <= 0 || next.heartbeat_ns > now() ||
 	     next.period_ns > INCISE_HAPTIC_PAGE_PERIOD_NS ||
 	     (int32_t)(next.seq - user.seq) < 0))
 		return share = 0;

@@ -65,7 +65,7 @@ class Gate:
             seq, wants, beat, period, *forces = half
             back = (seq - self.last[0]) % 2**32 >= 2**31
             if (wants != FORCE or not all(map(math.isfinite, forces)) or back or
-                    not 0 < period <= PERIOD_MOST_NS or beat > now()):
+                    not 0 < period <= PERIOD_MOST_NS or not 0 < beat <= now()):
                 self.share = 0.0
                 return 0.0
             self.last = half

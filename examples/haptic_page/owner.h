@@ -84,9 +84,9 @@ static int owner_accepts(const struct owner *owner,
 {
 	return next->wants == INCISE_HAPTIC_PAGE_FORCE && next->period_ns > 0 &&
 	       next->period_ns <= INCISE_HAPTIC_PAGE_PERIOD_NS &&
-	       next->heartbeat_ns <= now && isfinite(next->force_N[0]) &&
-	       isfinite(next->force_N[1]) && isfinite(next->force_N[2]) &&
-	       (int32_t)(next->seq - owner->user.seq) >= 0;
+	       next->heartbeat_ns > 0 && next->heartbeat_ns <= now &&
+	       isfinite(next->force_N[0]) && isfinite(next->force_N[1]) &&
+	       isfinite(next->force_N[2]) && (int32_t)(next->seq - owner->user.seq) >= 0;
 }
 
 /*
@@ -103,7 +103,8 @@ static void owner_force(struct owner *owner, double peak_N, double force_N[3])
 
 	for (i = 0; i < 3 && !whole; i++)
 		whole = incise_haptic_page_get(&owner->page->user, &next, sizeof(next));
-	owner->share = fmin(1, owner->share + fmin(ramp, 0.05));
+	/* One that stood still for 20 ms starts again. */
+	owner->share = ramp > 0.2 ? 0 : fmin(1, owner->share + ramp);
 	owner->forced_ns = now;
 	if (whole && !owner_accepts(owner, &next, now))
 		owner->share = 0;

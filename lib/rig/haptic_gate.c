@@ -40,20 +40,21 @@ static INCISE_REALTIME void ramp_up(struct haptic_gate *gate, int64_t now_ns)
 {
 	int64_t step_ns = now_ns - gate->now_ns;
 
-	if (!gate->now_ns || step_ns > GAP_NS || step_ns < 0)
+	if (!gate->now_ns || step_ns > (gate->gap_ns > GAP_NS ? gate->gap_ns : GAP_NS) ||
+	    step_ns < 0)
 		gate->share = 0;
 	else
 		gate->share = fmin(1, gate->share + (double)step_ns /
 							    INCISE_HAPTIC_PAGE_RAMP_NS);
 }
 
-/* @most: 0: none is known. */
+/* @most: 0: not known, or none is taken: nothing is given. */
 static INCISE_REALTIME void give(double to[3], const double from[3], double share,
 				 double most)
 {
-	double length = v3_length(from), factor = share;
+	double length = v3_length(from), factor = most > 0 ? share : 0;
 
-	if (most > 0 && length * share > most)
+	if (length * factor > most)
 		factor = most / length;
 	for (int i = 0; i < 3; i++)
 		to[i] = factor > 0 ? factor * from[i] : 0;

@@ -73,6 +73,8 @@ static void put_device(struct incise_haptic_owner *owner, const char *device,
 
 	incise_haptic_info(owner->haptic, &info);
 	memcpy(to->low_mm, info.low_mm, HAPTIC_PAGE_MIDDLE(incise_haptic_info));
+	/* A force that answers a sample is given at the next tick. */
+	to->force_latency_ns += owner->period_ns;
 	to->buttons = (uint32_t)info.buttons;
 	to->features = (info.measures_velocity ? INCISE_HAPTIC_PAGE_VELOCITY : 0) |
 		       (info.measures_orientation ? INCISE_HAPTIC_PAGE_ORIENTATION : 0) |
@@ -190,6 +192,7 @@ static int open_owned_device(struct incise_haptic_owner *owner, const char *devi
 					"haptic_setup",
 					owner->where);
 	owner->period_ns = llround(INCISE_NS_PER_S / owner->haptic->info.rate_hz);
+	owner->gate.gap_ns = 2 * owner->period_ns;
 	owner->gate.peak_N = owner->haptic->info.peak_N;
 	owner->gate.torque_N_mm = owner->haptic->info.torque_N_mm;
 	owner->next_ns = owner->used_ns = incise_clock_now(owner->clock);

@@ -72,7 +72,8 @@ uint32_t incise_haptic_page_settings(const struct incise_haptic_setup *setup);
  * After each 0 it returns by a ramp.
  */
 struct haptic_gate {
-	double peak_N, torque_N_mm;	     /* limits of the device; 0: not known */
+	double peak_N, torque_N_mm; /* limits of the device; 0: nothing is given */
+	int64_t gap_ns;		    /* between decisions, of a slow device; else 20 ms */
 	struct incise_haptic_page_user last; /* whole and valid half */
 	double share;			     /* 0 … 1, of its force */
 	int64_t now_ns;			     /* of the last decision; 0: none */

@@ -357,6 +357,9 @@ static int attach_once(struct haptic_user *user, const char *device, const char 
 
 	incise_haptic_page_close(&user->page, false);
 	memset(&user->owner, 0, sizeof(user->owner));
+	user->rc = 0;
+	user->cause = NULL;
+	user->flags = 0;
 	rc = incise_haptic_page_open(&user->page, device, where, err);
 	return rc ? rc : read_device(user, device, where, err);
 }
@@ -387,6 +390,8 @@ struct incise_haptic *incise_haptic_attach(const char *spec, const char *device,
 					   struct incise_error *err)
 {
 	struct haptic_user *user = calloc(1, sizeof(*user));
+	static const struct incise_haptic_setup none;
+	bool local = !strncmp(device, HAPTIC_PAGE_LOCAL, strlen(HAPTIC_PAGE_LOCAL));
 	int rc;
 
 	if (!user) {
@@ -396,15 +401,15 @@ struct incise_haptic *incise_haptic_attach(const char *spec, const char *device,
 	user->base.ops = &ops;
 	user->clock = clock;
 	user->page.fd = -1;
-	rc = strncmp(device, HAPTIC_PAGE_LOCAL, strlen(HAPTIC_PAGE_LOCAL))
-		     ? attach_owned(user, spec, device, where, setup, err)
-		     : attach_once(user, device, where, err);
+	rc = local ? attach_once(user, device, where, err)
+		   : attach_owned(user, spec, device, where, setup, err);
 	if (rc) {
 		incise_haptic_page_close(&user->page, false);
 		free(user);
 		errno = -rc;
 		return NULL;
 	}
-	incise_haptic_set_info(&user->base, setup);
+	/* An owner of ours has the settings of the rig. */
+	incise_haptic_set_info(&user->base, local ? setup : &none);
 	return &user->base;
 }

@@ -15,7 +15,7 @@ static const struct {
 	bool usable;
 	const char *text;
 } flags[] = {
-	{'!', '!', false, "its sender does not see it"},
+	{'!', '!', false, "its sender does not see it, or is not ready"},
 	{'=', '=', false, "the same pose for too long: the sensor does not measure"},
 	{'A', 'G', false, "its source or a self-test failed"},
 	{'a', 'g', false, "its source or its self-calibration failed"},

@@ -361,17 +361,21 @@ struct incise_stylus *incise_rig_stylus(struct incise_rig *rig)
 void incise_rig_haptic_place(struct incise_rig *rig, const double turn[4],
 			     const double origin_mm[3])
 {
-	incise_stylus_place(rig->stylus, turn, origin_mm);
+	if (rig->stylus)
+		incise_stylus_place(rig->stylus, turn, origin_mm);
 }
 
 void incise_rig_haptic_assume(struct incise_rig *rig, int64_t latency_ns)
 {
-	incise_stylus_assume(rig->stylus, latency_ns);
+	if (rig->stylus)
+		incise_stylus_assume(rig->stylus, latency_ns);
 }
 
 void incise_rig_haptic_ages(const struct incise_rig *rig, struct incise_haptic_ages *ages)
 {
-	incise_stylus_ages(rig->stylus, ages);
+	*ages = (struct incise_haptic_ages){0};
+	if (rig->stylus)
+		incise_stylus_ages(rig->stylus, ages);
 }
 
 struct incise_sim *incise_rig_sim(struct incise_rig *rig)

@@ -643,9 +643,12 @@ static int check_haptic(struct incise_haptic_setup *haptic, const config_setting
 	for (int i = 0; i < 4; i++)
 		haptic->turn[i] /= size;
 	for (int i = 0; i < 3; i++)
-		if (haptic->high_mm[i] < haptic->low_mm[i])
-			return incise_conf_error(group, "high_mm", path, err,
-						 "no number below that of low_mm");
+		if (haptic->high_mm[i] < haptic->low_mm[i] ||
+		    (group && !config_setting_get_member(group, "low_mm") !=
+				      !config_setting_get_member(group, "high_mm")))
+			return incise_conf_error(
+				group, "high_mm", path, err,
+				"low_mm and high_mm, and no number below that of low_mm");
 	if (haptic->n_motor_directions != 3 * haptic->n_motors ||
 	    haptic->n_motor_torques != haptic->n_motors)
 		return incise_conf_error(

@@ -103,7 +103,7 @@ static INCISE_REALTIME void place_sample(struct incise_stylus *stylus,
 					 struct incise_tracker_sample *to)
 {
 	*to = (struct incise_tracker_sample){
-		.t_ns = from->t_ns + stylus->info.latency_ns,
+		.t_ns = from->t_ns + stylus->latency_ns,
 		.seq = from->seq,
 		.status = ' ',
 		.station = 1,
@@ -115,7 +115,11 @@ static INCISE_REALTIME void place_sample(struct incise_stylus *stylus,
 		return;
 	}
 	place_tool(stylus, from, to->position_mm);
-	use_clutch(stylus, from, to->position_mm);
+	/* Such a place is not the handle's: it moves nothing, nor the frame by the clutch. */
+	if (from->flags & (INCISE_HAPTIC_NOT_READY | INCISE_HAPTIC_CHANGED))
+		to->status = '!';
+	else
+		use_clutch(stylus, from, to->position_mm);
 	multiply_turns(to->quaternion, stylus->turn, from->quaternion);
 	stylus->last = *from;
 	stylus->seen = true;

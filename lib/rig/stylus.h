@@ -25,7 +25,7 @@ void incise_stylus_free(struct incise_stylus *stylus);
 /* Its poses: time, period and latency are the device's. Owned by the stylus. */
 struct incise_tracker *incise_stylus_tracker(struct incise_stylus *stylus);
 
-/* Push with a force in the scene's frame, while on; else with none. 0 or a negative errno. */
+/* Push with a force in the scene's frame. 0 or a negative errno. */
 int incise_stylus_push(struct incise_stylus *stylus,
 		       const double force_N[3]) INCISE_REALTIME;
 

@@ -99,6 +99,11 @@ void haptic_begin_device(struct haptic *haptic)
 			"%s keeps its last force if its owner is killed: keep its switch "
 			"at hand",
 			info.name);
+	if (!(info.high_mm[0] > info.low_mm[0]))
+		cli_warn(
+			"%s: its workspace is not known, so a force may begin anywhere; set "
+			"haptic_setup.low_mm and high_mm",
+			info.name);
 	if (info.continuous_N > 0 && limits.force_N > info.continuous_N)
 		cli_note("%s stands %g N for ever; limits.force_N is %g N", info.name,
 			 info.continuous_N, limits.force_N);
@@ -135,7 +140,8 @@ void haptic_device_line(const struct haptic *haptic)
 	incise_haptic_info(incise_rig_haptic(haptic->rig), &info);
 	incise_rig_haptic_ages(haptic->rig, &ages);
 	printf("device     %s: poses %.2f ms old in the mean, jitter %.2f, at most %.2f "
-	       "(assumed %.2f); %llu lost\n",
+	       "(assumed %.2f); %llu lost; %llu gaps of the loop\n",
 	       info.name, ages.mean_ms, ages.jitter_ms, ages.most_ms, ages.assumed_ms,
-	       (unsigned long long)ages.lost);
+	       (unsigned long long)ages.lost,
+	       (unsigned long long)haptic->stats->overruns);
 }

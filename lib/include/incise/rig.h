@@ -106,7 +106,8 @@ INCISE_API struct incise_stepper *incise_rig_axis(struct incise_rig *rig, int i,
 INCISE_API struct incise_haptic *incise_rig_haptic(struct incise_rig *rig);
 
 /**
- * Place the frame of the rig's haptic device in the scene, in place of rig.conf.
+ * Place the frame of the rig's haptic device in the scene, in place of rig.conf. A rig without one
+ * ignores these three calls; its ages are 0.
  *
  * @param turn from the device's frame, unit, w first
  * @param origin_mm of the device, in the scene
