@@ -314,8 +314,10 @@ static int read_device(struct haptic_user *user, const char *device, const char 
 			where, user->page.path);
 	if (strcmp(user->device.device, device))
 		return incise_error_set(err, EPROTO,
-					"%s: %s: has the device %.80s; end its owner",
-					where, user->page.path, user->device.device);
+					"%s: %s: has the device \"%.80s\", not "
+					"\"%.80s\"; end its owner",
+					where, user->page.path, user->device.device,
+					device);
 	user->period_ns = (double)INCISE_NS_PER_S / user->device.rate_hz;
 	if (look_at_owner(user)) {
 		char cause[400];
