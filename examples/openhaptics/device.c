@@ -45,26 +45,34 @@ static void read_device(struct incise_haptic_page_sample *sample)
 	sample->buttons = (uint32_t)buttons;
 }
 
-/* A tick of the scheduler. After a failure it gives no force. */
+static void keep_error(struct touch *touch)
+{
+	HDErrorInfo error = hdGetError();
+
+	if (HD_DEVICE_ERROR(error) && !touch->failed)
+		touch->failed = hdGetErrorString(error.errorCode);
+}
+
+/* A tick of the scheduler. The last one, after a failure or a signal, sets no force. */
 static HDCallbackCode HDCALLBACK serve(void *data)
 {
 	struct touch *touch = (struct touch *)data;
 	struct incise_haptic_page_sample sample;
-	HDErrorInfo error;
 	HDdouble force_N[3] = {0, 0, 0};
+	int last = stop || touch->failed;
 
 	memset(&sample, 0, sizeof(sample));
 	hdBeginFrame(touch->device);
 	read_device(&sample);
-	owner_sample(&touch->owner, &sample);
-	if (!stop && !touch->failed)
+	keep_error(touch);
+	if (!touch->failed)
+		owner_sample(&touch->owner, &sample);
+	if (!touch->failed && !last)
 		owner_force(&touch->owner, touch->peak_N, force_N);
 	hdSetDoublev(HD_CURRENT_FORCE, force_N);
 	hdEndFrame(touch->device);
-	error = hdGetError();
-	if (HD_DEVICE_ERROR(error))
-		touch->failed = hdGetErrorString(error.errorCode);
-	return stop || touch->failed ? HD_CALLBACK_DONE : HD_CALLBACK_CONTINUE;
+	keep_error(touch);
+	return last ? HD_CALLBACK_DONE : HD_CALLBACK_CONTINUE;
 }
 
 /* Constant properties, before the scheduler runs. */

@@ -57,6 +57,13 @@ serve() { # ARGUMENT…
 }
 
 # bats test_tags=check
+@test "openhaptics: a tick with an error has neither force nor sample" {
+	"${CC:-cc}" -std=gnu11 -D_GNU_SOURCE -Wall -Wextra -Werror "-I$root/lib/include" "-I$root/tests/haptic/stub" \
+		"$root/tests/haptic/touch_failure.c" -lm -o touch_failure
+	./touch_failure "$id"
+}
+
+# bats test_tags=check
 @test "forcedimension: a stand-in's metres become millimetres, a dead owner is told" {
 	compile forcedimension
 	serve 12

@@ -54,6 +54,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 		check_frame(&frame);
 	if (!haply_frame_parse(&frame, (const char *)data, size, "04B2", "8200"))
 		check_frame(&frame);
+	if (!haply_frame_parse(&frame, (const char *)data, size, "04B2", NULL))
+		check_frame(&frame);
 	haply_event_parse((const char *)data, size, "049D", "8200", words, sizeof(words));
 	check_text(words, sizeof(words));
 	return 0;

@@ -20,6 +20,7 @@ a line each, print one line when they are done:
     event JSON          send an event
     report              messages, last force, profile, complaints in JSON; complaints start anew
     close               close all connections
+    deaf                close those of the events
 """
 import argparse
 import asyncio
@@ -235,8 +236,8 @@ class Service:
                                  "complaints": self.complaints})
             self.complaints = []
             return report
-        elif word == "close":
-            for writer in self.writers:
+        elif word in ("close", "deaf"):
+            for writer in self.writers if word == "close" else self.listeners:
                 writer.close()
         return "done"
 

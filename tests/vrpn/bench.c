@@ -18,7 +18,7 @@ static int compare(const void *a, const void *b)
 
 int main(int argc, char **argv)
 {
-	const struct incise_haptic_setup setup = {0};
+	const struct incise_haptic_setup setup = {.peak_N = 10};
 	struct incise_clock *clock = incise_clock_new_real();
 	struct incise_haptic_sample samples[64];
 	struct incise_error err = {0};

@@ -73,6 +73,7 @@ struct haply {
 	uint32_t states;  /* haply_protection, BATTERY and CHANGED */
 	int64_t brief_ns; /* HAPLY_BRIEF began */
 	char event[160];  /* the last state's */
+	char ended[300];  /* why there is no force until it is opened again; or "" */
 	int error;	  /* negative; for good */
 	char cause[400];
 };
@@ -98,27 +99,26 @@ static void add_sample(struct haply *h, int64_t t_ns, const char *not_ready)
 		h->states &= ~(uint32_t)HAPLY_BRIEF;
 	h->sample.t_ns = t_ns;
 	h->sample.seq = h->seq++;
-	h->sample.flags = (not_ready ? INCISE_HAPTIC_NOT_READY : 0) |
-			  (h->states < HAPLY_BRAKE ? 0 : INCISE_HAPTIC_PROTECTED) |
-			  (h->states & (HAPLY_BRAKE - 1));
+	h->sample.flags =
+		(not_ready ? INCISE_HAPTIC_NOT_READY : 0) |
+		(h->states < HAPLY_BRAKE && !*h->ended ? 0 : INCISE_HAPTIC_PROTECTED) |
+		(h->states & (HAPLY_BRAKE - 1));
 	h->has_sample = true;
 	if (h->states & INCISE_HAPTIC_CHANGED)
 		not_ready = "was unplugged, or is another one now; start again";
 	snprintf(h->cause, sizeof(h->cause), h->sample.flags ? "Inverse3 %s %s%s" : "",
 		 h->id, not_ready ? not_ready : h->event,
 		 not_ready ? "" : "; see the manual of the device");
+	if (*h->ended)
+		snprintf(h->cause, sizeof(h->cause), "Inverse3 %s: %s", h->id, h->ended);
 }
 
 static void use_config(struct haply *h)
 {
-	struct incise_haptic_info *info = &h->haptic.info;
-
 	h->mount_scaled = h->frame.mount_scaled;
 	if (*h->info.filters && strcmp(h->info.filters, h->frame.filters))
-		snprintf(info->note, sizeof(info->note),
-			 "its filters changed since it was opened with %s",
-			 h->info.filters);
-	snprintf(info->filters, sizeof(info->filters), "%s", h->frame.filters);
+		snprintf(h->ended, sizeof(h->ended),
+			 "its filters changed (now %s): start again", h->frame.filters);
 }
 
 static void use_frame(struct haply *h, bool late)
@@ -148,7 +148,9 @@ static void take_frame(struct haply *h, const char *text, size_t n)
 	if (!h->waits)
 		return;
 	h->waits = h->late = false;
-	if (!haply_frame_parse(&h->frame, text, n, h->id, h->grip)) {
+	/* A VerseGrip that comes after the start is not that of the plan. */
+	if (!haply_frame_parse(&h->frame, text, n, h->id,
+			       h->period_ns && !*h->grip ? NULL : h->grip)) {
 		h->bad = 0;
 		use_frame(h, late && h->period_ns);
 		return;
@@ -210,6 +212,11 @@ static int handle_link(struct lws *wsi, enum lws_callback_reasons reason, void *
 		return 0;
 	case LWS_CALLBACK_CLIENT_CONNECTION_ERROR:
 	case LWS_CALLBACK_CLIENT_CLOSED:
+		if (link == &h->events && link->is_open)
+			snprintf(
+				h->ended, sizeof(h->ended),
+				"the port of its events closed, its safety is not known: "
+				"start its service, then start again");
 		link->is_open = false;
 		link->wsi = NULL;
 		return 0;

@@ -187,11 +187,11 @@ static void read_frame(struct haply_frame *frame, const json_t *root, const char
 	if (device)
 		read_inverse3(frame, device);
 	device = NULL;
-	for (int i = 0; i < 3 && !device; i++)
+	for (int i = 0; i < 3 && !device && grip; i++)
 		device = find_device(json_object_get(root, grips[i]), grip, frame->grip);
 	if (device)
 		read_grip(frame, device);
-	else if (*grip && !frame->not_ready)
+	else if (grip && *grip && !frame->not_ready)
 		frame->not_ready = "has lost its VerseGrip; plug or pair it again";
 }
 
@@ -238,15 +238,24 @@ size_t haply_command_print(char *text, size_t size, enum haply_format format,
 	return n <= size ? n : 0;
 }
 
+/* A member of another type does not hide the others. */
+static const char *get_text(const json_t *object, const char *key, const char *without)
+{
+	const char *text = json_string_value(json_object_get(object, key));
+
+	return text ? text : without;
+}
+
 int haply_event_parse(const char *text, size_t n, const char *id, const char *grip,
 		      char *words, size_t size)
 {
-	const char *name = "", *level = "", *message = "", *of = id, *type = "";
-	json_t *root = load_object(text, n);
+	json_t *root = load_object(text, n), *data = json_object_get(root, "data");
+	const char *name = get_text(root, "name", "");
+	const char *level = get_text(root, "level", "");
+	const char *of = get_text(data, "device_id", id);
+	const char *type = get_text(data, "safety_type", NULL);
 	int state = 0;
 
-	json_unpack(root, "{s:s, s?s, s?s, s?{s?s, s?s}}", "name", &name, "level", &level,
-		    "message", &message, "data", "device_id", &of, "safety_type", &type);
 	if (strcmp(of, id) && strcmp(of, grip))
 		state = 0;
 	else if (!strcmp(name, "device-disconnected") && !strcmp(of, id))
@@ -256,14 +265,15 @@ int haply_event_parse(const char *text, size_t n, const char *id, const char *gr
 	else if (!strcmp(name, "device-busy"))
 		state = HAPLY_BRIEF;
 	else if (!strcmp(name, "device-safety-triggered"))
-		state = !strncmp(type, "ebrake", 6) ? HAPLY_BRAKE
-			: !strncmp(type, "fod", 3)  ? HAPLY_FOREIGN_OBJECT
-						    : HAPLY_BRIEF;
-	if ((state == HAPLY_BRAKE || state == HAPLY_FOREIGN_OBJECT) &&
+		state = !type || !strncmp(type, "ebrake", 6) ? HAPLY_BRAKE
+			: !strncmp(type, "fod", 3)	     ? HAPLY_FOREIGN_OBJECT
+							     : HAPLY_BRIEF;
+	if (type && (state == HAPLY_BRAKE || state == HAPLY_FOREIGN_OBJECT) &&
 	    (!strcmp(level, "info") || !strcmp(level, "notice")))
 		state = -state;
 	if (state > 0) {
-		snprintf(words, size, "%.40s: %.100s", name, message);
+		snprintf(words, size, "%.40s: %.100s", name,
+			 get_text(root, "message", ""));
 		control_characters_hide(words);
 	}
 	json_decref(root);

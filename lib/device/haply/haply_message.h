@@ -46,7 +46,10 @@ struct haply_frame {
 	char filters[200]; /* settings that change how a force feels */
 };
 
-/* Read a frame for the Inverse3 @id and the VerseGrip @grip; "": the first of each. 0; -EPROTO: it is none. */
+/*
+ * Read a frame for the Inverse3 @id and the VerseGrip @grip; "": the first of each; @grip NULL: without one.
+ * 0; -EPROTO: it is none.
+ */
 int haply_frame_parse(struct haply_frame *frame, const char *text, size_t n,
 		      const char *id, const char *grip);
 
@@ -66,7 +69,10 @@ enum haply_protection {
 	HAPLY_BRIEF = 64, /* no event ends it */
 };
 
-/* Read an event: the state that begins, with words for people; negative: that ends; 0: none of these. */
+/*
+ * Read an event: the state that begins, with words for people; negative: that ends; 0: none of these. A
+ * safety event without a type is a brake that another event ends.
+ */
 int haply_event_parse(const char *text, size_t n, const char *id, const char *grip,
 		      char *words, size_t size);
 

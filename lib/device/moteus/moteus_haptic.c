@@ -307,12 +307,11 @@ static int push_moteus(struct incise_haptic *haptic, const double force_N[3],
 	int64_t now = now_ns(m), pause_ns = now - m->pushed_ns;
 
 	(void)torque_N_mm;
-	if (m->failed)
-		return m->failed;
 	m->pushed_ns = now;
 	m->cycles++;
+	/* Again, as a stop may have found no place in the queue; it asks for an answer, too. */
 	if (m->flags) {
-		send_all(m, moteus_pack_query);
+		send_all(m, moteus_pack_stop);
 		return m->failed;
 	}
 	if (m->cycles == 1 || pause_ns > WATCHDOG_NS / 2)

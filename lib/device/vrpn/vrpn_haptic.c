@@ -12,8 +12,11 @@
  * thirds of a new force; so the radius is ten times that of a workspace.
  */
 #include <errno.h>
+#include <float.h>
+#include <math.h>
 #include <poll.h>
 #include <stdio.h>
+#include "../../base/vector.h"
 #include "../../rig/backends.h"
 #include "vrpn_device.h"
 
@@ -40,13 +43,22 @@ static int haptic_read(struct incise_haptic *haptic, struct incise_haptic_sample
 	return got ? got : device->gone;
 }
 
+/* Without a known largest force there is none. On the wire it is of single precision. */
 static int haptic_push(struct incise_haptic *haptic, const double force_N[3],
 		       const double torque_N_mm[3])
 {
 	struct vrpn_device *device = device_of(haptic);
+	double size_N = v3_length(force_N), limited_N[3];
+	double peak_N = fmin(haptic->info.peak_N, FLT_MAX) * (1 - FLT_EPSILON);
+	double share = !(haptic->info.peak_N > 0) ? 0
+		       : size_N > peak_N	  ? peak_N / size_N
+						  : 1;
 
 	(void)torque_N_mm;
-	return device->gone ? device->gone : vrpn_device_force(device, force_N, RADIUS_M);
+	for (int i = 0; i < 3; i++)
+		limited_N[i] = force_N[i] * share;
+	return device->gone ? device->gone
+			    : vrpn_device_force(device, limited_N, RADIUS_M);
 }
 
 static int haptic_wait(struct incise_haptic *haptic, int64_t most_ns)

@@ -16,6 +16,7 @@
 #include "../unit.h"
 #include "../../../lib/base/monotonic.h"
 #include "../../../lib/base/vector.h"
+#include "../../../lib/device/haply/haply_message.h"
 #include "../../../lib/rig/backends.h"
 
 #define MS INT64_C(1000000)
@@ -427,19 +428,82 @@ TEST(a_force_that_nobody_pushes_again_ends)
 	close_device();
 }
 
-TEST(a_setting_that_changes_is_noted)
+TEST(a_grip_that_comes_later_is_not_used)
 {
-	int64_t until_ns = incise_monotonic_ns() + LONG_NS;
+	static const double straight[4] = {1};
 	struct incise_haptic_sample sample;
 
-	open_device("");
-	say("say inverse3.config.filters.force_gate.gain 0.9");
-	while (!strstr(haptic->info.filters, "gain:0.9")) {
-		assert_true(incise_monotonic_ns() < until_ns);
-		step(&sample);
-	}
-	assert_non_null(strstr(haptic->info.note, "gain:0.3"));
+	open_device("--grip none");
+	say("say verse_grip {\"state\": {\"orientation\": {\"x\": 1, \"y\": 0, \"z\": 0, "
+	    "\"w\": 0}, \"button\": true, \"hall\": 1}}");
+	say("say inverse3.state.cursor_position.x 0.5");
+	do
+		sample = wait_flags(0);
+	while (sample.position_mm[0] != 1e3 * 0.5);
+	assert_memory_equal(sample.quaternion, straight, sizeof(straight));
+	assert_int_equal(sample.buttons, 0);
 	close_device();
+}
+
+TEST(what_ends_the_force_until_it_is_opened_again)
+{
+	static const struct {
+		const char *begin, *end, *cause;
+	} cases[] = {
+		{"say inverse3.config.filters.force_gate.gain 0.9",
+		 "say inverse3.config.filters.force_gate.gain 0.3",
+		 "its filters changed (now force_gate:gain:0.9"},
+		{"deaf", "report", "the port of its events closed"},
+	};
+	static const double none_N[3];
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		open_device("");
+		wait_flags(0);
+		force_N[0] = 1;
+		wait_force(force_N, 0);
+		say(cases[i].begin);
+		wait_cause(INCISE_HAPTIC_PROTECTED, cases[i].cause);
+		wait_force(none_N, 0);
+		say(cases[i].end);
+		wait_cause(INCISE_HAPTIC_PROTECTED, cases[i].cause);
+		close_device();
+	}
+}
+
+TEST(each_member_of_an_event_is_read_on_its_own)
+{
+	static const struct {
+		const char *members, *data;
+		int state;
+	} cases[] = {
+		{"\"level\": null", "\"safety_type\": \"ebrake_triggered\"", HAPLY_BRAKE},
+		{"\"message\": 1",
+		 "\"device_id\": 1181, \"safety_type\": \"ebrake_triggered\"",
+		 HAPLY_BRAKE},
+		{"\"message\": []",
+		 "\"device_id\": {}, \"safety_type\": \"fod_stage_changed\"",
+		 HAPLY_FOREIGN_OBJECT},
+		{"\"level\": \"notice\"",
+		 "\"device_id\": null, \"safety_type\": \"ebrake_released\"",
+		 -HAPLY_BRAKE},
+		{"\"level\": \"error\"", "\"safety_type\": \"stall_detected\"",
+		 HAPLY_BRIEF},
+		{"\"level\": \"error\"", "\"safety_type\": 3", HAPLY_BRAKE},
+		{"\"level\": \"info\"", "\"safety_type\": null", HAPLY_BRAKE},
+		{"\"level\": \"info\"", "", HAPLY_BRAKE},
+		{"\"level\": 1", "\"device_id\": \"other\", \"safety_type\": 1", 0},
+	};
+	char text[300], words[160];
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		snprintf(text, sizeof(text),
+			 "{\"name\": \"device-safety-triggered\", %s, \"data\": {%s}}",
+			 cases[i].members, cases[i].data);
+		assert_int_equal(haply_event_parse(text, strlen(text), "049D", "8200",
+						   words, sizeof(words)),
+				 cases[i].state);
+	}
 }
 
 TEST(a_service_that_ends_is_gone_until_it_is_opened_again)

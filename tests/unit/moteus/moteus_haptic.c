@@ -335,6 +335,29 @@ TEST(faults, start, end)
 	assert_no_torque();
 }
 
+TEST(a_stop_that_found_no_place_is_repeated, start, end)
+{
+	static const double force_N[3] = {1, 0, 0};
+	struct incise_haptic_sample sample;
+
+	succeeds(open_device("can0:1,2,3"));
+	run(&sample);
+	tick(force_N, &sample);
+	drives.drive[1].mode = MOTEUS_FAULT;
+	drives.drive[1].fault = 38;
+	tick(force_N, &sample);
+	drives.full = true;
+	tick(force_N, &sample);
+	assert_cause("motor 2: fault 38");
+	assert_true(drives.drive[0].torque > 0);
+	drives.full = false;
+	tick(force_N, &sample);
+	for (int i = 0; i < 3; i++)
+		assert_int_equal(drives.drive[i].mode, MOTEUS_STOPPED);
+	/* Positions go on. */
+	assert_int_equal(tick(force_N, &sample), 1);
+}
+
 TEST(positions_that_jump, start, end)
 {
 	struct incise_haptic_sample sample;

@@ -7,11 +7,13 @@
 #include <arpa/inet.h>
 #include <endian.h>
 #include <fcntl.h>
+#include <float.h>
 #include <pthread.h>
 #include <semaphore.h>
 #include <sys/socket.h>
 #include "../unit.h"
 #include "../../../lib/base/monotonic.h"
+#include "../../../lib/base/vector.h"
 #include "../../../lib/device/vrpn/vrpn_device.h"
 
 #define SERVER_MAX 16384
@@ -420,6 +422,7 @@ TEST(a_force_goes_out_as_vrpn_accepted_it)
 	sample = read_sample(haptic);
 	assert_int_equal(sample.seq, 0);
 	force_N[2] = -0.1 * sample.position_mm[2];
+	haptic->info.peak_N = 5;
 	assert_int_equal(haptic->ops->push(haptic, force_N, (double[3]){0}), 0);
 	haptic->ops->close(haptic);
 	pthread_join(thread, NULL);
@@ -428,6 +431,43 @@ TEST(a_force_goes_out_as_vrpn_accepted_it)
 	assert_memory_equal(peer.got, client, 24);
 	check_sent(peer.got + 24, client + 24, NAMES - 24);
 	check_sent(peer.got + NAMES, client + NAMES + (FIELDS - 1) * FIELD, 2 * FIELD);
+}
+
+TEST(no_force_above_the_peak_or_without_a_known_one)
+{
+	static const struct {
+		double peak_N, force_N[3], least_N, most_N;
+	} cases[] = {
+		{0, {3, 4, 0}, 0, 0},	  {NAN, {3, 4, 0}, 0, 0},
+		{6, {3, 4, 0}, 5, 5},	  {0.5, {3, 4, 0}, 0.4999998, 0.5},
+		{3, {0, 0, 1e200}, 0, 3}, {1e300, {1e39, 0, 0}, 1e38, FLT_MAX},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_haptic *haptic;
+		double sent_N[3];
+		struct peer peer;
+		pthread_t thread;
+
+		haptic = open_haptic(&peer, &thread, false);
+		haptic->info.peak_N = cases[i].peak_N;
+		assert_int_equal(
+			haptic->ops->push(haptic, cases[i].force_N, (double[3]){0}), 0);
+		haptic->ops->close(haptic);
+		pthread_join(thread, NULL);
+		close(peer.listener);
+		for (int k = 0; k < 3; k++) {
+			uint32_t word;
+			float single;
+
+			memcpy(&word, peer.got + NAMES + 24 + 12 + 4 * k, sizeof(word));
+			word = be32toh(word);
+			memcpy(&single, &word, sizeof(single));
+			sent_N[k] = (double)single;
+		}
+		assert_true(v3_length(sent_N) >= cases[i].least_N &&
+			    v3_length(sent_N) <= cases[i].most_N);
+	}
 }
 
 TEST(a_server_that_is_gone_leaves_a_cause)

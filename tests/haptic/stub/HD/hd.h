@@ -51,6 +51,7 @@ typedef struct {
 static HDSchedulerCallback stub_callback;
 static void *stub_data;
 static double stub_mm[3] = {1, 2, 3};
+static HDerror stub_error = HD_SUCCESS; /* of all calls from now on */
 
 static inline HHD hdInitDevice(HDstring name)
 {
@@ -59,9 +60,9 @@ static inline HHD hdInitDevice(HDstring name)
 
 static inline HDErrorInfo hdGetError(void)
 {
-	HDErrorInfo none = {HD_SUCCESS, 0, 0};
+	HDErrorInfo error = {stub_error, 0, 0};
 
-	return none;
+	return error;
 }
 
 static inline HDstring hdGetErrorString(HDerror code)
