@@ -9,8 +9,11 @@
  *         │ ─╯ ╰─╯ ╰─╯
  *         ╰─────────────▶ position
  */
+#include <errno.h>
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
 #include "../lib/base/vector.h"
 #include "cli/cli.h"
 #include "cli/handle.h"
@@ -28,6 +31,7 @@
 struct torque_job {
 	const char *rig;
 	double direction[3], span_mm;
+	int enable; /* button, from 1, that must be pressed; 0: none */
 	bool json;
 	struct handle handle;
 	double start_mm[3];
@@ -78,7 +82,8 @@ static const struct cli_command command = {
 /* --- motion ------------------------------------------------------------------------------ */
 
 /* Set the force that draws the handle to @target_mm along the line, which moves. */
-static void draw_handle(struct torque_job *job, double target_mm, double speed_mm_s)
+static int draw_handle(struct torque_job *job, double target_mm, double speed_mm_s,
+		       struct incise_error *err)
 {
 	struct handle *handle = &job->handle;
 	double most_N = SHARE * handle->info.peak_N;
@@ -93,11 +98,13 @@ static void draw_handle(struct torque_job *job, double target_mm, double speed_m
 		if (isfinite(slow_mm_s))
 			handle->force_N[k] += DAMPING_N_S_MM * slow_mm_s;
 	}
-	if (v3_length(handle->force_N) > most_N)
-		cli_fail(
-			"the handle does not follow a force of %.3g N; clear its way, or "
-			"choose another --direction or a shorter --span",
-			most_N);
+	if (v3_length(handle->force_N) <= most_N)
+		return 0;
+	return incise_error_set(
+		err, EDOM,
+		"the handle does not follow a force of %.3g N; clear its way, or "
+		"choose another --direction or a shorter --span",
+		most_N);
 }
 
 static double find_place(const struct torque_job *job)
@@ -119,51 +126,74 @@ static void add_force(struct torque_job *job, int pass, int back)
 	job->n[pass][back][(int)(share * BINS)]++;
 }
 
-static void check_flags(const struct handle *handle)
+/* Whether the device may move now. */
+static int check_handle(const struct torque_job *job, struct incise_error *err)
 {
-	char cause[300] = "";
+	const struct handle *handle = &job->handle;
 
-	if (!handle->last.flags)
-		return;
-	incise_haptic_cause(handle->haptic, cause, sizeof(cause));
-	cli_fail("%s", *cause ? cause : "the device is not ready");
+	if (job->enable && !(handle->last.buttons >> (job->enable - 1) & 1))
+		return incise_error_set(
+			err, EPERM,
+			"%s: button %d, haptic_setup.enable, is not pressed; press it "
+			"before the command starts, until it ends",
+			handle->info.name, job->enable);
+	return handle_check(handle, err);
 }
 
 /* Until the handle is there: friction stretches the spring first. */
-static void move_once(struct torque_job *job, int pass, int back)
+static int move_once(struct torque_job *job, int pass, int back, struct incise_error *err)
 {
 	struct incise_clock *clock = job->handle.clock;
 	int64_t start_ns = incise_clock_now(clock);
 	double from_mm = find_place(job), speed_mm_s = back ? -SPEED_MM_S : SPEED_MM_S;
 	double end_mm = job->span_mm * (back ? EDGE / 2 : 1 - EDGE / 2);
-	struct incise_error err = {0};
+	int rc = check_handle(job, err);
 
-	while ((find_place(job) - end_mm) * speed_mm_s < 0) {
+	while (!rc && (find_place(job) - end_mm) * speed_mm_s < 0) {
 		double t_s = (double)(incise_clock_now(clock) - start_ns) * 1e-9;
 
-		check_flags(&job->handle);
-		draw_handle(job, from_mm + speed_mm_s * t_s, speed_mm_s);
+		rc = draw_handle(job, from_mm + speed_mm_s * t_s, speed_mm_s, err);
+		if (rc)
+			break;
 		add_force(job, pass, back);
-		if (handle_poll(&job->handle, false, &err))
-			cli_fail_with(&err);
+		rc = handle_poll(&job->handle, false, err);
+		if (!rc)
+			rc = check_handle(job, err);
 	}
+	return rc;
+}
+
+static int find_enable(void *context, const struct incise_key *key)
+{
+	struct torque_job *job = context;
+
+	if (!strcmp(key->name, "haptic_setup.enable"))
+		job->enable = atoi(key->value);
+	return 0;
 }
 
 static void measure_torque(struct torque_job *job)
 {
 	struct incise_rig *rig = cli_open_rig(job->rig, INCISE_RIG_HAPTIC);
 	struct incise_error err = {0};
+	int rc;
 
 	if (!incise_rig_haptic(rig))
 		cli_fail("the rig has no haptic device; name one in rig.conf");
+	/* A device alone, such as "haply:", has no settings. */
+	incise_rig_keys(cli_rig(job->rig), find_enable, job, NULL);
 	handle_begin(&job->handle, rig);
-	if (handle_record(&job->handle, 0.3, &err))
-		cli_fail_with(&err);
+	if (!(job->handle.info.peak_N > 0))
+		cli_fail(
+			"%s: its largest force is not known; set haptic_setup.peak_N in rig.conf",
+			job->handle.info.name);
+	rc = handle_record(&job->handle, 0.3, &err);
 	v3_copy(job->start_mm, job->handle.last.position_mm);
-	for (int pass = 0; pass < PASSES; pass++) {
-		move_once(job, pass, 0);
-		move_once(job, pass, 1);
-	}
+	for (int i = 0; !rc && i < 2 * PASSES; i++)
+		rc = move_once(job, i / 2, i % 2, &err);
+	handle_release(&job->handle);
+	if (rc)
+		cli_fail_with(&err);
 	incise_rig_close(rig);
 }
 

@@ -3,6 +3,7 @@
  * incise doctor: checks this machine and its rig for a capture and for the haptic loop, and
  * prints the command that mends each finding.
  */
+#include <ctype.h>
 #include <dirent.h>
 #include <errno.h>
 #include <grp.h>
@@ -220,6 +221,52 @@ static void check_modules(struct doctor *doctor)
 
 #define GLANCE_S 1.0
 #define REST_S 10.0
+#define OLD_MS 1000	 /* beyond, times are of another clock */
+#define RATE_SHARE 0.5	 /* of the declared rate, that it may differ by */
+#define LENGTH2_OFF 0.02 /* of a quaternion, as the loop takes it */
+
+static void add_state(struct doctor *doctor, const struct handle *handle)
+{
+	struct incise_error err = {0};
+	bool fault = handle_check(handle, &err);
+
+	add(doctor, "devices", "state", fault ? WARNING : OK, "incise help rig.conf",
+	    "%s; buttons: %d, pressed: %#x",
+	    fault					 ? err.text
+	    : handle->last.flags & INCISE_HAPTIC_BATTERY ? "ready, but a battery is low"
+							 : "ready",
+	    handle->info.buttons, handle->last.buttons);
+}
+
+/* For each of these the loop gives no force. */
+static void add_refusals(struct doctor *doctor, const struct handle *handle)
+{
+	const struct incise_haptic_info *info = &handle->info;
+	const double *q = handle->last.quaternion,
+		     age_ms = doctor->protocol.age_median_ms;
+	double length2 = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+
+	if (!(fabs(age_ms) <= OLD_MS))
+		add(doctor, "devices", "times", PROBLEM, "incise help rig.conf",
+		    "samples are %.3g s old: its times are not of CLOCK_MONOTONIC",
+		    age_ms * 1e-3);
+	if (!(info->peak_N > 0))
+		add(doctor, "devices", "peak_N", PROBLEM, "incise help rig.conf",
+		    "0 N: incise haptic refuses it: set haptic_setup.peak_N");
+	if (!(info->mass_kg > 0))
+		add(doctor, "devices", "mass_kg", PROBLEM, "incise help rig.conf",
+		    "0 kg: incise haptic refuses it: set haptic_setup.mass_kg");
+	if (!(fabs(length2 - 1) < LENGTH2_OFF))
+		add(doctor, "devices", "quaternion", PROBLEM, NULL,
+		    "(%.3g, %.3g, %.3g, %.3g) is no rotation: incise haptic takes no pose "
+		    "of it; 1 0 0 0 is that of a device without orientation",
+		    q[0], q[1], q[2], q[3]);
+	if (info->rate_hz > 0 &&
+	    !(fabs(doctor->protocol.rate_hz / info->rate_hz - 1) <= RATE_SHARE))
+		add(doctor, "devices", "rate", WARNING, "incise help rig.conf",
+		    "%.0f Hz, but it declares %.0f Hz: set haptic_setup.rate_hz",
+		    doctor->protocol.rate_hz, info->rate_hz);
+}
 
 static void add_haptic(struct doctor *doctor, struct incise_rig *rig)
 {
@@ -250,11 +297,8 @@ static void add_haptic(struct doctor *doctor, struct incise_rig *rig)
 	    handle.info.name, protocol->rate_hz, protocol->age_median_ms,
 	    protocol->value[AGE], protocol->value[AGE_MOST], protocol->value[LOST],
 	    failed ? "; above its mark: " : "", failed ? failed : "");
-	add(doctor, "devices", "state",
-	    handle.last.flags & INCISE_HAPTIC_NOT_READY ? WARNING : OK,
-	    "incise help rig.conf", "%s; buttons: %d, pressed: %#x",
-	    handle.last.flags ? "it reports a fault, or is not ready" : "ready",
-	    handle.info.buttons, handle.last.buttons);
+	add_state(doctor, &handle);
+	add_refusals(doctor, &handle);
 	if (*handle.info.filters)
 		add(doctor, "devices", "filters", OK, NULL, "%s", handle.info.filters);
 	if (*handle.info.note)
@@ -642,24 +686,70 @@ static json_t *make_doctor_json(const struct doctor *doctor)
 		doctor->haptic_measured ? protocol_json(&doctor->protocol) : json_null());
 }
 
-/* Without the names of this host and of its user's folder. */
-static void put_hidden(const char *text, FILE *out)
+/* Whether two characters are of one word. */
+static bool joins_word(char a, char b)
 {
-	struct utsname name = {0};
-	const char *secrets[] = {getenv("HOME"), name.nodename};
+	return (isalnum((unsigned char)a) || a == '_') &&
+	       (isalnum((unsigned char)b) || b == '_');
+}
 
-	uname(&name);
+/* Replace each @secret that is a whole word, or begins and ends as one. */
+static char *hide_word(const char *text, const char *secret)
+{
+	size_t length = secret ? strlen(secret) : 0, size;
+	char *hidden = NULL, last = '\0';
+	FILE *out = open_memstream(&hidden, &size);
+
+	if (!out)
+		cli_fail("no memory");
 	while (*text) {
-		size_t length = 0;
+		bool found = length > 2 && !strncmp(text, secret, length) &&
+			     !joins_word(last, *text) &&
+			     !joins_word(text[length - 1], text[length]);
+		size_t step = found ? length : 1;
 
-		for (int i = 0; i < 2 && !length; i++)
-			if (secrets[i] && strlen(secrets[i]) > 2)
-				length = strncmp(text, secrets[i], strlen(secrets[i]))
-						 ? 0
-						 : strlen(secrets[i]);
-		fprintf(out, "%.*s", length ? 3 : 1, length ? "***" : text);
-		text += length ? length : 1;
+		fprintf(out, "%.*s", found ? 3 : 1, found ? "***" : text);
+		last = text[step - 1];
+		text += step;
 	}
+	if (fclose(out))
+		cli_fail("no memory");
+	return hidden;
+}
+
+/* Leave the names of this host and of its user's folder out of a text; keys and fixed words stay. */
+static void hide_names(json_t *text)
+{
+	struct utsname host = {0};
+	char *hidden[3] = {NULL};
+
+	if (!json_is_string(text))
+		return;
+	uname(&host);
+	hidden[0] = hide_word(json_string_value(text), getenv("HOME"));
+	hidden[1] = hide_word(hidden[0], host.nodename);
+	host.nodename[strcspn(host.nodename, ".")] = '\0';
+	hidden[2] = hide_word(hidden[1], host.nodename);
+	json_string_set(text, hidden[2]);
+	for (int i = 0; i < 3; i++)
+		free(hidden[i]);
+}
+
+static void hide_report(json_t *report)
+{
+	static const char *const of_device[] = {"name", "filters", "note"};
+	const json_t *device = json_object_get(report, "haptic");
+	json_t *value;
+	const char *key;
+	size_t i;
+
+	json_array_foreach(json_object_get(report, "checks"), i, value)
+		hide_names(json_object_get(value, "found"));
+	json_object_foreach(json_object_get(report, "machine"), key, value)
+		hide_names(value);
+	for (i = 0; i < sizeof(of_device) / sizeof(*of_device); i++)
+		hide_names(json_object_get(device, of_device[i]));
+	hide_names(json_object_get(report, "rig"));
 }
 
 static void write_report(const struct doctor *doctor)
@@ -671,15 +761,14 @@ static void write_report(const struct doctor *doctor)
 	struct incise_outfile *file;
 	FILE *out = whole_file_begin(doctor->report, &file);
 	size_t size;
-	char *rig = incise_infile_read(spec, &conf, &size, NULL), *text;
+	char *rig = incise_infile_read(spec, &conf, &size, NULL);
 
 	json_object_set_new(report, "machine", machine_json());
 	json_object_set_new(report, "rig", json_text_or_null(rig ? rig : spec));
-	text = json_dumps(report, JSON_INDENT(2) | JSON_REAL_PRECISION(12));
-	put_hidden(text ? text : "", out);
+	hide_report(report);
+	json_dumpf(report, out, JSON_INDENT(2) | JSON_REAL_PRECISION(12));
 	whole_file_end(file);
 	json_decref(report);
-	free(text);
 	free(rig);
 }
 

@@ -79,6 +79,12 @@ setup() {
 	[[ "$stderr" == *"point 3 of 3: touch (0, 50, 0) mm"*"points 1 and 2 are 0 mm apart"* ]]
 	[ "$(wc -l <touched.csv)" -eq 4 ]
 	grep -q '^50,0,0,0,0,' touched.csv
+	for fault in not_ready changes nan; do
+		run --separate-stderr incise calibrate frame --rig $rig,${fault}_s=0.01 --point 0,0,0 --point 50,0,0 \
+			--point 0,50,0 <enter
+		[ "$status" -eq 1 ]
+		[[ "$stderr" == *"its ${fault}_s has passed; set it later" ]]
+	done
 	run --separate-stderr incise calibrate frame --rig sim: --point 0,0,0 --point 50,0,0 --point 0,50,0
 	failed_with "no haptic device"
 }

@@ -19,6 +19,32 @@ setup() {
 }
 
 # bats test_tags=check
+@test "samples that stop, are late, or come without the enabling button end the force" {
+	free=clock=simulated,motion=still,hand_N_mm=0,hand_kg=0,hand_N_s_mm=0,coulomb_N=0.3
+	# before the force has grown by 0.3 N, in 100 ms, to half of peak_N
+	while read -r keys words; do
+		run --separate-stderr incise calibrate torque --rig "sim:haptic,$free,peak_N=1.2,$keys"
+		failed_with "$words"
+	done <<-END
+		dies_s=1.3 its dies_s has passed
+		late_s=1.3 its late_s has passed
+		nan_s=1.3 its nan_s has passed
+		changes_s=1.3 its changes_s has passed
+	END
+	for to in 0 1.3; do
+		cat >rig.conf <<-END
+			clock = "simulated";
+			haptic = "sim:${free#*,},button1_to_s=$to";
+			haptic_setup = { enable = 1; };
+		END
+		run --separate-stderr incise calibrate torque
+		failed_with "button 1, haptic_setup.enable, is not pressed"
+	done
+	sed -i 's/button1_to_s=[0-9.]*/button1_to_s=100/' rig.conf
+	run -0 incise calibrate torque
+}
+
+# bats test_tags=check
 @test "a handle that does not follow ends it, and so does a rig without one" {
 	run --separate-stderr incise calibrate torque \
 		--rig sim:haptic,clock=simulated,motion=still,hand_N_mm=20

@@ -154,7 +154,7 @@ static void touch_points(void *run)
 			"Enter or a button\n",
 			i + 1, frame->n, at[0], at[1], at[2]);
 		if (handle_await_press(&handle, &err) ||
-		    handle_record(&handle, HOLD_S, &err))
+		    handle_record(&handle, HOLD_S, &err) || handle_check(&handle, &err))
 			cli_fail_with(&err);
 		point->sd_mm = handle_mean(&handle, point->device_mm);
 		if (point->sd_mm <= MOVED_MM)

@@ -513,7 +513,7 @@ static void *open_haply(const struct incise_backend_request *request,
 	return NULL;
 }
 
-/* Each Inverse3 of a service; where there is none, none. */
+/* Each Inverse3 of a service; where there is none, none. Few machines have one at the default address. */
 static int scan_haply(const char *arguments, incise_scan_found *found, void *context,
 		      struct incise_error *err)
 {
@@ -533,6 +533,8 @@ static int scan_haply(const char *arguments, incise_scan_found *found, void *con
 	}
 	if (h)
 		close_haply(&h->haptic);
+	if (rc == -ENODEV && !*arguments && err)
+		err->code = 0;
 	return rc == -ENODEV ? 0 : rc;
 }
 

@@ -567,6 +567,10 @@ TEST(a_search_finds_each_inverse3)
 	end_emulator();
 	assert_int_equal(incise_haptic_haply.scan(arguments, keep_found, list, &err), 0);
 	assert_string_equal(list, "/049D/04B2");
+	assert_int_equal(err.code, ENODEV);
+	err.code = 0;
+	assert_int_equal(incise_haptic_haply.scan("", keep_found, list, &err), 0);
+	assert_int_equal(err.code, 0);
 }
 
 TEST(what_cannot_be_opened_is_refused)
