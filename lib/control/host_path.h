@@ -11,11 +11,18 @@
 #include <stdbool.h>
 #include "../base/vector.h"
 
+/*
+ * A host whose steps drift between the ticks: so many ticks more than in its longest step count as a hold, as that step
+ * may end a tick later, and a mix of steps swung without the other. The last tick before a step may be one old.
+ */
+#define INCISE_HOST_SPARE 2
+
 /* A host's steps in a loop of ticks: its poses, and the forces that it holds. */
 struct incise_host_hold {
-	int ticks;  /* from step to step; 1: a tracker's loop, without a host */
-	bool cubic; /* the host gives velocities */
-	bool fit;   /* a gain that is too large is lowered */
+	int ticks;   /* from step to step; 1: a tracker's loop, without a host */
+	bool drifts; /* between the ticks: see INCISE_HOST_SPARE */
+	bool cubic;  /* the host gives velocities */
+	bool fit;    /* a gain that is too large is lowered */
 	double gain; /* in place of the scene's; 0: that. A refusal sets it to the largest that is safe */
 };
 

@@ -97,15 +97,14 @@ static bool keep_plan(struct incise_host *host)
  * The longest hold of a force in ticks; see incise_host_options. Steps and ticks that are not
  * multiples of each other drift apart.
  */
-static int count_hold(double host_period_s, double rate_hz)
+static void count_hold(struct incise_host_hold *hold, double host_period_s,
+		       double rate_hz)
 {
 	double ticks = host_period_s * rate_hz, ratio = ticks < 1 ? 1 / ticks : ticks;
 
-	if (!(ticks > 0))
-		return 1;
-	if (fabs(ratio - rint(ratio)) <= DRIFT * ratio)
-		return (int)fmax(rint(ticks), 1);
-	return (int)ceil(ticks - SNAP) + 2;
+	hold->drifts = ticks > 0 && fabs(ratio - rint(ratio)) > DRIFT * ratio;
+	hold->ticks = hold->drifts ? (int)ceil(ticks - SNAP) + INCISE_HOST_SPARE
+				   : (int)fmax(rint(ticks), 1);
 }
 
 static struct incise_plan *new_host_plan(const struct incise_scene *scene,
@@ -118,12 +117,12 @@ static struct incise_plan *new_host_plan(const struct incise_scene *scene,
 		.stations = 1,
 	};
 	struct incise_host_hold hold = {
-		.ticks = count_hold(options->host_period_s, poses.rate_hz),
 		.cubic = options->gives_velocity,
 		.fit = options->fit_gain,
 	};
 	struct incise_plan *plan;
 
+	count_hold(&hold, options->host_period_s, poses.rate_hz);
 	plan = incise_plan_new_held(scene, &poses, &hold, err);
 	if (!plan || (!incise_plan_set_tip(plan, options->tip_mm) &&
 		      !incise_plan_set_tool(plan, options->tool)))

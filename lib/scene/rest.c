@@ -895,22 +895,30 @@ void incise_rest_take_weakest(struct incise_plan_weakest *to,
 	to->paid = paid;
 }
 
-/* A host's step may be shorter than the longest, with which a stiffer tissue can be stable. */
+/*
+ * A host's step may be shorter than the longest, with which a stiffer tissue can be stable. A host that drifts is judged
+ * with an old tick before each step, too: such a short hold may swing where the longest hold of a fresh tick rests.
+ */
 static bool judge_steps(struct search *s, const struct rest_run *run, double depth_mm,
 			int way, struct incise_rest *rest)
 {
-	int longest = s->plan.hold.ticks;
+	int longest = s->plan.hold.ticks, late_ticks = s->device.late_ticks;
 	bool rests = true;
 
 	s->leaned = s->plan;
 	s->leaned_parts = s->parts;
-	for (int ticks = longest; ticks && rests; ticks = ticks * 3 / 4) {
-		/* A kicked run moves on from there. */
-		s->plan = s->leaned;
-		s->parts = s->leaned_parts;
-		s->plan.hold.ticks = ticks;
-		rests = judge_linear(s, run, depth_mm, way, rest);
+	for (int old = 0; old <= s->leaned.hold.drifts; old++) {
+		s->device.late_ticks = late_ticks + old;
+		for (int ticks = longest - old * INCISE_HOST_SPARE; ticks && rests;
+		     ticks = ticks * 3 / 4) {
+			/* A kicked run moves on from there. */
+			s->plan = s->leaned;
+			s->parts = s->leaned_parts;
+			s->plan.hold.ticks = ticks;
+			rests = judge_linear(s, run, depth_mm, way, rest);
+		}
 	}
+	s->device.late_ticks = late_ticks;
 	s->plan.hold.ticks = longest;
 	return rests;
 }

@@ -53,7 +53,8 @@ struct incise_host_options {
 	 * whole part of it, counts as the step of a host that always steps by just that; a host
 	 * that also makes shorter steps adds a thousandth of a tick. Any other step counts as up
 	 * to two ticks longer: the last tick before it may be one old, and a host whose steps
-	 * differ swung in a test without the other.
+	 * differ swung in a test without the other. Steps up to the largest are checked with
+	 * a tick that is one old, too.
 	 */
 	double host_period_s;
 	bool gives_velocity; /**< each step has a velocity; false: velocities are not read */

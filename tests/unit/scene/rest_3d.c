@@ -863,6 +863,9 @@ TEST(test_an_accepted_host_rests)
 	static const char *const names[] = {"30", "60", "100"};
 
 	try_all(try_hosted, cases_are_all() ? HOSTED : HOSTED_FEW);
+	/* This host swung: its steps of 2.5 ticks met ticks of any age. */
+	if (!getenv("SEEDS"))
+		try_hosted(398);
 	summarize();
 	for (int k = 0; k < 3; k++) {
 		qsort(lost[k].share, (size_t)lost[k].n, sizeof(double), compare);
