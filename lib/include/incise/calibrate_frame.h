@@ -18,8 +18,8 @@
 
 INCISE_BEGIN_DECLS
 
-#define INCISE_FRAME_POINTS_MIN 3
-#define INCISE_FRAME_POINTS_MAX 6
+#define INCISE_FRAME_POINTS_MIN 3  /**< fewest points */
+#define INCISE_FRAME_POINTS_MAX 6  /**< most points */
 #define INCISE_FRAME_APART_MM 10.0 /**< smallest distance of two points */
 #define INCISE_FRAME_RMS_MM 2.0	   /**< largest residual, rms */
 
