@@ -80,3 +80,12 @@ largest() {
 	run -1 --separate-stderr incise capture --rig sim:haptic,clock=simulated -o r.rec --duration 1s
 	[[ "$stderr" == *"sim:haptic,clock=simulated: a haptic device alone has no force channel"* ]]
 }
+
+# bats test_tags=check
+@test "serve sends the poses of a rig that is a haptic device alone" {
+	incise serve --rig sim:haptic -c none --igtl 0 --duration 1s --json >r.json
+	holds "$(key r.json poses) > 0" "$(key r.json forces) == 0"
+	echo 'tracker = "sim:";' >rig.conf
+	run -1 --separate-stderr incise serve --rig rig.conf -c none --duration 1s
+	failed_with rig.conf "force:" "missing"
+}

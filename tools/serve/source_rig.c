@@ -2,6 +2,7 @@
 /*
  * The devices of a rig as a source. No loop may use them meanwhile: a device has one reader.
  */
+#include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <incise/rig.h>
@@ -187,6 +188,22 @@ static int64_t delay_ns(double ms, int64_t own_ns)
 	return isnan(ms) ? own_ns : (int64_t)(ms * 1e6);
 }
 
+/* A haptic device may be all that a rig has: then there are poses only. */
+static struct incise_rig *open_served(const char *spec, unsigned int camera)
+{
+	struct incise_error err = {0};
+	struct incise_rig *rig = incise_rig_open(
+		spec, INCISE_RIG_TRACKER | INCISE_RIG_FORCE | camera, &err);
+
+	if (!rig && err.code == ENODEV)
+		rig = incise_rig_open(spec, INCISE_RIG_TRACKER | camera, NULL);
+	if (rig && !incise_rig_force(rig) && !incise_rig_haptic(rig)) {
+		incise_rig_close(rig);
+		rig = NULL;
+	}
+	return cli_require(rig, &err);
+}
+
 struct serve_source *serve_rig_open(const struct serve_source_options *options,
 				    struct serve_info *info)
 {
@@ -197,8 +214,7 @@ struct serve_source *serve_rig_open(const struct serve_source_options *options,
 				      : INCISE_RIG_CAMERA | INCISE_RIG_IF_NAMED;
 
 	rig->base.ops = &rig_ops;
-	rig->rig = cli_open_rig(options->rig,
-				INCISE_RIG_TRACKER | INCISE_RIG_FORCE | camera);
+	rig->rig = open_served(options->rig, camera);
 	if (!incise_clock_is_real(incise_rig_clock(rig->rig)))
 		cli_fail("%s: its clock is simulated, and clients live in real time; use "
 			 "clock=real",
@@ -208,7 +224,8 @@ struct serve_source *serve_rig_open(const struct serve_source_options *options,
 	rig->force = incise_rig_force(rig->rig);
 	rig->camera = incise_rig_camera(rig->rig);
 	incise_tracker_info(rig->tracker, &rig->tracker_info);
-	incise_force_info(rig->force, &rig->force_info);
+	if (rig->force)
+		incise_force_info(rig->force, &rig->force_info);
 	incise_force_calibration(&rig->force_info, &rig->calibration);
 	rig->zero_mV = rig->calibration.force_zero_mV;
 	rig->tracker_delay_ns =
@@ -221,7 +238,8 @@ struct serve_source *serve_rig_open(const struct serve_source_options *options,
 		       : rig->poll_ns > POLL_MAX_NS ? POLL_MAX_NS
 						    : rig->poll_ns;
 	info->name = cli_text("rig %s", incise_rig_spec(rig->rig));
-	info->kinds[SERVE_POSE] = info->kinds[SERVE_FORCE] = true;
+	info->kinds[SERVE_POSE] = true;
+	info->kinds[SERVE_FORCE] = rig->force;
 	info->kinds[SERVE_FRAME] = rig->camera;
 	return &rig->base;
 }
