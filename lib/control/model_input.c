@@ -14,6 +14,8 @@ const struct incise_model_input_kind incise_model_input_kinds[INCISE_MODEL_INPUT
 		[INCISE_INPUT_ACCELERATION] = {INCISE_ACCELERATION_COLUMN},
 		[INCISE_INPUT_TILT] = {INCISE_TILT_COLUMN},
 		[INCISE_INPUT_TIME] = {INCISE_TIME_COLUMN},
+		[INCISE_INPUT_MEAN_SPEED] = {INCISE_MEAN_SPEED_COLUMN},
+		[INCISE_INPUT_DEEPEST] = {INCISE_DEEPEST_COLUMN},
 };
 
 int incise_model_input_find(const char *name)
@@ -33,23 +35,40 @@ double incise_input_tilt_deg(const double quaternion[4], const double axis[3],
 	return incise_double_input_tilt(turned, normal);
 }
 
-void incise_stay_add(struct incise_stay *stay, int64_t t_ns, double depth_mm)
+void incise_stay_add(struct incise_stay *stay, int64_t t_ns, double depth_mm,
+		     double speed_mm_s)
 {
-	bool was_inside = stay->inside;
+	double before_mm_s = stay->speed_mm_s;
+	int64_t from_ns = stay->t_ns;
 
-	if (!was_inside && depth_mm > 0) {
-		double rise_mm = depth_mm - stay->depth_mm, share = 1;
+	if (!stay->inside && depth_mm > 0) {
+		double rise_mm = depth_mm - stay->depth_mm;
+		double share = !stay->known	     ? 0
+			       : stay->depth_mm <= 0 ? depth_mm / rise_mm
+						     : 1;
 
-		if (stay->known && stay->depth_mm <= 0)
-			share = depth_mm / rise_mm;
 		stay->inside = true;
-		stay->began_ns =
-			stay->known ? t_ns - llround(share * (double)(t_ns - stay->t_ns))
-				    : t_ns;
-	} else if (was_inside && depth_mm < -INCISE_STAY_LEAVE_MM) {
+		before_mm_s = speed_mm_s - share * (speed_mm_s - before_mm_s);
+		from_ns = t_ns - llround(share * (double)(t_ns - from_ns));
+		stay->began_ns = from_ns;
+		stay->path_mm = stay->deepest_mm = 0;
+	} else if (stay->inside && depth_mm < -INCISE_STAY_LEAVE_MM) {
 		stay->inside = false;
+	}
+	if (stay->inside) {
+		stay->path_mm += 0.5 * (before_mm_s + speed_mm_s) *
+				 (double)(t_ns - from_ns) * 1e-9;
+		stay->deepest_mm = fmax(stay->deepest_mm, depth_mm);
 	}
 	stay->known = true;
 	stay->t_ns = t_ns;
 	stay->depth_mm = depth_mm;
+	stay->speed_mm_s = speed_mm_s;
+}
+
+double incise_stay_mean_speed_mm_s(const struct incise_stay *stay)
+{
+	return stay->t_ns > stay->began_ns
+		       ? stay->path_mm / ((double)(stay->t_ns - stay->began_ns) * 1e-9)
+		       : stay->speed_mm_s;
 }

@@ -14,6 +14,8 @@
  *                            ────────┴────────
  *
  *   time_in_tissue_s    since the tip first touched the surface
+ *   mean_speed_mm_s     path of the tip since then over that time
+ *   deepest_mm          largest depth since then
  */
 #ifndef INCISE_MODEL_INPUT_H
 #define INCISE_MODEL_INPUT_H
@@ -33,6 +35,11 @@
 	"tilt_deg", "deg", "angle of the scalpel to the surface's normal"
 #define INCISE_TIME_COLUMN \
 	"time_in_tissue_s", "s", "since the tip first touched the surface"
+#define INCISE_MEAN_SPEED_COLUMN   \
+	"mean_speed_mm_s", "mm/s", \
+		"path of the tip since it first touched the surface over that time"
+#define INCISE_DEEPEST_COLUMN \
+	"deepest_mm", "mm", "largest depth since the tip first touched the surface"
 
 enum incise_model_input {
 	INCISE_INPUT_DEPTH,
@@ -40,6 +47,8 @@ enum incise_model_input {
 	INCISE_INPUT_ACCELERATION,
 	INCISE_INPUT_TILT,
 	INCISE_INPUT_TIME,
+	INCISE_INPUT_MEAN_SPEED,
+	INCISE_INPUT_DEEPEST,
 	INCISE_MODEL_INPUT_KINDS,
 };
 
@@ -73,12 +82,17 @@ double incise_input_tilt_deg(const double quaternion[4], const double axis[3],
 struct incise_stay {
 	bool inside, known;
 	int64_t began_ns;
+	double path_mm, deepest_mm; /* since then */
 	/* of the depth before */
 	int64_t t_ns;
-	double depth_mm;
+	double depth_mm, speed_mm_s;
 };
 
-/* Add a later depth. */
-void incise_stay_add(struct incise_stay *stay, int64_t t_ns, double depth_mm);
+/* Add a later depth, with the speed of the tip there. */
+void incise_stay_add(struct incise_stay *stay, int64_t t_ns, double depth_mm,
+		     double speed_mm_s);
+
+/* At the last depth; its speed where the stay begins. */
+double incise_stay_mean_speed_mm_s(const struct incise_stay *stay);
 
 #endif

@@ -6,6 +6,11 @@
  *   v · a            3 · 2^29.3 · 2^28.7 < 2^59.6    Q28
  *   that / |v|       Q12
  *   ns · 2^16        2^45 · 2^16 = 2^61
+ *
+ * and with a speed |v| ≤ 2^30.1 that of a path, in 2^14 ns of Q16 mm/s:
+ *
+ *   |v| · ns         2^30.1 · 2^32 = 2^62.1
+ *   its sum · 2      2^30.1 · 2^45 / 2^13 = 2^62.1
  */
 #include "plan.h"
 #include "vector.h"
@@ -77,4 +82,34 @@ int32_t incise_fixed_input_time(int64_t t_ns, int64_t from_ns)
 	if (gone > (uint64_t)LONGEST_NS)
 		gone = (uint64_t)LONGEST_NS;
 	return incise_fx_hold32(div64_s64((int64_t)gone * ONE, 1000000000));
+}
+
+#define PATH_BITS 14
+
+int64_t incise_fixed_input_path(int64_t path, int32_t speed, int64_t from_ns,
+				int64_t t_ns)
+{
+	uint64_t gone = (uint64_t)t_ns - (uint64_t)from_ns;
+
+	if (t_ns <= from_ns)
+		return path;
+	if (gone > INCISE_INPUT_GAP_NS)
+		gone = INCISE_INPUT_GAP_NS;
+	path += incise_fx_rounded((int64_t)gone * speed, PATH_BITS);
+	return path < (int64_t)1 << 61 ? path : (int64_t)1 << 61;
+}
+
+int32_t incise_fixed_input_mean_speed(int64_t path, int32_t speed, int64_t from_ns,
+				      int64_t t_ns)
+{
+	uint64_t gone = (uint64_t)t_ns - (uint64_t)from_ns;
+
+	if (t_ns <= from_ns)
+		return speed;
+	if (gone > (uint64_t)LONGEST_NS)
+		gone = (uint64_t)LONGEST_NS;
+	if (gone >> 32)
+		return incise_fx_hold32(
+			div64_s64(path * 2, (int64_t)(gone >> (PATH_BITS - 1))));
+	return incise_fx_hold32(div64_s64(path * (1 << PATH_BITS), (int64_t)gone));
 }

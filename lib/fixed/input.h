@@ -19,16 +19,22 @@ enum incise_fixed_input_kind {
 	INCISE_FIXED_INPUT_ACCELERATION,
 	INCISE_FIXED_INPUT_TILT,
 	INCISE_FIXED_INPUT_TIME,
+	INCISE_FIXED_INPUT_MEAN_SPEED,
+	INCISE_FIXED_INPUT_DEEPEST,
 	INCISE_FIXED_INPUT_KINDS,
 };
 
 /*
- * Rounding of incise_fixed_input_acceleration(), _tilt() and _time() (tick.proto.h), of exact operands: 2^-11 mm/s²
- * and 2^-19 of it, by the speed; 10^-5 degrees; 2^-16 s. A unit vector off by 2^-27 turns the angle by as many
- * radians.
+ * Rounding of incise_fixed_input_acceleration(), _tilt(), _time() and _mean_speed() (tick.proto.h), of exact operands:
+ * 2^-11 mm/s² and 2^-19 of it, by the speed; 10^-5 degrees; 2^-16 s; 2^-16 mm/s and 2^-18 of it. A unit vector off
+ * by 2^-27 turns the angle by as many radians.
  */
 #define INCISE_FIXED_INPUT_ACCELERATION_BITS 11
 #define INCISE_FIXED_INPUT_ACCELERATION_SHARE_BITS 19
 #define INCISE_FIXED_INPUT_TILT_DEG 1e-5
+#define INCISE_FIXED_INPUT_MEAN_SPEED_SHARE_BITS 18
+
+/* Ticks farther apart add to a path as if they were as near, in double as well. */
+#define INCISE_INPUT_GAP_NS 4000000000
 
 #endif

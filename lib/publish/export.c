@@ -25,6 +25,7 @@ struct bin {
 	uint64_t n;
 	double t_s, depth_mm, velocity_mm_s, force_N; /* means … */
 	double acceleration_mm_s2, tilt_deg, time_in_tissue_s;
+	double mean_speed_mm_s, deepest_mm;
 	double m2;    /* sum of squared deviations of the force */
 	int64_t cuts; /* that have samples here */
 	int last;     /* the cut counted last */
@@ -134,6 +135,9 @@ static void bin_add(struct bin *bin, size_t at, const struct pass *pass,
 	bin->tilt_deg += share * (pass->blade.tilt_deg - bin->tilt_deg);
 	bin->time_in_tissue_s +=
 		share * (pass->blade.time_in_tissue_s - bin->time_in_tissue_s);
+	bin->mean_speed_mm_s +=
+		share * (pass->blade.mean_speed_mm_s - bin->mean_speed_mm_s);
+	bin->deepest_mm += share * (pass->blade.deepest_mm - bin->deepest_mm);
 	bin->force_N += share * delta;
 	bin->m2 += delta * (sample->force_N - bin->force_N);
 	bin->clipped |= sample->clipped;
@@ -284,6 +288,8 @@ static const struct incise_table_column raw_columns[] = {
 	COLUMN(bin.acceleration_mm_s2, SINGLE, 1, INCISE_ACCELERATION_COLUMN),
 	COLUMN(bin.tilt_deg, SINGLE, 2, INCISE_TILT_COLUMN),
 	COLUMN(bin.time_in_tissue_s, SINGLE, 4, INCISE_TIME_COLUMN),
+	COLUMN(bin.mean_speed_mm_s, SINGLE, 3, INCISE_MEAN_SPEED_COLUMN),
+	COLUMN(bin.deepest_mm, SINGLE, 4, INCISE_DEEPEST_COLUMN),
 };
 
 struct raw {
@@ -347,6 +353,8 @@ static const struct incise_table_column bin_columns[] = {
 	COLUMN(bin.acceleration_mm_s2, REAL, -1, INCISE_ACCELERATION_COLUMN),
 	COLUMN(bin.tilt_deg, REAL, -1, INCISE_TILT_COLUMN),
 	COLUMN(bin.time_in_tissue_s, REAL, -1, INCISE_TIME_COLUMN),
+	COLUMN(bin.mean_speed_mm_s, REAL, -1, INCISE_MEAN_SPEED_COLUMN),
+	COLUMN(bin.deepest_mm, REAL, -1, INCISE_DEEPEST_COLUMN),
 };
 
 /* Bin of a value; the upper end belongs to the last one. -1: above it. */

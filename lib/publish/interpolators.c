@@ -337,6 +337,7 @@ static int more_depth(struct incise_blade_pose *blade, struct incise_error *err)
 {
 	const struct incise_smooth_record *record;
 	struct incise_blade_depth *deep = blade->deep;
+	double speed_mm_s;
 	int rc = 1;
 
 	while (!(record = incise_smooth_take(&blade->smooth)) && rc > 0 && !blade->ended)
@@ -351,13 +352,12 @@ static int more_depth(struct incise_blade_pose *blade, struct incise_error *err)
 	if (!record)
 		return 0;
 	loop_push(&blade->loop, record);
-	incise_stay_add(&blade->stay, record->t_ns, record->depth_mm);
+	speed_mm_s = v3_length(record->velocity_mm_s);
+	incise_stay_add(&blade->stay, record->t_ns, record->depth_mm, speed_mm_s);
 	deep[1] = (struct incise_blade_depth){
 		record->t_ns,
 		record->depth_mm,
-		sqrt(record->velocity_mm_s[0] * record->velocity_mm_s[0] +
-		     record->velocity_mm_s[1] * record->velocity_mm_s[1] +
-		     record->velocity_mm_s[2] * record->velocity_mm_s[2]),
+		speed_mm_s,
 		record->noise_mm,
 		record->depth_noise_mm,
 		record->t_sd_s,
@@ -367,6 +367,8 @@ static int more_depth(struct incise_blade_pose *blade, struct incise_error *err)
 					blade->smooth.noise_1_s),
 		blade->stay.inside,
 		blade->stay.began_ns,
+		incise_stay_mean_speed_mm_s(&blade->stay),
+		blade->stay.deepest_mm,
 	};
 	if (deep[0].t_ns != INCISE_TIME_NONE)
 		blade->rate_mm_s = (deep[1].depth_mm - deep[0].depth_mm) /
@@ -456,17 +458,6 @@ static void slerp(const struct incise_blade_pose *blade, double s, double to[4])
 		to[i] = wa * a[i] + wb * b[i];
 }
 
-/* Since the contact began that there was at this time. */
-static double time_in_tissue(const struct incise_blade_pose *blade, int64_t t_ns)
-{
-	const struct incise_blade_depth *before = &blade->deep[0],
-					*after = &blade->deep[1];
-
-	if (after->inside && after->began_ns <= t_ns)
-		return (double)(t_ns - after->began_ns) * 1e-9;
-	return before->inside ? (double)(t_ns - before->began_ns) * 1e-9 : 0;
-}
-
 /* The uncertainty on the line between two values with this noise, where the time is uncertain at this speed. */
 static double uncertainty(double noise, double share, double time_s, double speed)
 {
@@ -478,6 +469,31 @@ static double uncertainty(double noise, double share, double time_s, double spee
 static double mix_interpolators(double a, double b, double share)
 {
 	return a + share * (b - a);
+}
+
+/* Set what is known of the contact that there was at this time, @share of the way between two depths. */
+static void set_history(const struct incise_blade_pose *blade, int64_t t_ns, double share,
+			struct incise_blade_pose_value *value)
+{
+	const struct incise_blade_depth *before = &blade->deep[0],
+					*after = &blade->deep[1], *of = after;
+
+	value->time_in_tissue_s = value->mean_speed_mm_s = value->deepest_mm =
+		isnan(share) ? NAN : 0;
+	if (!after->inside || after->began_ns > t_ns)
+		of = before;
+	if (isnan(share) || !of->inside)
+		return;
+	value->time_in_tissue_s = (double)(t_ns - of->began_ns) * 1e-9;
+	value->mean_speed_mm_s =
+		before->inside && after->inside && before->began_ns == after->began_ns
+			? mix_interpolators(before->mean_speed_mm_s,
+					    after->mean_speed_mm_s, share)
+			: of->mean_speed_mm_s;
+	value->deepest_mm = fmax(of == before || before->began_ns == after->began_ns
+					 ? before->deepest_mm
+					 : 0,
+				 value->depth_mm);
 }
 
 int incise_blade_pose_at(struct incise_blade_pose *blade, int64_t t_ns, double t_sd_s,
@@ -513,7 +529,7 @@ int incise_blade_pose_at(struct incise_blade_pose *blade, int64_t t_ns, double t
 								     : b->q,
 						 (const double[3])INCISE_SCALPEL_AXIS,
 						 blade->progress.normal);
-	value->time_in_tissue_s = isnan(e) ? NAN : time_in_tissue(blade, t_ns);
+	set_history(blade, t_ns, e, value);
 	value->position_u_mm = uncertainty(mix_interpolators(c->noise_mm, d->noise_mm, e),
 					   s, time_s, blade->speed_mm_s);
 	value->depth_u_mm =

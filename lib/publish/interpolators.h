@@ -105,6 +105,7 @@ struct incise_blade_depth {
 	bool advancing;
 	bool inside;	  /* the tissue … */
 	int64_t began_ns; /* … since then */
+	double mean_speed_mm_s, deepest_mm;
 };
 
 /*
@@ -140,8 +141,9 @@ struct incise_blade_pose {
 struct incise_blade_pose_value {
 	double position_mm[3], position_u_mm, q[4];
 	double depth_mm, depth_u_mm, velocity_mm_s;
-	/* As in the haptic loop; see ../../control/model_input.h. Outside of tissue the time is 0. */
+	/* As in the haptic loop; see ../../control/model_input.h. Outside of tissue the last three are 0. */
 	double acceleration_mm_s2, tilt_deg, time_in_tissue_s;
+	double mean_speed_mm_s, deepest_mm;
 	int64_t station, cut; /* 0: not known; outside cuts */
 	bool button, interpolated, error;
 	bool advancing; /* at both records around; false where depth is not known */

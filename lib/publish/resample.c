@@ -59,6 +59,8 @@ static const struct incise_table_column columns[] = {
 	COLUMN(blade.acceleration_mm_s2, SINGLE, 1, INCISE_ACCELERATION_COLUMN),
 	COLUMN(blade.tilt_deg, SINGLE, 2, INCISE_TILT_COLUMN),
 	COLUMN(blade.time_in_tissue_s, SINGLE, 4, INCISE_TIME_COLUMN),
+	COLUMN(blade.mean_speed_mm_s, SINGLE, 3, INCISE_MEAN_SPEED_COLUMN),
+	COLUMN(blade.deepest_mm, SINGLE, 4, INCISE_DEEPEST_COLUMN),
 	COLUMN(camera.depth_mm, SINGLE, 4, "camera_depth_mm", "mm",
 	       "depth from the frames"),
 	COLUMN(camera.sd_mm, COARSE, 4, "camera_depth_sd_mm", "mm",

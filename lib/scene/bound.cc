@@ -219,6 +219,21 @@ num T(input_time)(int64_t, int64_t)
 	return num::of(put({0, 32767, paths->tick_s, 2 * lsb_mm(), 16, false}));
 }
 
+wide T(input_path)(wide path, num, int64_t, int64_t)
+{
+	return path;
+}
+
+/* A mean is as far off as its speeds; a contact that begins a tick earlier has one speed more, a tick's change away. */
+num T(input_mean_speed)(wide, num speed, int64_t, int64_t)
+{
+	struct bounds s = at(speed.id);
+
+	s.in += HAND_MM_S2 * paths->tick_s;
+	s.own += lsb_mm() + ldexp(most_of(s), -INCISE_FIXED_INPUT_MEAN_SPEED_SHARE_BITS);
+	return num::of(put(s));
+}
+
 /* The tip is as far off as settle_tear() says; at this tick it is no farther away than the tissue gives way. */
 void T(stage_fracture)(const struct T(plan) *plan, struct T(state) *state,
 		       struct T(tick) *tick)

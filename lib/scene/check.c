@@ -23,12 +23,15 @@ static double pushed(const struct incise_plan *plan, int i)
 }
 
 /* Inputs that the search's hand does not move, or does not move far enough. */
-static const enum incise_model_input unmoved[] = {INCISE_INPUT_TILT, INCISE_INPUT_TIME};
+static const enum incise_model_input unmoved[] = {INCISE_INPUT_TILT, INCISE_INPUT_TIME,
+						  INCISE_INPUT_MEAN_SPEED,
+						  INCISE_INPUT_DEEPEST};
 #define UNMOVED ((int)(sizeof(unmoved) / sizeof(*unmoved)))
 
 /*
  * Search as the inputs are, then with those unmoved ones held at either end of their supports, in all
- * combinations, until one swings. Returns 0 or -ENOMEM.
+ * combinations, until one swings; a blade is not below the deepest depth, which is held at its upper end. Returns 0 or
+ * -ENOMEM.
  */
 static int search_check(struct incise_plan *plan,
 			const struct incise_tracker_info *tracker,
@@ -42,8 +45,11 @@ static int search_check(struct incise_plan *plan,
 	for (int i = 0; i < plan->stability.n_axes; i++)
 		trial->gain = fmax(trial->gain, as_is->gain * pushed(plan, i));
 	for (int i = 0; i < UNMOVED; i++)
-		if (incise_plan_kind_range(plan, unmoved[i], ends[n]))
+		if (incise_plan_kind_range(plan, unmoved[i], ends[n])) {
+			if (unmoved[i] == INCISE_INPUT_DEEPEST)
+				ends[n][0] = ends[n][1];
 			inputs[n++] = unmoved[i];
+		}
 	rc = incise_plan_rest(plan, tracker, trial, rest);
 	for (int corner = 0; n && corner < 1 << n && !rc && rest->rests; corner++) {
 		struct incise_rest here;

@@ -43,7 +43,9 @@ _Static_assert(INCISE_FIXED_INPUT_DEPTH == INCISE_INPUT_DEPTH + 1 &&
 		       INCISE_FIXED_INPUT_SPEED == INCISE_INPUT_SPEED + 1 &&
 		       INCISE_FIXED_INPUT_ACCELERATION == INCISE_INPUT_ACCELERATION + 1 &&
 		       INCISE_FIXED_INPUT_TILT == INCISE_INPUT_TILT + 1 &&
-		       INCISE_FIXED_INPUT_TIME == INCISE_INPUT_TIME + 1,
+		       INCISE_FIXED_INPUT_TIME == INCISE_INPUT_TIME + 1 &&
+		       INCISE_FIXED_INPUT_MEAN_SPEED == INCISE_INPUT_MEAN_SPEED + 1 &&
+		       INCISE_FIXED_INPUT_DEEPEST == INCISE_INPUT_DEEPEST + 1,
 	       "the same, from 1");
 
 static void set_model(const struct incise_plan *plan, struct incise_double_plan *to)

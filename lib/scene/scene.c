@@ -446,18 +446,19 @@ static int refuse_input(const struct incise_scene *scene, const char *name,
 			struct incise_error *err)
 {
 	const char *names[INCISE_MODEL_INPUT_KINDS + 1] = {NULL}, *nearest;
+	char all[INCISE_MODEL_INPUT_KINDS * 24] = "";
 
-	for (int k = 0; k < INCISE_MODEL_INPUT_KINDS; k++)
+	for (int k = 0; k < INCISE_MODEL_INPUT_KINDS; k++) {
 		names[k] = incise_model_input_kinds[k].name;
+		strcat(strcat(all, k ? ", " : ""), names[k]);
+	}
 	nearest = incise_nearest_name(name, names);
 	return incise_error_set(
 		err, EINVAL,
 		"%.200s: its model has the input '%.64s', which a loop does not have%s%s: "
-		"expected %s, %s, %s, %s or %s; train with --inputs of these",
+		"expected some of %s; train with --inputs of these",
 		scene->path, name, nearest ? "; did you mean " : "",
-		nearest ? nearest : "", names[INCISE_INPUT_DEPTH],
-		names[INCISE_INPUT_SPEED], names[INCISE_INPUT_ACCELERATION],
-		names[INCISE_INPUT_TILT], names[INCISE_INPUT_TIME]);
+		nearest ? nearest : "", all);
 }
 
 /* The origin of each input, by its name. */

@@ -159,6 +159,7 @@ static void take_slopes(struct incise_plan *plan, enum incise_cutting_phase phas
 {
 	const struct incise_scene_model *cut = &plan->scene->cut[phase];
 	struct incise_plan_stability *s = &plan->stability;
+	double steepest_N_mm = 0;
 
 	for (int i = 0; i < cut->n_inputs; i++) {
 		double either = fmax(fabs(slopes[i].lowest), fabs(slopes[i].highest));
@@ -166,13 +167,14 @@ static void take_slopes(struct incise_plan *plan, enum incise_cutting_phase phas
 
 		s->certified = s->certified && slopes[i].certified;
 		*to = fmax(*to, plan->gain * either);
-		/* A force that pulls the blade back may rise either way. */
-		if (cut->input[i] == INCISE_INPUT_DEPTH)
-			plan->steepest_N_mm = fmax(plan->steepest_N_mm,
-						   phase == INCISE_WITHDRAW
-							   ? either
-							   : fmax(slopes[i].highest, 0));
+		/* A blade that goes deeper moves both; a force that pulls it back may rise either way. */
+		if (cut->input[i] == INCISE_INPUT_DEPTH ||
+		    cut->input[i] == INCISE_INPUT_DEEPEST)
+			steepest_N_mm += phase == INCISE_WITHDRAW
+						 ? either
+						 : fmax(slopes[i].highest, 0);
 	}
+	plan->steepest_N_mm = fmax(plan->steepest_N_mm, steepest_N_mm);
 }
 
 /* The largest slopes of the models, by depth, by speed and by acceleration; its support, and the slope there. */
@@ -205,7 +207,9 @@ static int survey_model(struct incise_plan *plan)
 			return -ENOMEM;
 		take_slopes(plan, (enum incise_cutting_phase)i, slope);
 	}
-	s->speed_slope_N_s_mm = plan->input_slope[INCISE_INPUT_SPEED];
+	/* Where a contact begins, the mean speed is the speed. */
+	s->speed_slope_N_s_mm = plan->input_slope[INCISE_INPUT_SPEED] +
+				plan->input_slope[INCISE_INPUT_MEAN_SPEED];
 	s->acceleration_slope_N_s2_mm = plan->input_slope[INCISE_INPUT_ACCELERATION];
 	plan->steepest_N_mm += opening_slope(plan);
 	s->slope_N_mm = plan->gain * plan->steepest_N_mm;

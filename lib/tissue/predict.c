@@ -32,3 +32,17 @@ double incise_double_input_time(int64_t t_ns, int64_t from_ns)
 	/* Unsigned: two times may be farther apart than an int64_t holds. */
 	return (double)((uint64_t)t_ns - (uint64_t)from_ns) / INCISE_NS_PER_S;
 }
+
+double incise_double_input_path(double path, double speed, int64_t from_ns, int64_t t_ns)
+{
+	double gone_ns = (double)((uint64_t)t_ns - (uint64_t)from_ns);
+
+	return t_ns > from_ns ? path + speed * fmin(gone_ns, INCISE_INPUT_GAP_NS) : path;
+}
+
+double incise_double_input_mean_speed(double path, double speed, int64_t from_ns,
+				      int64_t t_ns)
+{
+	return t_ns > from_ns ? path / (double)((uint64_t)t_ns - (uint64_t)from_ns)
+			      : speed;
+}

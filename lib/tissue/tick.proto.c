@@ -289,6 +289,8 @@ static void begin_contact(struct T(state) *state, int64_t t_ns)
 {
 	state->touched_ns = t_ns;
 	state->deepest = 0;
+	state->path = 0;
+	state->path_ns = t_ns;
 	state->skin_open = false;
 	v_copy(state->p0, state->proxy.first.point);
 	d_copy(state->entry, state->proxy.touch.normal);
@@ -510,6 +512,11 @@ static num find_input(const struct T(plan) *plan, const struct T(state) *state,
 		return T(input_tilt)(axis, state->normal);
 	case INCISE_FIXED_INPUT_TIME:
 		return T(input_time)(tick->t_ns, state->touched_ns);
+	case INCISE_FIXED_INPUT_MEAN_SPEED:
+		return T(input_mean_speed)(state->path, tick->speed, state->touched_ns,
+					   tick->t_ns);
+	case INCISE_FIXED_INPUT_DEEPEST:
+		return state->deepest;
 	default:
 		return state->depth;
 	}
@@ -542,6 +549,8 @@ static num model_force(const struct T(plan) *plan, struct T(state) *state,
 	num share = N(1), cut = 0, skin;
 
 	state->deepest = n_max(state->deepest, state->depth);
+	state->path = T(input_path)(state->path, tick->speed, state->path_ns, tick->t_ns);
+	state->path_ns = tick->t_ns;
 	if (plan->numbers.phases & T_PUNCTURES)
 		share = open_share(&plan->numbers, state);
 	if (n_below(0, share))

@@ -355,12 +355,14 @@ struct T(state) {
 	dir normal[3];	    /* direction of forces: Sn, or its average */
 	num depth;	    /* ≥ 0; of the tissue in front of a membrane */
 	int64_t touched_ns; /* when the contact began */
-	num deepest;	    /* of the blade since then */
-	int32_t skin_open;  /* it came into a cut that was there */
-	num open;	    /* so deep a spring meets friction only */
-	dir side[3];	    /* of the blade when its contact began: Sx(0) */
-	dir flat[3];	    /* of blade and handle now */
-	int32_t averaged;   /* the average has begun in this contact */
+	num deepest;	    /* of the blade since then … */
+	wide path;	    /* … and its path, until … */
+	int64_t path_ns;
+	int32_t skin_open; /* it came into a cut that was there */
+	num open;	   /* so deep a spring meets friction only */
+	dir side[3];	   /* of the blade when its contact began: Sx(0) */
+	dir flat[3];	   /* of blade and handle now */
+	int32_t averaged;  /* the average has begun in this contact */
 	struct T(front) front;
 	struct T(opening) opening; /* that handle or tube went into … */
 	num tightness;		   /* … and how tight it was */
@@ -421,12 +423,16 @@ num T(model_force)(const struct T(plan) *plan, int32_t phase, const num *x,
 /*
  * Inputs: the rate of change of the speed |v|, mm/s², which below 5 mm/s goes to 0 with the speed, for a
  * blade at rest has no direction of motion: no more than |a|, and without a leap; the angle of two unit
- * vectors, degrees; a time, s.
+ * vectors, degrees; a time, s; a path, to which a tick adds its speed over the time since the last, and that path over
+ * the time since @from_ns, mm/s, the speed where there is no such time.
  */
 num T(input_acceleration)(const num velocity[3],
 			  const wide acceleration[3]) INCISE_REALTIME;
 num T(input_tilt)(const dir axis[3], const dir normal[3]) INCISE_REALTIME;
 num T(input_time)(int64_t t_ns, int64_t from_ns) INCISE_REALTIME;
+wide T(input_path)(wide path, num speed, int64_t from_ns, int64_t t_ns) INCISE_REALTIME;
+num T(input_mean_speed)(wide path, num speed, int64_t from_ns,
+			int64_t t_ns) INCISE_REALTIME;
 
 /* --- ticks --- */
 

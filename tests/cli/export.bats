@@ -45,10 +45,10 @@ well_formed() {
 @test "export raw at a rate, to standard output" {
 	run -0 --separate-stderr incise export --no-lineage liver.rec --rate 100
 	[ -z "$stderr" ]
-	[ "${lines[0]}" = cut,t_s,depth_mm,velocity_mm_s,force_N,clipped,advancing,acceleration_mm_s2,tilt_deg,time_in_tissue_s ]
+	[ "${lines[0]}" = cut,t_s,depth_mm,velocity_mm_s,force_N,clipped,advancing,acceleration_mm_s2,tilt_deg,time_in_tissue_s,mean_speed_mm_s,deepest_mm ]
 	[[ "${lines[1]}" == liver-01,* ]]
 	printf '%s\n' "${lines[@]}" >out.csv
-	well_formed out.csv 10 2
+	well_formed out.csv 12 2
 	[ "$(cut -d, -f1 out.csv | sort -u | grep -c liver-)" -eq 14 ]
 	# 14 cuts of not quite 2 s at 100 rows a second
 	[ "${#lines[@]}" -gt 1400 ]
@@ -88,8 +88,8 @@ well_formed() {
 # bats test_tags=check
 @test "export averaged by cut" {
 	incise export --no-lineage liver.rec -a 12x10,by-cut -o a.csv
-	[ "$(head -n 1 a.csv)" = cut,depth_mm,velocity_mm_s,force_N,sd_N,count,cuts,advancing,acceleration_mm_s2,tilt_deg,time_in_tissue_s ]
-	well_formed a.csv 11 2
+	[ "$(head -n 1 a.csv)" = cut,depth_mm,velocity_mm_s,force_N,sd_N,count,cuts,advancing,acceleration_mm_s2,tilt_deg,time_in_tissue_s,mean_speed_mm_s,deepest_mm ]
+	well_formed a.csv 13 2
 	[ "$(tail -n +2 a.csv | cut -d, -f1 | uniq | wc -l)" -eq 14 ]
 }
 
@@ -123,7 +123,7 @@ well_formed() {
 	incise capture -o cut.rec --rig sim:clock=simulated --duration 6s >/dev/null
 	mv cut.rec cut.rec.part
 	incise export --no-lineage cut.rec -a 3x3 -o a.csv
-	well_formed a.csv 10 1
+	well_formed a.csv 12 1
 }
 
 # bats test_tags=check
@@ -184,7 +184,7 @@ well_formed() {
 	incise export --no-lineage liver.rec -a 3x3 -o a.csv
 	incise export --no-lineage liver.rec -a 3x3 -c half.conf -o b.csv
 	paste -d, a.csv b.csv | awk -F, '
-		NR > 1 { d = $3 - 2 * $13; if (d > 1e-7 || d < -1e-7) bad = 1 } END { exit bad || NR < 2 }'
+		NR > 1 { d = $3 - 2 * $15; if (d > 1e-7 || d < -1e-7) bad = 1 } END { exit bad || NR < 2 }'
 	echo 'force_mV_N = 0;' >bad.conf
 	run --separate-stderr incise export liver.rec -c bad.conf -o c.csv
 	failed_with "bad.conf"
@@ -298,14 +298,14 @@ read_mcap() {
 	sqlite3 seen.rec/recording.db "DELETE FROM knots;
 		INSERT INTO frames SELECT seq, t_ns, t_ns, 0, 1, 0, 100.0, 0.5, depth_mm, 0.9, zeroblob(32) FROM depth"
 	incise export --no-lineage seen.rec liver.rec --resample --rate 50 -o a.csv --damaged
-	[[ "$(head -n 1 a.csv)" == *,tracker_error,advancing,acceleration_mm_s2,tilt_deg,time_in_tissue_s,camera_depth_mm,camera_depth_sd_mm,camera_depth_u_mm,quality,low_quality ]]
+	[[ "$(head -n 1 a.csv)" == *,tracker_error,advancing,acceleration_mm_s2,tilt_deg,time_in_tissue_s,mean_speed_mm_s,deepest_mm,camera_depth_mm,camera_depth_sd_mm,camera_depth_u_mm,quality,low_quality ]]
 	# by the pictures as by the tracker; and none of what has no pictures
-	awk -F, 'NR > 1 && $1 == "seen" && $14 != "nan" { n++; if ($14 != $26 || $30) bad = 1 }
-		NR > 1 && $1 == "liver" && ($26 != "nan" || !$30) { bad = 1 }
+	awk -F, 'NR > 1 && $1 == "seen" && $14 != "nan" { n++; if ($14 != $28 || $32) bad = 1 }
+		NR > 1 && $1 == "liver" && ($28 != "nan" || !$32) { bad = 1 }
 		END { exit bad || n < 2100 }' a.csv
 	echo 'depth_mm_px = 0.2375;' >twice.conf
 	incise export seen.rec --resample --rate 50 -c twice.conf -o b.csv --damaged
-	awk -F, 'FNR > 1 && /^seen/ && $14 != "nan" { n++; d = $26 - 2 * $14; if (d > 2e-4 || d < -2e-4) bad = 1 }
+	awk -F, 'FNR > 1 && /^seen/ && $14 != "nan" { n++; d = $28 - 2 * $14; if (d > 2e-4 || d < -2e-4) bad = 1 }
 		END { exit bad || n < 2100 }' b.csv
 	grep -qx '# depth_mm_px: 0.2375' b.csv
 }
@@ -337,7 +337,7 @@ read_mcap() {
 		        for value, row in zip(column, rows):
 		            text = float(row[name])
 		            # float32, and half of the last digit
-		            half = {"velocity_mm_s": 5.1e-4, "acceleration_mm_s2": 5.1e-2, "tilt_deg": 5.1e-3,
+		            half = {"velocity_mm_s": 5.1e-4, "mean_speed_mm_s": 5.1e-4, "acceleration_mm_s2": 5.1e-2, "tilt_deg": 5.1e-3,
 		                    "time_in_tissue_s": 5.1e-5}.get(name, 5.1e-5 * name.endswith("_mm"))
 		            assert math.isnan(value) and math.isnan(text) or abs(
 		                value - text) < 2e-5 + half + 1e-6 * abs(text), (name, value, text)
@@ -412,7 +412,7 @@ calibrated() {
 	[ "${#stderr_lines[@]}" -eq 4 ]
 	run -0 --separate-stderr incise export --no-lineage liver.rec --rate 10 --uncertainty total -o a.csv --json --overwrite
 	sqlite3 :memory: "SELECT json_extract('$(sed "s/'/''/g" <<<"$output")', '\$.unstated[1]')" | grep -q 'calibrate tip'
-	awk -F, 'NR > 1 && ($11 != "nan" || $12 != "nan") { bad = 1 } END { exit bad || NR < 2 }' a.csv
+	awk -F, 'NR > 1 && ($13 != "nan" || $14 != "nan") { bad = 1 } END { exit bad || NR < 2 }' a.csv
 }
 
 @test "export of MCAP and HDF5 names uncertainties in the style of CF" {

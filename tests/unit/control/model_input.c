@@ -47,7 +47,7 @@ TEST(a_stay_begins_at_the_surface)
 	struct incise_stay stay = {0};
 
 	for (size_t i = 0; i < sizeof(depths) / sizeof(*depths); i++) {
-		incise_stay_add(&stay, depths[i].t_ms * 1000000LL, depths[i].depth_mm);
+		incise_stay_add(&stay, depths[i].t_ms * 1000000LL, depths[i].depth_mm, 0);
 		assert_int_equal(stay.inside, depths[i].began_ms >= 0);
 		if (stay.inside)
 			assert_true(llabs(stay.began_ns -
@@ -55,8 +55,31 @@ TEST(a_stay_begins_at_the_surface)
 	}
 	/* From the first depth on, when it is one. */
 	stay = (struct incise_stay){0};
-	incise_stay_add(&stay, 5, 1);
+	incise_stay_add(&stay, 5, 1, 7);
 	assert_true(stay.inside && stay.began_ns == 5);
+	assert_true(incise_stay_mean_speed_mm_s(&stay) == 7);
+}
+
+/* A speed that rises evenly from the touch on, down for a second and up for one; then another stay. */
+TEST(a_stay_keeps_its_path_and_its_deepest_depth)
+{
+	struct incise_stay stay = {0};
+
+	for (int k = -3; k <= 200; k++) {
+		double t_s = k * 0.01, depth_mm = 4 * (t_s < 1 ? t_s : 2 - t_s);
+
+		incise_stay_add(&stay, k * 10000000LL, k < 0 ? -1 : depth_mm,
+				k < 0 ? 0 : 5 * t_s);
+		if (k < 2)
+			continue;
+		assert_true(fabs(incise_stay_mean_speed_mm_s(&stay) - 2.5 * t_s) <
+			    0.05 * t_s);
+		assert_true(stay.deepest_mm == fmax(depth_mm, k < 100 ? 0 : 4));
+	}
+	incise_stay_add(&stay, 2100000000, -1, 3);
+	incise_stay_add(&stay, 2200000000, 1, 3);
+	assert_true(stay.deepest_mm == 1);
+	assert_true(fabs(incise_stay_mean_speed_mm_s(&stay) - 3) < 1e-9);
 }
 
 /* A hand that is pushed evenly: the filter finds it; and between two ticks nothing leaps. */

@@ -105,7 +105,7 @@ static struct truth brute_force(const char *file)
 /* One recording of the short script for all tests, and its truth. */
 static struct truth truth;
 
-#define INPUTS "acceleration_mm_s2,tilt_deg,time_in_tissue_s"
+#define INPUTS "acceleration_mm_s2,tilt_deg,time_in_tissue_s,mean_speed_mm_s,deepest_mm"
 
 static void read_advancing(void);
 

@@ -49,7 +49,7 @@ static char *resample(const char *path, double rate_hz,
 struct row {
 	double cut, t, x[3], x_u, q[4], station, button, depth, depth_u, velocity, force,
 		u, clipped, interpolated, error, advancing, acceleration, tilt, time,
-		camera[5];
+		mean_speed, deepest, camera[5];
 };
 
 /* Columns in the order of the struct, with the camera's or without. */
@@ -147,6 +147,8 @@ TEST(rows_are_those_of_the_signals)
 			assert_true(fabs(r.tilt - acos(cos(0.02 * at)) * 180 / M_PI) <
 				    2e-2);
 			assert_true(fabs(r.time - 0.008 * at) < 2e-4);
+			assert_true(fabs(r.mean_speed - r.velocity) < 1e-2);
+			assert_true(r.deepest == r.depth);
 			if (fabs(at - record - 0.5) < 0.49)
 				assert_true(r.error == (record == 59 || record == 60));
 		}
@@ -190,10 +192,11 @@ TEST(uncertainties_are_what_was_put_in)
 	incise_calibration_nominal(&calibration);
 	text = rest = resample("camera.rec", 1000, NULL);
 	first = at("SELECT value FROM meta WHERE key = 'depth_mm_px'");
-	assert_non_null(strstr(strsep(&rest, "\n"),
-			       "tracker_error,advancing,acceleration_mm_s2,tilt_deg,"
-			       "time_in_tissue_s,camera_depth_mm,camera_depth_sd_mm,"
-			       "camera_depth_u_mm,quality,low_quality"));
+	assert_non_null(strstr(
+		strsep(&rest, "\n"),
+		"tracker_error,advancing,acceleration_mm_s2,tilt_deg,"
+		"time_in_tissue_s,mean_speed_mm_s,deepest_mm,camera_depth_mm,camera_depth_sd_mm,"
+		"camera_depth_u_mm,quality,low_quality"));
 	for (int i = 0; next_row(&rest, &r); i++) {
 		int frame = i / 10;
 		double share = i % 10 / 10.0, line = hypot(share, 1 - share);

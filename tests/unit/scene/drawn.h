@@ -56,13 +56,16 @@ static const struct {
 	{4,
 	 {INCISE_INPUT_TIME, INCISE_INPUT_ACCELERATION, INCISE_INPUT_DEPTH,
 	  INCISE_INPUT_SPEED}},
+	{4,
+	 {INCISE_INPUT_MEAN_SPEED, INCISE_INPUT_DEPTH, INCISE_INPUT_DEEPEST,
+	  INCISE_INPUT_SPEED}},
 	/* These have no bound in integers on a mesh. */
 	{3, {INCISE_INPUT_TILT, INCISE_INPUT_DEPTH, INCISE_INPUT_TIME}},
 	{4,
 	 {INCISE_INPUT_DEPTH, INCISE_INPUT_SPEED, INCISE_INPUT_TILT, INCISE_INPUT_TIME}},
 };
 #define KINDS ((int)(sizeof(kinds) / sizeof(*kinds)))
-#define KINDS_LEVEL 4 /* without the tilt */
+#define KINDS_LEVEL 5 /* without the tilt */
 
 static struct fed_folder folder;
 
@@ -80,10 +83,13 @@ static inline void write_model(int kind)
 		[INCISE_INPUT_ACCELERATION] = {"acceleration_mm_s2", -900, 900},
 		[INCISE_INPUT_TILT] = {"tilt_deg", 0, 40},
 		[INCISE_INPUT_TIME] = {"time_in_tissue_s", 0, 0.2},
+		[INCISE_INPUT_MEAN_SPEED] = {"mean_speed_mm_s", 0, 60},
+		[INCISE_INPUT_DEEPEST] = {"deepest_mm", 0, 6},
 	};
 	static const struct incise_variable out = {"force_N", 0, 4};
 	static const int mfs[] = {3, 2, 2, 2};
-	const double slope[INCISE_MODEL_INPUT_KINDS] = {0.1, 0.005, 1e-4, 0.001, 0.5};
+	const double slope[INCISE_MODEL_INPUT_KINDS] = {0.1, 0.005, 1e-4, 0.001,
+							0.5, 0.002, 0.02};
 	struct incise_variable in[INCISE_LOOP_INPUTS_MAX];
 	struct incise_model *model;
 	struct incise_fixed_options direct;

@@ -36,15 +36,17 @@ static const struct incise_variable all_inputs[INCISE_MODEL_INPUT_KINDS] = {
 	[INCISE_INPUT_ACCELERATION] = {"acceleration_mm_s2", -500, 500},
 	[INCISE_INPUT_TILT] = {"tilt_deg", 0, 60},
 	[INCISE_INPUT_TIME] = {"time_in_tissue_s", 0, 4},
+	[INCISE_INPUT_MEAN_SPEED] = {"mean_speed_mm_s", 0, 40},
+	[INCISE_INPUT_DEEPEST] = {"deepest_mm", 0, 20},
 };
 
-/* About 0.1 N/mm, 0.005 N s/mm, @mass of kg, 0.5 mN a degree, 5 mN a second. */
+/* About 0.1 N/mm, 0.005 N s/mm, @mass of kg, 0.5 mN a degree, 5 mN a second, and a little of the last two. */
 static void write_model(const enum incise_model_input *inputs, int n, double mass_kg)
 {
 	static const struct incise_variable out = {"force_N", 0, 4};
 	static const int mfs[] = {3, 2, 2, 2};
-	const double slope[INCISE_MODEL_INPUT_KINDS] = {0.1, 0.005, 1e-3 * mass_kg,
-							0.0005, 0.005};
+	const double slope[INCISE_MODEL_INPUT_KINDS] = {
+		0.1, 0.005, 1e-3 * mass_kg, 0.0005, 0.005, 0.0005, 0.001};
 	struct incise_variable in[INCISE_LOOP_INPUTS_MAX];
 	struct incise_model *model;
 
@@ -77,6 +79,7 @@ static void cut(void *own, double t_s, struct incise_tracker_sample *pose)
 struct truth {
 	struct incise_predict predict;
 	int64_t touched_ns;
+	double path_mm, deepest_mm;
 };
 
 static void find(struct truth *truth, const struct incise_tick *tick,
@@ -94,6 +97,12 @@ static void find(struct truth *truth, const struct incise_tick *tick,
 	/* The z axis turned by q has cos tilt = 1 - 2 (x² + y²) = 2 (w² + z²) - 1 along z. */
 	found[INCISE_INPUT_TILT] = acos(2 * (w * w + z * z) - 1) * 180 / M_PI;
 	found[INCISE_INPUT_TIME] = (double)(tick->t_ns - truth->touched_ns) * 1e-9;
+	truth->path_mm += tick->t_ns > truth->touched_ns ? v3_length(v) * 1e-3 : 0;
+	truth->deepest_mm = fmax(truth->deepest_mm, tick->depth_mm);
+	found[INCISE_INPUT_MEAN_SPEED] =
+		tick->t_ns > truth->touched_ns ? truth->path_mm / found[INCISE_INPUT_TIME]
+					       : v3_length(v);
+	found[INCISE_INPUT_DEEPEST] = truth->deepest_mm;
 }
 
 /* Returns how many ticks were compared. */
@@ -120,12 +129,15 @@ static int compare(struct incise_plan *plan, const struct incise_model *model,
 			incise_predict_add(&truth.predict, &pose);
 		}
 		assert_int_equal(fed_tick(plan, t_ns, cut, NULL, &tick), 0);
-		if (tick.flags & INCISE_TICK_CONTACT && !inside)
+		if (tick.flags & INCISE_TICK_CONTACT && !inside) {
 			truth.touched_ns = t_ns;
+			truth.path_mm = truth.deepest_mm = 0;
+		}
 		inside = tick.flags & INCISE_TICK_CONTACT;
+		if (inside)
+			find(&truth, &tick, found);
 		if (!inside || tick.flags & other || !(tick.depth_mm > 0))
 			continue;
-		find(&truth, &tick, found);
 		for (int i = 0; i < n; i++)
 			x[i] = found[inputs[i]];
 		force_N = fmax(incise_model_eval(model, x, &flags), 0);
@@ -149,6 +161,8 @@ static const struct {
 	{4,
 	 {INCISE_INPUT_TIME, INCISE_INPUT_ACCELERATION, INCISE_INPUT_DEPTH,
 	  INCISE_INPUT_TILT}},
+	{2, {INCISE_INPUT_DEPTH, INCISE_INPUT_DEEPEST}},
+	{3, {INCISE_INPUT_MEAN_SPEED, INCISE_INPUT_DEPTH, INCISE_INPUT_DEEPEST}},
 };
 #define N_CASES ((int)(sizeof(cases) / sizeof(*cases)))
 

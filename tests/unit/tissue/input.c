@@ -145,3 +145,57 @@ TEST(time_is_held)
 	assert_int_equal(incise_fixed_input_time(INT64_MAX, INT64_MIN), INT32_MAX);
 	assert_int_equal(incise_fixed_input_time(INT64_MAX, 0), INT32_MAX);
 }
+
+static double mean_both(const double *speeds, const int64_t *steps_ns, int n,
+			double *integer)
+{
+	double path = 0, exact = 0;
+	int64_t fixed_path = 0, t_ns = -7;
+
+	for (int i = 0; i < n; i++) {
+		int32_t speed = (int32_t)lrint(speeds[i] * ONE);
+
+		path = incise_double_input_path(path, speed / ONE, t_ns,
+						t_ns + steps_ns[i]);
+		fixed_path = incise_fixed_input_path(fixed_path, speed, t_ns,
+						     t_ns + steps_ns[i]);
+		t_ns += steps_ns[i];
+		exact = incise_double_input_mean_speed(path, speed / ONE, -7, t_ns);
+		*integer =
+			incise_fixed_input_mean_speed(fixed_path, speed, -7, t_ns) / ONE;
+	}
+	return exact;
+}
+
+/* Evenly at any speed it is that speed; else the integers are within their rounding of double. */
+TEST(mean_speed_is_path_over_time)
+{
+	double speeds[40], integer;
+	int64_t steps_ns[40];
+
+	for (int k = 0; k < CASES; k++) {
+		double size = pow(10, 4 * fabs(any())), exact;
+		int64_t step_ns = (int64_t)pow(10, 4.8 + 4.7 * fabs(any()));
+		bool even = k % 4 == 0;
+
+		for (int i = 0; i < 40; i++) {
+			speeds[i] = even && i ? speeds[0] : size * fabs(any());
+			steps_ns[i] = even ? 3000000 : step_ns + k * i;
+		}
+		exact = mean_both(speeds, steps_ns, 1 + k % 40, &integer);
+		assert_true(!even || fabs(exact - speeds[0]) < 1e-4);
+		assert_true(
+			fabs(integer - exact) <=
+			ldexp(1, -16) +
+				ldexp(exact, -INCISE_FIXED_INPUT_MEAN_SPEED_SHARE_BITS));
+	}
+	/* No time; time that goes back; more time and speed than there are. */
+	assert_int_equal(incise_fixed_input_mean_speed(0, 99, 5, 5), 99);
+	assert_true(incise_double_input_mean_speed(0, 99, 5, 4) == 99);
+	assert_true(incise_double_input_path(3, 99, 5, 4) == 3);
+	assert_int_equal(incise_fixed_input_path(3, 99, INT64_MAX, INT64_MIN), 3);
+	assert_true(incise_fixed_input_path(INT64_MAX / 4, INT32_MAX, INT64_MIN,
+					    INT64_MAX) <= (int64_t)1 << 61);
+	assert_true(incise_fixed_input_mean_speed((int64_t)1 << 61, 1, INT64_MIN,
+						  INT64_MAX) >= 0);
+}
