@@ -70,7 +70,7 @@ static const char *serve(struct owner *owner, double peak_N)
 
 int main(int argc, char **argv)
 {
-	struct incise_haptic_page_device *device;
+	struct incise_haptic_info *device;
 	struct owner owner;
 	const char *why;
 

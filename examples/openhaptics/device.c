@@ -78,7 +78,7 @@ static HDCallbackCode HDCALLBACK serve(void *data)
 /* Constant properties, before the scheduler runs. */
 static void describe_device(struct touch *touch)
 {
-	struct incise_haptic_page_device *device = &touch->owner.page->device;
+	struct incise_haptic_info *device = &touch->owner.page->device;
 	HDdouble box[6] = {0, 0, 0, 0, 0, 0}, peak_N = 0, continuous_N = 0;
 	int i;
 

@@ -518,13 +518,6 @@ static void put_quoted(const char *key, const char *text, FILE *out)
 	fputs("\";", out);
 }
 
-static void put_calibration_text(const char *key, const char *text, FILE *out)
-{
-	fputs("  ", out);
-	put_quoted(key, text, out);
-	fputc('\n', out);
-}
-
 /*
  * "force_mV_N = 1238.6; ## mV/N, U = 2.4 (k = 2), 2026-11-21": a key with its unit and where it is
  * from. Two signs: it is rewritten.
@@ -564,63 +557,52 @@ static void put_keys(const struct file_content *file, FILE *out)
 	}
 }
 
-static void put_value(const struct incise_calibration_value *value, FILE *out)
+/* A row of a record or of one of its values, unless it has none: texts and numbers alone. */
+static void put_row(const struct incise_setting *row, const void *of, const char *before,
+		    const char *after, FILE *out)
 {
-	fprintf(out, "    { key = \"%s\"; ", value->key);
-	if (*value->unit) {
-		put_quoted("unit", value->unit, out);
-		fputc(' ', out);
+	const char *text = (const char *)of + row->offset;
+	const double *number = (const double *)text;
+	int n = row->count ? *(const int *)((const char *)of + row->count) : 1;
+
+	if (row->kind == SETTING_IS_TEXT ? !*text : n < 1 || !isfinite(*number))
+		return;
+	fputs(before, out);
+	if (row->kind == SETTING_IS_TEXT) {
+		put_quoted(row->key, text, out);
+	} else {
+		fprintf(out, "%s = %s", row->key, row->count ? "[" : "");
+		for (int i = 0; i < n; i++) {
+			fputs(i ? ", " : "", out);
+			put_calibration_number(number[i], out);
+		}
+		fputs(row->count ? "];" : ";", out);
 	}
-	if (isfinite(value->found)) {
-		fputs("found = ", out);
-		put_calibration_number(value->found, out);
-		fputs("; ", out);
+	fputs(after, out);
+}
+
+static void put_values(const struct incise_calibration_record *record, FILE *out)
+{
+	fputs("  values = (\n", out);
+	for (int i = 0; i < record->n; i++) {
+		fputs("    { ", out);
+		for (const struct incise_setting *row = value_settings; row->key; row++)
+			put_row(row, &record->values[i], "", " ", out);
+		fputs(i + 1 < record->n ? "},\n" : "} );\n", out);
 	}
-	fputs("left = ", out);
-	put_calibration_number(value->left, out);
-	fputs("; u = ", out);
-	put_calibration_number(value->u, out);
-	fputs("; }", out);
 }
 
 static void put_record(const struct incise_calibration_record *record, FILE *out)
 {
-	put_calibration_text("kind", record->kind, out);
-	put_calibration_text("date", record->date, out);
-	if (*record->device)
-		put_calibration_text("device", record->device, out);
-	if (*record->method)
-		put_calibration_text("method", record->method, out);
-	if (*record->raw) {
-		put_calibration_text("raw", record->raw, out);
-		fprintf(out, "  raw_crc32c = \"%08x\";\n", record->raw_crc);
-	}
-	fputs("  values = (\n", out);
-	for (int i = 0; i < record->n; i++) {
-		put_value(&record->values[i], out);
-		fputs(i + 1 < record->n ? ",\n" : " );\n", out);
-	}
-	for (int i = 0; i < record->n_covariance; i++) {
-		fputs(i ? ", " : "  covariance = [", out);
-		put_calibration_number(record->covariance[i], out);
-	}
-	if (record->n_covariance)
-		fputs("];\n", out);
-	if (isfinite(record->low)) {
-		fputs("  low = ", out);
-		put_calibration_number(record->low, out);
-		fputs(";\n", out);
-	}
-	if (isfinite(record->high)) {
-		fputs("  high = ", out);
-		put_calibration_number(record->high, out);
-		fputs(";\n", out);
-	}
-	if (*record->range_unit)
-		put_calibration_text("range_unit", record->range_unit, out);
-	fprintf(out, "  pass = %s;\n", record->pass ? "true" : "false");
-	if (*record->verdict)
-		put_calibration_text("verdict", record->verdict, out);
+	for (const struct incise_setting *row = record_settings; row->key; row++)
+		if (row->read == read_values)
+			put_values(record, out);
+		else if (row->read == read_crc && *record->raw)
+			fprintf(out, "  raw_crc32c = \"%08x\";\n", record->raw_crc);
+		else if (row->kind == SETTING_IS_TRUTH)
+			fprintf(out, "  pass = %s;\n", record->pass ? "true" : "false");
+		else if (row->kind != SETTING_IS_OWN)
+			put_row(row, record, "  ", "\n", out);
 }
 
 /* Write all of a file; @notes are lines of comment to begin with. */

@@ -73,16 +73,6 @@ static void append_value(struct incise_provenance *to, const char *key, const ch
 	free(text);
 }
 
-static const char *path_of(const struct incise_recording *recording)
-{
-	return recording->path;
-}
-
-static const char *start_of(const struct incise_recording *recording)
-{
-	return recording->meta.started;
-}
-
 static const char *state_of(const struct incise_recording *recording)
 {
 	const struct incise_recording_info *meta = &recording->meta;
@@ -93,26 +83,17 @@ static const char *state_of(const struct incise_recording *recording)
 	return lost ? "complete, with losses" : "complete";
 }
 
-static const char *rig_of(const struct incise_recording *recording)
-{
-	return recording->meta.rig;
-}
-
 static void add_sources(struct incise_provenance *provenance,
 			struct incise_recording *const *recordings, int n)
 {
-	static const struct {
-		const char *key;
-		const char *(*text)(const struct incise_recording *recording);
-	} items[] = {{"source", path_of},
-		     {"recorded", start_of},
-		     {"rig", rig_of},
-		     {"state", state_of}};
-
-	for (size_t i = 0; i < sizeof(items) / sizeof(*items); i++)
-		for (int k = 0; k < n; k++)
-			append_value(provenance, items[i].key, "%s",
-				     items[i].text(recordings[k]));
+	for (int k = 0; k < n; k++)
+		append_value(provenance, "source", "%s", recordings[k]->path);
+	for (int k = 0; k < n; k++)
+		append_value(provenance, "recorded", "%s", recordings[k]->meta.started);
+	for (int k = 0; k < n; k++)
+		append_value(provenance, "rig", "%s", recordings[k]->meta.rig);
+	for (int k = 0; k < n; k++)
+		append_value(provenance, "state", "%s", state_of(recordings[k]));
 }
 
 /* Append a calibration that was given for the export, a file; one that is a pipe was read already. */

@@ -119,6 +119,20 @@ uint64_t incise_haptic_lost(const struct incise_haptic *haptic)
 	return haptic->ops->lost(haptic);
 }
 
+int64_t incise_haptic_ages_add(struct incise_haptic_ages *ages, int64_t t_ns,
+			       int64_t now_ns)
+{
+	double age_ms = (double)(now_ns - t_ns) * 1e-6, step_ms = age_ms - ages->mean_ms;
+	double sum2_ms2 = ages->jitter_ms * ages->jitter_ms * (double)ages->ticks;
+
+	ages->ticks++;
+	ages->mean_ms += step_ms / (double)ages->ticks;
+	ages->most_ms = fmax(ages->most_ms, age_ms);
+	sum2_ms2 += step_ms * (age_ms - ages->mean_ms);
+	ages->jitter_ms = sqrt(sum2_ms2 / (double)ages->ticks);
+	return now_ns - t_ns;
+}
+
 int incise_haptic_cause(struct incise_haptic *haptic, char *text, size_t size)
 {
 	return haptic->ops->cause ? haptic->ops->cause(haptic, text, size)

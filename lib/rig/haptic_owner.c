@@ -68,23 +68,17 @@ static void put_sample(struct incise_haptic_owner *owner,
 static void put_device(struct incise_haptic_owner *owner, const char *device,
 		       const char *note)
 {
-	struct incise_haptic_page_device *to = &owner->page.map->device;
-	struct incise_haptic_info info;
+	struct incise_haptic_info *to = &owner->page.map->device;
+	size_t length;
 
-	incise_haptic_info(owner->haptic, &info);
-	memcpy(to->low_mm, info.low_mm, HAPTIC_PAGE_MIDDLE(incise_haptic_info));
+	incise_haptic_info(owner->haptic, to);
 	/* A force that answers a sample is given at the next tick. */
 	to->force_latency_ns += owner->period_ns;
-	to->buttons = (uint32_t)info.buttons;
-	to->features = (info.measures_velocity ? INCISE_HAPTIC_PAGE_VELOCITY : 0) |
-		       (info.measures_orientation ? INCISE_HAPTIC_PAGE_ORIENTATION : 0) |
-		       (info.own_gravity ? INCISE_HAPTIC_PAGE_GRAVITY : 0);
 	to->settings = incise_haptic_page_settings(&owner->setup);
 	snprintf(to->device, sizeof(to->device), "%s", device);
-	snprintf(to->name, sizeof(to->name), "%s", info.name);
-	snprintf(to->filters, sizeof(to->filters), "%s", info.filters);
-	snprintf(to->note, sizeof(to->note), "%s%s%s", info.note,
-		 *info.note && *note ? "; " : "", note);
+	length = strlen(to->note);
+	snprintf(to->note + length, sizeof(to->note) - length, "%s%s",
+		 length && *note ? "; " : "", note);
 }
 
 /* --- a tick ------------------------------------------------------------------------------ */
@@ -122,12 +116,9 @@ static int give_force(struct incise_haptic_owner *owner,
 		      struct incise_haptic_owner_tick *tick)
 {
 	struct incise_haptic_page_user half;
-	bool whole = false;
+	bool whole = haptic_page_read(&owner->page.map->user, &half, sizeof(half));
 	const char *off;
 
-	for (int i = 0; i < HAPTIC_PAGE_TRIES && !whole; i++)
-		whole = incise_haptic_page_get(&owner->page.map->user, &half,
-					       sizeof(half));
 	tick->t_ns = incise_clock_now(owner->clock);
 	off = incise_haptic_gate(&owner->gate, whole ? &half : NULL, tick->t_ns,
 				 tick->force_N, tick->torque_N_mm);

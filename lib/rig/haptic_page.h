@@ -14,19 +14,21 @@
 #include <incise/haptic_page.h>
 
 #define HAPTIC_PAGE_LOCAL "local:"
-#define HAPTIC_PAGE_TRIES 3 /* of a torn part */
 
-/* The middle of the page's properties is that of struct incise_haptic_info; its samples end like one. */
-#define HAPTIC_PAGE_MIDDLE(part)                             \
-	(offsetof(struct part, deadman_s) + sizeof(double) - \
-	 offsetof(struct part, low_mm))
-_Static_assert(HAPTIC_PAGE_MIDDLE(incise_haptic_info) == 136 &&
-		       HAPTIC_PAGE_MIDDLE(incise_haptic_page_device) == 136,
-	       "14 numbers, 2 times, 1 number");
+/* The page's samples end like those of incise/haptic.h. */
 _Static_assert(sizeof(struct incise_haptic_sample) == 104 &&
 		       offsetof(struct incise_haptic_page_sample, t_ns) == 16 &&
 		       offsetof(struct incise_haptic_page_sample, reserved) == 16 + 104,
 	       "a sample behind seq and number");
+
+/* Copy a part; false: it was torn at each of three tries. */
+static inline bool haptic_page_read(const void *part, void *to, uint32_t bytes)
+{
+	for (int i = 0; i < 3; i++)
+		if (incise_haptic_page_get(part, to, bytes))
+			return true;
+	return false;
+}
 
 /* An open page, and the lock of this side; with fd -1 there is none. */
 struct haptic_page {

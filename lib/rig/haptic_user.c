@@ -18,18 +18,20 @@
 #define RATE_MOST_HZ 20000
 #define END_NS 10000000 /* between looks whether an owner has ended */
 #define END_LOOKS 1000
+#define REFUSED                                                                      \
+	"a sample was refused: not finite, of a later time, or with unknown flags; " \
+	"correct the owner"
 
 struct haptic_user {
 	struct incise_haptic base;
 	struct haptic_page page;
 	struct incise_clock *clock;
-	struct incise_haptic_page_device device;
+	struct incise_haptic_info device;
 	struct incise_haptic_page_owner owner; /* the last whole one */
 	struct incise_haptic_page_user own;    /* as written last */
 	uint64_t taken, lost;
 	bool reads;	   /* has read */
 	uint32_t flags;	   /* of the last sample */
-	bool refused;	   /* a sample */
 	int rc;		   /* negative errno that ended the stream */
 	const char *cause; /* in place of the owner's reason */
 	double period_ns;
@@ -38,14 +40,6 @@ struct haptic_user {
 static struct haptic_user *of_user(struct incise_haptic *haptic)
 {
 	return (struct haptic_user *)haptic;
-}
-
-static INCISE_REALTIME bool read_part(const void *part, void *to, uint32_t bytes)
-{
-	for (int i = 0; i < HAPTIC_PAGE_TRIES; i++)
-		if (incise_haptic_page_get(part, to, bytes))
-			return true;
-	return false;
 }
 
 /* --- the owner's half -------------------------------------------------------------------- */
@@ -77,7 +71,7 @@ static INCISE_REALTIME const char *judge_owner(
 static INCISE_REALTIME int look_at_owner(struct haptic_user *user)
 {
 	struct incise_haptic_page_owner owner;
-	bool whole = read_part(&user->page.map->owner, &owner, sizeof(owner));
+	bool whole = haptic_page_read(&user->page.map->owner, &owner, sizeof(owner));
 	int64_t now_ns = incise_clock_now(user->clock);
 	const char *wrong = whole ? judge_owner(&user->owner, &owner, now_ns) : NULL;
 
@@ -122,10 +116,11 @@ static INCISE_REALTIME bool take_slot(struct haptic_user *user,
 	bool velocity = user->device.features & INCISE_HAPTIC_PAGE_VELOCITY;
 	struct incise_haptic_page_sample from;
 
-	if (!read_part(slot, &from, sizeof(from)) || from.number != user->taken)
+	if (!haptic_page_read(slot, &from, sizeof(from)) || from.number != user->taken)
 		return false;
-	user->refused = !is_sample_good(&from, incise_clock_now(user->clock));
-	if (user->refused)
+	user->cause =
+		is_sample_good(&from, incise_clock_now(user->clock)) ? NULL : REFUSED;
+	if (user->cause)
 		return false;
 	memcpy(to, &from.t_ns, sizeof(*to));
 	for (int i = 0; i < 3 && !velocity; i++)
@@ -213,19 +208,7 @@ static void ask_owner(struct haptic_user *user, uint32_t wants)
 static void describe_page(const struct incise_haptic *haptic,
 			  struct incise_haptic_info *info)
 {
-	const struct incise_haptic_page_device *from =
-		&((const struct haptic_user *)haptic)->device;
-
-	*info = (struct incise_haptic_info){
-		.buttons = (int)from->buttons,
-		.measures_velocity = from->features & INCISE_HAPTIC_PAGE_VELOCITY,
-		.measures_orientation = from->features & INCISE_HAPTIC_PAGE_ORIENTATION,
-		.own_gravity = from->features & INCISE_HAPTIC_PAGE_GRAVITY,
-	};
-	memcpy(info->low_mm, from->low_mm, HAPTIC_PAGE_MIDDLE(incise_haptic_info));
-	snprintf(info->name, sizeof(info->name), "%s", from->name);
-	snprintf(info->filters, sizeof(info->filters), "%s", from->filters);
-	snprintf(info->note, sizeof(info->note), "%.299s", from->note);
+	*info = ((const struct haptic_user *)haptic)->device;
 }
 
 static uint64_t count_lost(const struct incise_haptic *haptic)
@@ -245,12 +228,6 @@ static int tell_cause(struct incise_haptic *haptic, char *text, size_t size)
 	control_characters_hide(reason);
 	if (user->cause)
 		return snprintf(text, size, "%s: %s", user->device.name, user->cause);
-	if (user->refused)
-		return snprintf(
-			text, size,
-			"%s: a sample was refused: not finite, of a later time, or "
-			"with unknown flags; correct the owner",
-			user->device.name);
 	return snprintf(text, size, "%s", user->rc || user->flags ? reason : "");
 }
 
@@ -284,7 +261,7 @@ static bool take_text(char *text, size_t size)
 }
 
 /* Whether the device part makes sense; it is a copy, which the owner cannot change. */
-static bool is_device_good(struct incise_haptic_page_device *device)
+static bool is_device_good(struct incise_haptic_info *device)
 {
 	const double *values = device->low_mm;
 	bool good = take_text(device->device, sizeof(device->device)) &&

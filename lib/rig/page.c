@@ -56,6 +56,15 @@ void incise_page_put_status(struct incise_stepper_motor_status *slot,
 	incise_haptic_page_put(slot, status, sizeof(*status));
 }
 
+/* False: it was being written at each try. */
+static INCISE_REALTIME bool get_whole(const void *slot, void *copy, uint32_t bytes)
+{
+	for (int i = 0; i < TRIES; i++)
+		if (incise_haptic_page_get(slot, copy, bytes))
+			return true;
+	return false;
+}
+
 static bool sensible(const struct incise_stepper_motor_status *status)
 {
 	const int64_t most = 2LL * INCISE_PROFILE_POSITION_MAX;
@@ -73,15 +82,12 @@ int incise_page_get_status(const struct incise_stepper_motor_status *slot,
 {
 	struct incise_stepper_motor_status status;
 
-	for (int i = 0; i < TRIES; i++) {
-		if (!incise_haptic_page_get(slot, &status, sizeof(status)))
-			continue;
-		if (!sensible(&status))
-			return -EIO;
-		*copy = status;
-		return 0;
-	}
-	return -EAGAIN;
+	if (!get_whole(slot, &status, sizeof(status)))
+		return -EAGAIN;
+	if (!sensible(&status))
+		return -EIO;
+	*copy = status;
+	return 0;
 }
 
 static bool plan_sensible(const struct incise_stepper_plan_status *status)
@@ -99,13 +105,10 @@ int incise_page_get_plan(const struct incise_stepper_plan_status *slot,
 {
 	struct incise_stepper_plan_status status;
 
-	for (int i = 0; i < TRIES; i++) {
-		if (!incise_haptic_page_get(slot, &status, sizeof(status)))
-			continue;
-		if (!plan_sensible(&status))
-			return -EIO;
-		*copy = status;
-		return 0;
-	}
-	return -EAGAIN;
+	if (!get_whole(slot, &status, sizeof(status)))
+		return -EAGAIN;
+	if (!plan_sensible(&status))
+		return -EIO;
+	*copy = status;
+	return 0;
 }

@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <incise/rig.h>
+#include "../base/vector.h"
 #include "../sim/sim.h"
 #include "backends.h"
 #include "encoder.h"
@@ -210,7 +211,7 @@ static int rig_haptic(struct incise_rig *rig, const struct incise_rig_plan *plan
 	if (!rig->stylus)
 		return incise_error_set(err, ENOMEM, "%s: %s", plan->haptic_where,
 					strerror(ENOMEM));
-	rig->tracker = incise_stylus_tracker(rig->stylus);
+	rig->tracker = &rig->stylus->tracker;
 	return 0;
 }
 
@@ -301,7 +302,7 @@ void incise_rig_close(struct incise_rig *rig)
 	}
 	for (int slot = 0; slot < N_SLOTS; slot++)
 		incise_backend_unload(&rig->loaded[slot]);
-	incise_stylus_free(rig->stylus);
+	free(rig->stylus);
 	incise_haptic_close(rig->haptic);
 	incise_sim_free(rig->sim);
 	incise_clock_free(rig->clock);
@@ -361,8 +362,10 @@ struct incise_stylus *incise_rig_stylus(struct incise_rig *rig)
 void incise_rig_haptic_place(struct incise_rig *rig, const double turn[4],
 			     const double origin_mm[3])
 {
-	if (rig->stylus)
-		incise_stylus_place(rig->stylus, turn, origin_mm);
+	if (!rig->stylus)
+		return;
+	memcpy(rig->stylus->setup.turn, turn, sizeof(rig->stylus->setup.turn));
+	v3_copy(rig->stylus->setup.origin_mm, origin_mm);
 }
 
 void incise_rig_haptic_assume(struct incise_rig *rig, int64_t latency_ns)

@@ -598,20 +598,16 @@ static bool virtual_camera(const config_setting_t *root)
 	       is_virtual(device);
 }
 
-/* Whether a rig with a haptic device opens it for these devices; then it is the tracker and the stepper. */
-static bool takes_haptic(struct incise_rig_plan *plan)
-{
-	const unsigned int both = INCISE_RIG_TRACKER | INCISE_RIG_STEPPER;
-	bool takes = plan->devices & (both | INCISE_RIG_HAPTIC);
-
-	plan->devices &= ~(both | INCISE_RIG_HAPTIC);
-	return takes;
-}
-
+/* It is the tracker and the stepper of its rig, and opened for these, too. */
 static int keep_haptic(struct incise_rig_plan *plan, const char *device,
 		       struct incise_error *err)
 {
-	if (!takes_haptic(plan))
+	const unsigned int all =
+		INCISE_RIG_TRACKER | INCISE_RIG_STEPPER | INCISE_RIG_HAPTIC;
+	bool wanted = plan->devices & all;
+
+	plan->devices &= ~all;
+	if (!wanted)
 		return 0;
 	if (plan->watch)
 		return incise_error_set(err, EOPNOTSUPP,
@@ -664,14 +660,13 @@ static int plan_haptic(struct incise_rig_plan *plan, const config_setting_t *roo
 	const config_setting_t *setting = config_setting_get_member(root, "haptic");
 	const char *device = setting ? config_setting_get_string(setting) : NULL;
 
+	if (!setting && plan->devices & INCISE_RIG_HAPTIC)
+		return incise_error_set(err, ENODEV,
+					"%.200s: haptic: missing, but required; add "
+					"`haptic = \"BACKEND:ARGUMENTS\";`",
+					path);
 	if (!setting)
-		return plan->devices & INCISE_RIG_HAPTIC
-			       ? incise_error_set(
-					 err, ENODEV,
-					 "%.200s: haptic: missing, but required; add "
-					 "`haptic = \"BACKEND:ARGUMENTS\";`",
-					 path)
-			       : 0;
+		return 0;
 	if (!device || !strchr(device, ':'))
 		return incise_conf_error(
 			setting, NULL, path, err,

@@ -19,24 +19,6 @@
 #define LATE_NS 500000
 #define AGE_TICKS 64
 
-struct incise_stylus {
-	struct incise_tracker tracker; /* the poses' face */
-	struct incise_haptic *haptic;
-	struct incise_haptic_info info;
-	struct incise_haptic_setup setup;
-	struct incise_haptic_sample last; /* device's frame */
-	bool seen;
-	double turn[4], origin_mm[3];
-	double held_mm
-		[3]; /* in the scene, where the tool was as the clutch was pressed */
-	bool clutched;
-	enum incise_haptic_off off;
-	int64_t latency_ns; /* assumed */
-	double age_ns;	    /* mean of the last ticks */
-	struct incise_haptic_ages ages;
-	double age_sum_ms, age_sum2_ms2;
-};
-
 static struct incise_stylus *of_stylus(struct incise_tracker *tracker)
 {
 	return (struct incise_stylus *)tracker;
@@ -61,14 +43,6 @@ static INCISE_REALTIME bool is_pressed(const struct incise_haptic_sample *sample
 
 /* --- poses --------------------------------------------------------------------------- */
 
-static INCISE_REALTIME void place_tool(struct incise_stylus *stylus,
-				       const struct incise_haptic_sample *sample,
-				       double position_mm[3])
-{
-	v3_rotate(position_mm, stylus->turn, sample->position_mm);
-	v3_add(position_mm, position_mm, 1, stylus->origin_mm);
-}
-
 /* While pressed the tool stays; let go it is where it stayed. */
 static INCISE_REALTIME void use_clutch(struct incise_stylus *stylus,
 				       const struct incise_haptic_sample *sample,
@@ -78,11 +52,11 @@ static INCISE_REALTIME void use_clutch(struct incise_stylus *stylus,
 
 	if (pressed && !stylus->clutched)
 		v3_copy(stylus->held_mm, position_mm);
-	if (pressed || stylus->clutched)
+	if (pressed || stylus->clutched) {
 		for (int i = 0; i < 3; i++)
-			stylus->origin_mm[i] += stylus->held_mm[i] - position_mm[i];
-	if (pressed || stylus->clutched)
+			stylus->setup.origin_mm[i] += stylus->held_mm[i] - position_mm[i];
 		v3_copy(position_mm, stylus->held_mm);
+	}
 	stylus->clutched = pressed;
 }
 
@@ -114,13 +88,14 @@ static INCISE_REALTIME void place_sample(struct incise_stylus *stylus,
 		to->status = '~';
 		return;
 	}
-	place_tool(stylus, from, to->position_mm);
+	v3_rotate(to->position_mm, stylus->setup.turn, from->position_mm);
+	v3_add(to->position_mm, to->position_mm, 1, stylus->setup.origin_mm);
 	/* Such a place is not the handle's: it moves nothing, nor the frame by the clutch. */
 	if (from->flags & (INCISE_HAPTIC_NOT_READY | INCISE_HAPTIC_CHANGED))
 		to->status = '!';
 	else
 		use_clutch(stylus, from, to->position_mm);
-	multiply_turns(to->quaternion, stylus->turn, from->quaternion);
+	multiply_turns(to->quaternion, stylus->setup.turn, from->quaternion);
 	stylus->last = *from;
 	stylus->seen = true;
 }
@@ -208,14 +183,10 @@ static INCISE_REALTIME int64_t assumed_ns(const struct incise_stylus *stylus)
 
 static INCISE_REALTIME void count_age(struct incise_stylus *stylus, int64_t now_ns)
 {
-	struct incise_haptic_ages *ages = &stylus->ages;
-	double age_ns = (double)(now_ns - stylus->last.t_ns);
+	double age_ns =
+		(double)incise_haptic_ages_add(&stylus->ages, stylus->last.t_ns, now_ns);
 
 	stylus->age_ns += (age_ns - stylus->age_ns) / AGE_TICKS;
-	ages->ticks++;
-	stylus->age_sum_ms += age_ns * 1e-6;
-	stylus->age_sum2_ms2 += age_ns * age_ns * 1e-12;
-	ages->most_ms = fmax(ages->most_ms, age_ns * 1e-6);
 }
 
 /* The reason to be off now, wherever the handle is. */
@@ -269,8 +240,8 @@ const char *incise_haptic_off_text(enum incise_haptic_off off)
 
 int incise_stylus_push(struct incise_stylus *stylus, const double force_N[3])
 {
-	const double back[4] = {stylus->turn[0], -stylus->turn[1], -stylus->turn[2],
-				-stylus->turn[3]};
+	const double *turn = stylus->setup.turn;
+	const double back[4] = {turn[0], -turn[1], -turn[2], -turn[3]};
 	double own_N[3];
 
 	v3_rotate(own_N, back, force_N);
@@ -293,37 +264,13 @@ struct incise_stylus *incise_stylus_new(struct incise_haptic *haptic,
 	stylus->off = INCISE_HAPTIC_OUTSIDE;
 	stylus->latency_ns = stylus->info.latency_ns;
 	stylus->age_ns = (double)assumed_ns(stylus);
-	incise_stylus_place(stylus, setup->turn, setup->origin_mm);
 	return stylus;
-}
-
-void incise_stylus_free(struct incise_stylus *stylus)
-{
-	free(stylus);
-}
-
-struct incise_tracker *incise_stylus_tracker(struct incise_stylus *stylus)
-{
-	return &stylus->tracker;
-}
-
-const struct incise_haptic_setup *incise_stylus_setup(const struct incise_stylus *stylus)
-{
-	return &stylus->setup;
-}
-
-void incise_stylus_place(struct incise_stylus *stylus, const double turn[4],
-			 const double origin_mm[3])
-{
-	memcpy(stylus->turn, turn, sizeof(stylus->turn));
-	v3_copy(stylus->origin_mm, origin_mm);
 }
 
 void incise_stylus_assume(struct incise_stylus *stylus, int64_t latency_ns)
 {
 	stylus->latency_ns = latency_ns;
 	stylus->ages = (struct incise_haptic_ages){0};
-	stylus->age_sum_ms = stylus->age_sum2_ms2 = 0;
 }
 
 void incise_stylus_ages(const struct incise_stylus *stylus,
@@ -332,9 +279,4 @@ void incise_stylus_ages(const struct incise_stylus *stylus,
 	*ages = stylus->ages;
 	ages->lost = incise_haptic_lost(stylus->haptic);
 	ages->assumed_ms = (double)assumed_ns(stylus) * 1e-6;
-	if (!ages->ticks)
-		return;
-	ages->mean_ms = stylus->age_sum_ms / (double)ages->ticks;
-	ages->jitter_ms = sqrt(fmax(0, stylus->age_sum2_ms2 / (double)ages->ticks -
-					       ages->mean_ms * ages->mean_ms));
 }

@@ -15,15 +15,26 @@
 #include <incise/backend.h>
 #include <incise/rig.h>
 
-struct incise_stylus;
+struct incise_stylus {
+	/* Its poses: time, period and latency are the device's. */
+	struct incise_tracker tracker;
+	struct incise_haptic *haptic;
+	struct incise_haptic_info info;
+	struct incise_haptic_setup setup; /* turn and origin are those of now */
+	struct incise_haptic_sample last; /* device's frame */
+	bool seen;
+	double held_mm
+		[3]; /* in the scene, where the tool was as the clutch was pressed */
+	bool clutched;
+	enum incise_haptic_off off;
+	int64_t latency_ns; /* assumed */
+	double age_ns;	    /* mean of the last ticks */
+	struct incise_haptic_ages ages;
+};
 
-/* NULL: no memory. @haptic must outlive it. */
+/* NULL: no memory; free(3). @haptic must outlive it. */
 struct incise_stylus *incise_stylus_new(struct incise_haptic *haptic,
 					const struct incise_haptic_setup *setup);
-void incise_stylus_free(struct incise_stylus *stylus);
-
-/* Its poses: time, period and latency are the device's. Owned by the stylus. */
-struct incise_tracker *incise_stylus_tracker(struct incise_stylus *stylus);
 
 /* Push with a force in the scene's frame. 0 or a negative errno. */
 int incise_stylus_push(struct incise_stylus *stylus,
@@ -33,14 +44,8 @@ int incise_stylus_push(struct incise_stylus *stylus,
 enum incise_haptic_off incise_stylus_off(struct incise_stylus *stylus,
 					 int64_t now_ns) INCISE_REALTIME;
 
-const struct incise_haptic_setup *incise_stylus_setup(const struct incise_stylus *stylus);
-
 /* Another latency than the device's nominal one, for plans to come. */
 void incise_stylus_assume(struct incise_stylus *stylus, int64_t latency_ns);
-
-/* Place the device's frame in the scene. */
-void incise_stylus_place(struct incise_stylus *stylus, const double turn[4],
-			 const double origin_mm[3]);
 
 void incise_stylus_ages(const struct incise_stylus *stylus,
 			struct incise_haptic_ages *ages);

@@ -360,21 +360,16 @@ struct incise_plan *incise_plan_new_fed_on(const struct incise_scene *scene,
 	struct plan_place place;
 
 	if (!(tracker->rate_hz > 0) || !isfinite(tracker->rate_hz) ||
-	    tracker->latency_ns < 0) {
-		incise_error_set(err, EINVAL,
-				 "a tracker of %g Hz and %g ms: expected a rate above "
-				 "0 and a latency of at least 0",
-				 tracker->rate_hz, (double)tracker->latency_ns * 1e-6);
-		errno = EINVAL;
-		return NULL;
-	}
+	    tracker->latency_ns < 0)
+		return INCISE_ERROR_NULL(
+			err, EINVAL,
+			"a tracker of %g Hz and %g ms: expected a rate above 0 and a "
+			"latency of at least 0",
+			tracker->rate_hz, (double)tracker->latency_ns * 1e-6);
 	v3_copy(place.point_mm, point_mm);
-	if (!v3_finite(point_mm) || !v3_unit(place.normal, normal, 0)) {
-		incise_error_set(err, EINVAL,
-				 "the tissue's plane has no point or no normal");
-		errno = EINVAL;
-		return NULL;
-	}
+	if (!v3_finite(point_mm) || !v3_unit(place.normal, normal, 0))
+		return INCISE_ERROR_NULL(err, EINVAL,
+					 "the tissue's plane has no point or no normal");
 	return new_plan(scene, NULL, *tracker, &place, &hold, err);
 }
 
@@ -383,9 +378,9 @@ struct incise_plan *incise_plan_new_held(const struct incise_scene *scene,
 					 struct incise_host_hold *hold,
 					 struct incise_error *err)
 {
-	struct incise_plan *plan;
+	struct incise_plan *plan =
+		new_plan(scene, NULL, *tracker, &floor_place, hold, err);
 
-	plan = new_plan(scene, NULL, *tracker, &floor_place, hold, err);
 	if (plan || !hold->fit || !(hold->gain > 0))
 		return plan;
 	plan = new_plan(scene, NULL, *tracker, &floor_place, hold, err);

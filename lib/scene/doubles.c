@@ -69,7 +69,7 @@ static void set_model(const struct incise_plan *plan, struct incise_double_plan 
 /* A haptic device starts more slowly. */
 static double ramp_ms(const struct incise_plan *plan)
 {
-	double own_s = plan->stylus ? incise_stylus_setup(plan->stylus)->start_s : 0;
+	double own_s = plan->stylus ? plan->stylus->setup.start_s : 0;
 
 	return fmax(plan->scene->limits.ramp_ms, own_s * 1e3);
 }

@@ -330,7 +330,7 @@ static void sim_info(const struct incise_haptic *haptic, struct incise_haptic_in
 			llround((config->force_latency_ms + config->motor_ms) * 1e6),
 		.deadman_s = config->deadman_s,
 		.buttons = BUTTONS,
-		.measures_velocity = true,
+		.features = INCISE_HAPTIC_PAGE_VELOCITY,
 	};
 	for (int i = 0; i < 3; i++) {
 		info->high_mm[i] = config->workspace_mm / 2;

@@ -74,17 +74,6 @@ int incise_cut_place(double at_mm)
 	return (int)fmin(fmax(place, 0), INCISE_CUT_PLACES - 1);
 }
 
-double incise_incision_length_mm(const struct incise_incision *incision, int number)
-{
-	double length_mm = 0;
-
-	for (int i = 0; i < incision->cuts->n; i++)
-		if (incision->cuts->cut[i].incision == number)
-			length_mm += incision->cuts->cut[i].to_mm -
-				     incision->cuts->cut[i].from_mm;
-	return length_mm;
-}
-
 void incise_incision_opening(const struct incise_incision *incision,
 			     enum incise_tool tool, const double at_mm[3],
 			     struct incise_opening *opening)

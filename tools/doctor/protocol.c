@@ -134,6 +134,7 @@ json_t *protocol_json(const struct protocol *protocol)
 			 (double)info->latency_ns * 1e-6, "age_median_ms",
 			 protocol->age_median_ms, "peak_N", info->peak_N, "continuous_N",
 			 info->continuous_N, "deadman_s", info->deadman_s, "own_gravity",
-			 info->own_gravity, "filters", json_text(info->filters), "note",
-			 json_text(info->note), "protocol", list);
+			 !!(info->features & INCISE_HAPTIC_PAGE_GRAVITY), "filters",
+			 json_text(info->filters), "note", json_text(info->note),
+			 "protocol", list);
 }

@@ -19,8 +19,8 @@ static double measure_age(struct haptic *haptic, const struct incise_tracker_inf
 	int64_t period_ns = llrint(INCISE_NS_PER_S / haptic->loop.rate_hz);
 	int64_t now_ns = incise_clock_now(clock), newest_ns = 0;
 	struct incise_tracker_sample samples[32];
-	int ticks = (int)(AGES_S * haptic->loop.rate_hz), seen = 0, n;
-	double sum_ns = 0;
+	int ticks = (int)(AGES_S * haptic->loop.rate_hz), n;
+	struct incise_haptic_ages ages = {0};
 	char cause[300];
 
 	for (int i = 0; i < ticks && !cli_stop; i++) {
@@ -33,10 +33,10 @@ static double measure_age(struct haptic *haptic, const struct incise_tracker_inf
 		}
 		if (n)
 			newest_ns = samples[n - 1].t_ns - info->latency_ns;
-		seen += !!newest_ns;
-		sum_ns += newest_ns ? (double)(now_ns - newest_ns) : 0;
+		if (newest_ns)
+			incise_haptic_ages_add(&ages, newest_ns, now_ns);
 	}
-	return seen ? sum_ns * 1e-6 / seen : NAN;
+	return ages.ticks ? ages.mean_ms : NAN;
 }
 
 /* A plan must not assume younger poses than there are: the check is made with their real age. */

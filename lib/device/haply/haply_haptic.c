@@ -460,9 +460,9 @@ static void fill_info(struct haply *h, double rate_hz)
 	info->latency_ns = info->force_latency_ns = ANSWER_NS;
 	info->deadman_s = DEADMAN_S;
 	info->buttons = *h->grip ? HAPLY_BUTTONS : 0;
-	info->measures_velocity = true;
-	info->measures_orientation = *h->grip;
-	info->own_gravity = h->frame.own_gravity;
+	info->features = INCISE_HAPTIC_PAGE_VELOCITY |
+			 (*h->grip ? INCISE_HAPTIC_PAGE_ORIENTATION : 0) |
+			 (h->frame.own_gravity ? INCISE_HAPTIC_PAGE_GRAVITY : 0);
 	snprintf(info->filters, sizeof(info->filters), "%s", h->frame.filters);
 	if (!h->events.is_open)
 		snprintf(info->note, sizeof(info->note),

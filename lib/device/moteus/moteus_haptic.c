@@ -450,7 +450,7 @@ static void get_moteus_info(const struct incise_haptic *haptic,
 	info->latency_ns = (int64_t)(1e9 / m->rate_hz);
 	info->force_latency_ns = FORCE_LATENCY_NS;
 	info->deadman_s = WATCHDOG_MS * 1e-3;
-	info->measures_velocity = true;
+	info->features = INCISE_HAPTIC_PAGE_VELOCITY;
 	snprintf(info->note, sizeof(info->note),
 		 "without commands for %d ms its motors follow servo.timeout_mode: 12, "
 		 "the default, damps; 0 lets go",

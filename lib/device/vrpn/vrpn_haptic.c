@@ -77,9 +77,9 @@ static void haptic_info(const struct incise_haptic *haptic,
 	*info = (struct incise_haptic_info){
 		.rate_hz = device->rate_hz,
 		.latency_ns = device->latency_ns,
-		.buttons = device->buttons,
-		.measures_velocity = device->measures_velocity,
-		.measures_orientation = true,
+		.buttons = (uint32_t)device->buttons,
+		.features = INCISE_HAPTIC_PAGE_ORIENTATION |
+			    (device->measures_velocity ? INCISE_HAPTIC_PAGE_VELOCITY : 0),
 	};
 	snprintf(info->name, sizeof(info->name), "%s", device->name);
 	snprintf(

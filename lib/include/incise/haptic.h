@@ -21,6 +21,7 @@
 #include <incise/clock.h>
 #include <incise/error.h>
 #include <incise/export.h>
+#include <incise/haptic_page.h> /* struct incise_haptic_info */
 
 INCISE_BEGIN_DECLS
 
@@ -50,29 +51,6 @@ struct incise_haptic_sample {
 	double quaternion[4];
 	uint32_t buttons; /**< pressed ones, the first is bit 0 */
 	uint32_t flags;	  /**< incise_haptic_flag bits */
-};
-
-/** Properties of a device; 0 where a backend does not know a value. */
-struct incise_haptic_info {
-	char name[64];		      /**< model and serial number */
-	double low_mm[3], high_mm[3]; /**< workspace, device's frame */
-	double peak_N;		      /**< largest force */
-	double continuous_N;	      /**< force that it stands for ever */
-	double torque_N_mm;	      /**< largest torque; 0: it takes none */
-	double mass_kg;		      /**< that the hand feels, at the handle */
-	double damping_N_s_mm, coulomb_N;
-	double encoder_mm;	  /**< resolution of the position */
-	double rate_hz;		  /**< samples, and forces, per second */
-	int64_t latency_ns;	  /**< from the acquisition to incise_haptic_read() */
-	int64_t force_latency_ns; /**< from incise_haptic_push() to the force */
-	/** It gives no force so long after the last one, without its owner; 0: it keeps it. */
-	double deadman_s;
-	int buttons; /**< number */
-	bool measures_velocity, measures_orientation;
-	bool own_gravity; /**< it compensates its own weight */
-	/** Its own settings that change how a force feels, for people and recordings; or "". */
-	char filters[200];
-	char note[300]; /**< a setting that its user should check; or "" */
 };
 
 /** Settings of a haptic device; the group `haptic_setup` of rig.conf. */
@@ -118,6 +96,10 @@ struct incise_haptic_ages {
 	double assumed_ms;		    /**< by the plan: latency and period */
 	double mean_ms, most_ms, jitter_ms; /**< jitter: standard deviation */
 };
+
+/** Count the age at @p now_ns of a sample of @p t_ns. Returns the age, ns. */
+INCISE_API int64_t incise_haptic_ages_add(struct incise_haptic_ages *ages, int64_t t_ns,
+					  int64_t now_ns) INCISE_REALTIME;
 
 struct incise_haptic;
 

@@ -60,21 +60,27 @@ enum incise_haptic_page_feature {
 	INCISE_HAPTIC_PAGE_GRAVITY = 4,	    /**< it compensates its own weight */
 };
 
-/** Constant properties, as struct incise_haptic_info; 0: unknown. Texts end with a 0. */
-struct incise_haptic_page_device {
-	char device[256]; /**< as rig.conf names it: "local:NAME" */
-	char name[64];	  /**< model and serial number */
-	char filters[200], note[304];
-	double low_mm[3], high_mm[3]; /**< workspace */
-	double peak_N, continuous_N, torque_N_mm;
-	double mass_kg, damping_N_s_mm, coulomb_N;
-	double encoder_mm;
-	double rate_hz; /**< 1 … 20000; never 0 */
-	int64_t latency_ns, force_latency_ns;
+/** Properties of a device, which do not change; 0 where one is not known. Texts end with a 0. */
+struct incise_haptic_info {
+	char device[256];  /**< as rig.conf names it; in a page only */
+	char name[64];	   /**< model and serial number */
+	char filters[200]; /**< its own settings that change how a force feels; or "" */
+	char note[304];	   /**< a setting that its user should check; or "" */
+	double low_mm[3], high_mm[3]; /**< workspace, device's frame */
+	double peak_N;		      /**< largest force */
+	double continuous_N;	      /**< force that it stands for ever */
+	double torque_N_mm;	      /**< largest torque; 0: it takes none */
+	double mass_kg;		      /**< that the hand feels, at the handle */
+	double damping_N_s_mm, coulomb_N;
+	double encoder_mm; /**< resolution of the position */
+	double rate_hz; /**< samples, and forces, per second; in a page 1 … 20000, never 0 */
+	int64_t latency_ns;	  /**< from the acquisition to the reader */
+	int64_t force_latency_ns; /**< from the request to the force */
+	/** It gives no force so long after the last one, without its owner; 0: it keeps it. */
 	double deadman_s;
 	uint32_t buttons;  /**< number, 0 … 32 */
 	uint32_t features; /**< incise_haptic_page_feature bits */
-	uint32_t settings; /**< CRC of those of an owner of incise; else 0 */
+	uint32_t settings; /**< CRC of those of an owner of incise, in a page; else 0 */
 	uint32_t reserved[13];
 };
 
@@ -134,7 +140,7 @@ struct incise_haptic_page_sample {
 /** The page. */
 struct incise_haptic_page {
 	struct incise_haptic_page_head head;				/**< at 0 */
-	struct incise_haptic_page_device device;			/**< at 128 */
+	struct incise_haptic_info device;				/**< at 128 */
 	struct incise_haptic_page_owner owner;				/**< at 1152 */
 	struct incise_haptic_page_user user;				/**< at 1472 */
 	struct incise_haptic_page_sample ring[INCISE_HAPTIC_PAGE_RING]; /**< at 1600 */

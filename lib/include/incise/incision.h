@@ -124,9 +124,5 @@ INCISE_API void incise_incision_opening(const struct incise_incision *incision,
 					enum incise_tool tool, const double at_mm[3],
 					struct incise_opening *opening) INCISE_REALTIME;
 
-/** Length of all cuts of an incision, by number; mm. */
-INCISE_API double incise_incision_length_mm(const struct incise_incision *incision,
-					    int number) INCISE_REALTIME;
-
 INCISE_END_DECLS
 #endif

@@ -517,10 +517,12 @@ int incise_prove(const char *path, const struct incise_prove_options *options,
 	int rc;
 
 	*proof = (struct incise_proof){.n = 0};
-	if (options->level == INCISE_PROVE_TABLES)
-		return incise_verify_tables(path, &prove.watch, &proof->report, err);
-	if (options->level == INCISE_PROVE_ROWS)
-		return incise_verify_rows(path, &prove.watch, &proof->report, err);
+	if (options->level == INCISE_PROVE_TABLES || options->level == INCISE_PROVE_ROWS)
+		return incise_verify_level(path,
+					   options->level == INCISE_PROVE_ROWS
+						   ? INCISE_VERIFY_ROWS
+						   : INCISE_VERIFY_TABLES,
+					   &prove.watch, &proof->report, err);
 	rc = read_trust(&prove);
 	if (!rc)
 		rc = find_seals(&prove);

@@ -512,9 +512,9 @@ static int verify_members(const struct incise_session *session,
 	return rc;
 }
 
-static int verify_it(const char *path, const struct incise_verify_watch *watch,
-		     enum incise_verify_level level, struct incise_verify_report *report,
-		     struct incise_error *err)
+int incise_verify_level(const char *path, enum incise_verify_level level,
+			const struct incise_verify_watch *watch,
+			struct incise_verify_report *report, struct incise_error *err)
 {
 	struct incise_recording *recording =
 		incise_recording_open_as(path, INCISE_RECORDING_ORIGINAL, err);
@@ -534,19 +534,7 @@ static int verify_it(const char *path, const struct incise_verify_watch *watch,
 int incise_verify(const char *path, const struct incise_verify_watch *watch,
 		  struct incise_verify_report *report, struct incise_error *err)
 {
-	return verify_it(path, watch, INCISE_VERIFY_ALL, report, err);
-}
-
-int incise_verify_rows(const char *path, const struct incise_verify_watch *watch,
-		       struct incise_verify_report *report, struct incise_error *err)
-{
-	return verify_it(path, watch, INCISE_VERIFY_ROWS, report, err);
-}
-
-int incise_verify_tables(const char *path, const struct incise_verify_watch *watch,
-			 struct incise_verify_report *report, struct incise_error *err)
-{
-	return verify_it(path, watch, INCISE_VERIFY_TABLES, report, err);
+	return incise_verify_level(path, INCISE_VERIFY_ALL, watch, report, err);
 }
 
 int incise_seal_compare(const char *path, const char *text, size_t length,

@@ -45,11 +45,10 @@ struct incise_verification {
 	struct incise_seal rows_seal;
 };
 
-/* As incise_verify(), without what INCISE_VERIFY_ROWS and INCISE_VERIFY_TABLES leave out. */
-int incise_verify_rows(const char *path, const struct incise_verify_watch *watch,
-		       struct incise_verify_report *report, struct incise_error *err);
-int incise_verify_tables(const char *path, const struct incise_verify_watch *watch,
-			 struct incise_verify_report *report, struct incise_error *err);
+/* As incise_verify(), without what a level leaves out. */
+int incise_verify_level(const char *path, enum incise_verify_level level,
+			const struct incise_verify_watch *watch,
+			struct incise_verify_report *report, struct incise_error *err);
 
 /*
  * Verify a stream, INCISE_LEDGER_*; @rows and @lost are the recorder's counts. Fills @out. Returns 0 or

@@ -810,13 +810,8 @@ int incise_recorder_put_force(struct incise_recorder *rec,
 
 static bool finite_record(const struct incise_tracker_sample *sample)
 {
-	for (int i = 0; i < 3; i++)
-		if (!isfinite(sample->position_mm[i]))
-			return false;
-	for (int i = 0; i < 4; i++)
-		if (!isfinite(sample->quaternion[i]))
-			return false;
-	return true;
+	return v3_finite(sample->position_mm) && v3_finite(sample->quaternion) &&
+	       isfinite(sample->quaternion[3]);
 }
 
 int incise_recorder_put_tracker(struct incise_recorder *rec,

@@ -189,8 +189,10 @@ TEST(each_format_gives_poses_and_takes_forces)
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		open_device(cases[i].options);
-		assert_int_equal(haptic->info.measures_orientation, cases[i].grip);
-		assert_true(haptic->info.own_gravity);
+		assert_int_equal(!!(haptic->info.features &
+				    INCISE_HAPTIC_PAGE_ORIENTATION),
+				 cases[i].grip);
+		assert_true(haptic->info.features & INCISE_HAPTIC_PAGE_GRAVITY);
 		assert_non_null(strstr(haptic->info.name, "049D"));
 		assert_non_null(strstr(haptic->info.filters, "scaling_factor:1.0"));
 		sample = wait_flags(0);

@@ -170,7 +170,8 @@ TEST(properties, start, end)
 	/* |dual| of x, y, z': 1, √2, √2; 20 π N each */
 	assert_float_equal(info.peak_N, 20 * M_PI / sqrt(2), 1e-9);
 	assert_true(info.deadman_s == WATCHDOG_MS * 1e-3 && info.rate_hz == 1000);
-	assert_true(info.measures_velocity && info.latency_ns == DRIVES_MS);
+	assert_true(info.features == INCISE_HAPTIC_PAGE_VELOCITY &&
+		    info.latency_ns == DRIVES_MS);
 	assert_string_equal(info.name, "3 moteus on can0");
 	/* the test of the watchdogs had no torque, and left them stopped */
 	for (int i = 0; i < 3; i++)

@@ -49,7 +49,7 @@ static int open_page(void **state)
 	snprintf(device, sizeof(device), "local:unit-%d", (int)getpid());
 	clock_ = incise_clock_new_simulated(START_NS);
 	assert_int_equal(incise_haptic_page_new(&page, device, "test", &err), 0);
-	page.map->device = (struct incise_haptic_page_device){
+	page.map->device = (struct incise_haptic_info){
 		.name = "unit", .rate_hz = 1000, .peak_N = 3, .features = 1};
 	strcpy(page.map->device.device, device);
 	half = (struct incise_haptic_page_owner){.state = INCISE_HAPTIC_PAGE_READY};
@@ -85,7 +85,8 @@ TEST(samples_come_through_once_and_a_force_goes_back, open_page, close_page)
 	succeeds(attach());
 	incise_haptic_info(user, &info);
 	assert_string_equal(info.name, "unit");
-	assert_true(info.peak_N == 3 && info.rate_hz == 1000 && info.measures_velocity);
+	assert_true(info.peak_N == 3 && info.rate_hz == 1000 &&
+		    info.features == INCISE_HAPTIC_PAGE_VELOCITY);
 	assert_int_equal(incise_haptic_read(user, samples, 40), 0);
 	for (int i = 0; i < 5; i++)
 		put_sample(i);

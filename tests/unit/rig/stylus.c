@@ -54,7 +54,7 @@ static int64_t now_ns;
 
 static void make_stub(const struct incise_haptic_setup *setup)
 {
-	incise_stylus_free(stylus);
+	free(stylus);
 	stub = (struct stub){
 		.haptic = {.ops = &ops,
 			   .info = {.name = "stub",
@@ -73,7 +73,7 @@ static void make_stub(const struct incise_haptic_setup *setup)
 static enum incise_haptic_off step(int64_t age_ns, struct incise_tracker_sample *pose)
 {
 	struct incise_tracker_sample poses[4];
-	struct incise_tracker *tracker = incise_stylus_tracker(stylus);
+	struct incise_tracker *tracker = &stylus->tracker;
 
 	now_ns += MS;
 	stub.sample.t_ns = now_ns - age_ns;
@@ -112,7 +112,7 @@ TEST(poses_and_forces_turn_with_the_frame)
 	assert_float_equal(stub.force_N[0], 2, 1e-12);
 	assert_float_equal(stub.force_N[1], 0, 1e-12);
 	assert_float_equal(stub.force_N[2], 1, 1e-12);
-	tracker = incise_stylus_tracker(stylus);
+	tracker = &stylus->tracker;
 	tracker->ops->info(tracker, &info);
 	assert_string_equal(info.haptic->name, "stub");
 	assert_true(info.rate_hz == 1000 && info.latency_ns == MS);
@@ -238,6 +238,6 @@ TEST(wrong_samples_are_flagged)
 		assert_int_equal(incise_stylus_off(stylus, now_ns) == INCISE_HAPTIC_ON,
 				 row[i].status == ' ');
 	}
-	incise_stylus_free(stylus);
+	free(stylus);
 	stylus = NULL;
 }

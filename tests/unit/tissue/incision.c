@@ -135,7 +135,15 @@ static void get_fixed(int i, struct incise_cut *cut)
 
 static double length_double(int number)
 {
-	return incise_incision_length_mm(in_double, number);
+	double length_mm = 0;
+
+	for (int i = 0; i < cuts_double(); i++) {
+		const struct incise_cut *cut = incise_incision_cut(in_double, i);
+
+		if (cut->incision == number)
+			length_mm += cut->to_mm - cut->from_mm;
+	}
+	return length_mm;
 }
 
 static double length_fixed(int number)
