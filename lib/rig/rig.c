@@ -358,10 +358,12 @@ struct incise_stylus *incise_rig_stylus(struct incise_rig *rig)
 	return rig->stylus;
 }
 
-void incise_rig_haptic_place(struct incise_rig *rig, const double turn[4],
-			     const double origin_mm[3])
+void incise_rig_haptic_place(struct incise_rig *rig,
+			     const struct incise_calibration *calibration)
 {
-	if (rig->stylus)
+	double turn[4], origin_mm[3];
+
+	if (rig->stylus && incise_calibration_frame(calibration, turn, origin_mm))
 		incise_stylus_place(rig->stylus, turn, origin_mm);
 }
 

@@ -75,14 +75,6 @@ static void check_ages(struct haptic *haptic)
 		 info.name, mean_ms, assumed_ms);
 }
 
-static void place_device(const struct haptic *haptic)
-{
-	double turn[4], origin_mm[3];
-
-	if (incise_calibration_frame(&haptic->calibration.values, turn, origin_mm))
-		incise_rig_haptic_place(haptic->rig, turn, origin_mm);
-}
-
 /* Say all that the user has to know before a force comes. */
 void haptic_begin_device(struct haptic *haptic)
 {
@@ -91,7 +83,7 @@ void haptic_begin_device(struct haptic *haptic)
 
 	if (!incise_rig_haptic(haptic->rig))
 		return;
-	place_device(haptic);
+	incise_rig_haptic_place(haptic->rig, &haptic->calibration.values);
 	incise_haptic_info(incise_rig_haptic(haptic->rig), &info);
 	incise_scene_limits(haptic->scene, &limits);
 	if (!(info.deadman_s > 0))
