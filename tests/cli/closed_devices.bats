@@ -71,7 +71,8 @@ serve() { # ARGUMENT…
 	grep -q "haptic = \"local:$id\";    # stub of dhd" out
 	[ "$(key r.json haptic.peak_N)" = 12.0 ] || [ "$(key r.json haptic.peak_N)" = 12 ]
 	kill -9 "$device"
-	sleep 1.1
+	wait "$device" || :
+	device=
 	incise info devices >out
 	grep -q "stub of dhd: its owner has died" out
 	rm "/dev/shm/incise-$id"
