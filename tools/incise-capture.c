@@ -169,7 +169,8 @@ static void parse_options(struct capture_options *options, int argc, char **argv
 static struct incise_rig *open_rig(const struct capture_options *options)
 {
 	static const unsigned int devices[] = {
-		[BOTH] = INCISE_RIG_TRACKER | INCISE_RIG_FORCE,
+		[BOTH] =
+			INCISE_RIG_TRACKER | INCISE_RIG_FORCE | INCISE_RIG_FORCE_IF_NAMED,
 		[ONLY_FORCE] = INCISE_RIG_FORCE,
 		[ONLY_TRACKER] = INCISE_RIG_TRACKER,
 	};
@@ -179,8 +180,15 @@ static struct incise_rig *open_rig(const struct capture_options *options)
 		[CAMERA_DEPTH] = INCISE_RIG_CAMERA,
 	};
 
-	return cli_open_rig(options->rig,
-			    devices[options->only] | camera[options->camera]);
+	struct incise_rig *rig = cli_open_rig(
+		options->rig, devices[options->only] | camera[options->camera]);
+
+	if (options->only == BOTH && !incise_rig_force(rig))
+		cli_warn(
+			"%s: no force is recorded: the rig has no force channel, and its "
+			"haptic device gives no force meanwhile",
+			incise_rig_spec(rig));
+	return rig;
 }
 
 /* Whether the depth is measured in pictures. */

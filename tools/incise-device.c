@@ -27,7 +27,7 @@ static const struct cli_option options[] = {
 	{CLI_RIG_OPTION(struct device_job, rig)},
 	{0, "detach", NULL,
 	 "for a program that starts it: print `ready` on standard error, and leave the "
-	 "terminal and its session",
+	 "terminal and its session; or fail behind a line `errno N`",
 	 CLI_FLAG(struct device_job, detach)},
 	{0, "log", "FILE",
 	 "write each tick to this CSV file: the age of the user's heartbeat and the "
@@ -146,10 +146,11 @@ int main(int argc, char **argv)
 	note = prepare_real_time(&job, &realtime);
 	if (job.log)
 		file = cli_require(incise_outfile_open(job.log, &err), &err);
-	owner = cli_require(incise_haptic_owner_open(cli_rig(job.rig), note,
-						     job.detach ? FIRST_USER_S : YEARS_S,
-						     &err),
-			    &err);
+	owner = incise_haptic_owner_open(cli_rig(job.rig), note,
+					 job.detach ? FIRST_USER_S : YEARS_S, &err);
+	if (!owner && job.detach)
+		fprintf(stderr, "errno %d\n", errno);
+	cli_require(owner, &err);
 	if (realtime && incise_realtime_enter(realtime, &err))
 		cli_warn("normal scheduling, ticks may be late: %s", err.text);
 	if (job.detach)

@@ -62,6 +62,7 @@ struct doctor {
 	bool has_haptic;      /* the rig names a haptic device */
 	bool haptic_measured; /* then: */
 	struct protocol protocol;
+	struct incise_error err; /* of its walls */
 };
 
 static const struct cli_option option_table[] = {
@@ -71,8 +72,8 @@ static const struct cli_option option_table[] = {
 	 "/etc/incise/calibration.conf)",
 	 CLI_INPUT(struct doctor, calibration)},
 	{0, "protocol", NULL,
-	 "measure the haptic device for 10 s while its handle rests, as the first steps of the "
-	 "protocol in doc/devices.md",
+	 "run the protocol of doc/devices.md with the haptic device: noise and latency for 10 s "
+	 "while its handle rests, then, with force, four walls and a weight",
 	 CLI_FLAG(struct doctor, asked)},
 	{0, "report", "FILE.json",
 	 "write one file to send: the checks, this machine, rig.conf and the haptic device",
@@ -89,7 +90,8 @@ static const struct cli_command command = {
 		"finding.",
 	.options = option_table,
 	.notes =
-		"Actuators are only watched, and a haptic device gives no force: nothing moves.",
+		"Actuators are only watched, and without --protocol a haptic device gives no "
+		"force: nothing moves.",
 	.success = "no problem",
 	.failure = "at least one problem",
 };
@@ -277,7 +279,7 @@ static void add_haptic(struct doctor *doctor, struct incise_rig *rig)
 	int rc = 0;
 
 	handle_begin(&handle, rig);
-	if (doctor->asked) {
+	if (doctor->asked && !protocol->simulated && isatty(STDIN_FILENO)) {
 		fprintf(stderr, "lay the handle down so that nothing moves it, and press "
 				"Enter or a button\n");
 		rc = handle_await_press(&handle, &err);
@@ -290,8 +292,11 @@ static void add_haptic(struct doctor *doctor, struct incise_rig *rig)
 		return;
 	}
 	protocol_measure(protocol, &handle, doctor->asked);
+	if (doctor->asked && handle.info.peak_N > 0)
+		protocol->limit_N_mm =
+			protocol_limit(rig, handle.info.peak_N, &doctor->err);
 	doctor->haptic_measured = true;
-	failed = protocol_failed(protocol);
+	failed = protocol_failed(protocol, SD);
 	add(doctor, "devices", "samples", failed ? WARNING : OK, "incise help doctor",
 	    "%s: %.0f Hz, %.2f ms old (99 %%: %.2f, at most %.2f), %.2g %% lost%s%s",
 	    handle.info.name, protocol->rate_hz, protocol->age_median_ms,
@@ -329,6 +334,32 @@ static void add_opened(struct doctor *doctor, const char *name, struct incise_ri
 		add_haptic(doctor, rig);
 }
 
+/* After the rig is closed: a device has one user. */
+static void check_force(struct doctor *doctor)
+{
+	struct protocol *protocol = &doctor->protocol;
+	const double *swings = protocol->value + SWINGS;
+
+	if (!doctor->haptic_measured || !doctor->asked)
+		return;
+	if (!protocol->simulated && !isatty(STDIN_FILENO))
+		add(doctor, "devices", "walls", WARNING,
+		    "incise doctor --protocol    # on a terminal",
+		    "not measured: standard input is no terminal, and a hand must lean on "
+		    "them");
+	else if (!(protocol->limit_N_mm > 0) || protocol_force(protocol, &doctor->err))
+		add(doctor, "devices", "walls", PROBLEM, "incise help doctor",
+		    "not measured: %s", doctor->err.text);
+	else
+		add(doctor, "devices", "walls",
+		    protocol_failed(protocol, WEIGHT) ? WARNING : OK,
+		    "incise help doctor",
+		    "%.2g, %.2g, %.2g, %.2g swings a second at 25, 50, 75, 90 %% of %.3g "
+		    "N/mm; 100 g: %.1f %% off",
+		    swings[0], swings[1], swings[2], swings[3], protocol->limit_N_mm,
+		    protocol->value[WEIGHT]);
+}
+
 /* Try one kind of device. A rig need not name each. */
 static void check_device(struct doctor *doctor, const char *rig, const char *name,
 			 unsigned int devices)
@@ -350,7 +381,7 @@ static void check_device(struct doctor *doctor, const char *rig, const char *nam
 		add(doctor, "devices", name, OK, NULL, "the rig names none");
 	else if (open)
 		add_opened(doctor, name, open);
-	else if (err.code == EBUSY)
+	else if (err.code == EBUSY || err.code == EAGAIN)
 		add(doctor, "devices", name, WARNING, "incise status", "%s", err.text);
 	else
 		add(doctor, "devices", name, PROBLEM,
@@ -362,7 +393,8 @@ static void check_device(struct doctor *doctor, const char *rig, const char *nam
 	incise_rig_close(open);
 }
 
-static int keep_stepper(void *context, const struct incise_key *key)
+/* Keep the steppers, and whether the haptic device is a simulated one. */
+static int keep_devices(void *context, const struct incise_key *key)
 {
 	struct doctor *doctor = context;
 	size_t used = strlen(doctor->steppers);
@@ -370,16 +402,29 @@ static int keep_stepper(void *context, const struct incise_key *key)
 	if (!strncmp(key->name, "stepper", 7))
 		snprintf(doctor->steppers + used, sizeof(doctor->steppers) - used, " %s",
 			 key->value);
+	if (!strcmp(key->name, "haptic"))
+		doctor->protocol.simulated = !strncmp(key->value, "\"sim:", 5);
 	return 0;
 }
 
-/* The steppers of the rig, if there is one without an error. */
+/* The devices of the rig, if there is one without an error. */
 static void read_rig(struct doctor *doctor)
 {
+	struct protocol *protocol = &doctor->protocol;
+
 	if (!doctor->rig)
 		doctor->rig = cli_default_rig();
 	doctor->has_rig =
-		doctor->rig && !incise_rig_keys(doctor->rig, keep_stepper, doctor, NULL);
+		doctor->rig && !incise_rig_keys(doctor->rig, keep_devices, doctor, NULL);
+	protocol->has_hand = doctor->asked && doctor->rig &&
+			     !strncmp(doctor->rig, "sim:haptic", strlen("sim:haptic"));
+	protocol->simulated |= protocol->has_hand;
+	if (protocol->has_hand)
+		doctor->rig = cli_text("%s,motion=still", doctor->rig);
+	protocol->rig = doctor->rig;
+	protocol->calibration = doctor->calibration	? doctor->calibration
+				: calibration_default() ? calibration_default()
+							: "none";
 }
 
 static void check_rig(struct doctor *doctor)
@@ -418,6 +463,7 @@ static void check_rig(struct doctor *doctor)
 		if (!doctor->has_haptic ||
 		    !(kinds[i].devices & (INCISE_RIG_TRACKER | INCISE_RIG_STEPPER)))
 			check_device(doctor, rig, kinds[i].name, kinds[i].devices);
+	check_force(doctor);
 }
 
 /* --- what is attached, whether the rig names it or not --- */

@@ -449,14 +449,14 @@ static void report_plan_text(const struct plan_job *job, const struct incise_pla
 }
 
 /* Only watch the actuator if it can be watched: a loop may run on it. */
-static struct incise_rig *open_rig(const char *spec, struct incise_error *err)
+static struct incise_rig *open_rig(const char *spec)
 {
 	const unsigned int devices = INCISE_RIG_TRACKER | INCISE_RIG_STEPPER;
-	struct incise_rig *rig = incise_rig_open(spec, devices | INCISE_RIG_WATCH, err);
+	struct incise_error err = {0};
+	struct incise_rig *rig = incise_rig_open(spec, devices | INCISE_RIG_WATCH, &err);
 
-	if (rig || errno != EOPNOTSUPP)
-		return rig;
-	return incise_rig_open(spec, devices, err);
+	return rig || err.code != EOPNOTSUPP ? cli_require(rig, &err)
+					     : cli_open_rig(spec, devices);
 }
 
 int main(int argc, char **argv)
@@ -476,7 +476,7 @@ int main(int argc, char **argv)
 	job.loaded = scene;
 	incise_scene_set_full(scene, job.full);
 	if (job.rig) {
-		rig = cli_require(open_rig(job.rig, &err), &err);
+		rig = open_rig(job.rig);
 		incise_tracker_info(incise_rig_tracker(rig), &tracker);
 	}
 	plan = cli_require(incise_plan_new(scene, rig, &err), &err);

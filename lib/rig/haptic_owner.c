@@ -25,6 +25,7 @@ struct incise_haptic_owner {
 	struct incise_haptic_page_owner half;
 	struct haptic_gate gate;
 	uint32_t flags; /* of the last sample */
+	bool cut;	/* the force that the user asks for is taken away */
 	int64_t period_ns, next_ns;
 	int64_t look_ns, used_ns; /* next look for a user; when there was one last */
 	double wait_s;		  /* for a user */
@@ -112,6 +113,18 @@ static const char *find_end(struct incise_haptic_owner *owner, int64_t now_ns)
 		       : NULL;
 }
 
+/* A user that has not begun, or asks for none, loses no force. */
+static void count_cut(struct incise_haptic_owner *owner, const char *off)
+{
+	bool cut = *off && strcmp(off, "none") && strcmp(off, "off");
+
+	if (cut && !owner->cut) {
+		owner->half.cuts++;
+		snprintf(owner->half.cut, sizeof(owner->half.cut), "%s", off);
+	}
+	owner->cut = cut;
+}
+
 static int give_force(struct incise_haptic_owner *owner,
 		      struct incise_haptic_owner_tick *tick)
 {
@@ -123,6 +136,7 @@ static int give_force(struct incise_haptic_owner *owner,
 	off = incise_haptic_gate(&owner->gate, whole ? &half : NULL, tick->t_ns,
 				 tick->force_N, tick->torque_N_mm);
 	tick->off = off ? off : "";
+	count_cut(owner, tick->off);
 	tick->period_ns = owner->gate.last.period_ns;
 	tick->age_ns = tick->period_ns ? tick->t_ns - owner->gate.last.heartbeat_ns : -1;
 	if (owner->gate.last.wants == INCISE_HAPTIC_PAGE_END)

@@ -4,20 +4,17 @@
  */
 #include <errno.h>
 #include <fcntl.h>
+#include <signal.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
-#include <time.h>
 #include <unistd.h>
 #include "../base/crc32c.h"
 #include "haptic_page.h"
 
 #define NAME_MOST 60
 #define NAME_CHARACTERS "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-"
-/* An owner that holds its lock and has no head yet opens its device. */
-#define LOOK_NS 10000000
-#define LOOKS 3000
 
 _Static_assert(sizeof(struct incise_haptic_page) == 5696 &&
 		       offsetof(struct incise_haptic_page, ring) == 1600 &&
@@ -116,13 +113,19 @@ static int report_page(const struct haptic_page *page, int rc, const char *busy,
 		       const char *where, struct incise_error *err)
 {
 	return incise_error_set(
-		err, -rc, "%s: %s: %s", where, page->path,
-		rc == -EBUSY	? busy
-		: rc == -ENOENT ? "no process serves this device; start it"
+		err, rc == -ENOLCK || rc == -EOWNERDEAD ? ENOENT : -rc, "%s: %s: %s",
+		where, page->path,
+		rc == -EBUSY	    ? busy
+		: rc == -ENOENT	    ? "no process serves this device; start it"
+		: rc == -EOWNERDEAD ? "its owner has died; start it again"
+		: rc == -ENOLCK
+			? "a process serves it without a lock of byte 0; let that process "
+			  "hold one, by F_OFD_SETLK"
 		: rc == -EACCES ? "another user's; run as that user"
 		: rc == -EPROTO ? "not a page of version 1 of incise/haptic_page.h; "
 				  "build the device's process for it"
-		: rc == -EAGAIN ? "its owner does not get ready; end that process"
+		: rc == -EAGAIN ? "its owner has not written the magic yet: it opens its "
+				  "device, or does not get ready"
 				: strerror(-rc));
 }
 
@@ -174,7 +177,7 @@ int incise_haptic_page_new(struct haptic_page *page, const char *device,
 
 /* --- the user's ------------------------------------------------------------------------- */
 
-/* 0; -EAGAIN: its owner has not finished it. */
+/* 0; -EAGAIN: its owner has not finished it; -ENOLCK: no lock, but its process lives; -EOWNERDEAD. */
 static int look_at_head(const struct haptic_page *page)
 {
 	struct incise_haptic_page own;
@@ -182,12 +185,16 @@ static int look_at_head(const struct haptic_page *page)
 	const size_t end = offsetof(struct incise_haptic_page_head, reserved);
 	struct incise_haptic_page_head head = {0};
 	struct stat st;
+	bool whole = pread(page->fd, &head, sizeof(head), 0) == (ssize_t)sizeof(head) &&
+		     head.magic[0];
 
 	incise_haptic_page_publish(&own, 0);
 	if (!incise_haptic_page_held(page, INCISE_HAPTIC_PAGE_OWNER_BYTE))
-		return -ENOENT;
-	if (pread(page->fd, &head, sizeof(head), 0) != (ssize_t)sizeof(head) ||
-	    !head.magic[0])
+		return whole && (pid_t)head.pid > 0 &&
+				       (!kill((pid_t)head.pid, 0) || errno == EPERM)
+			       ? -ENOLCK
+			       : -EOWNERDEAD;
+	if (!whole)
 		return -EAGAIN;
 	if (memcmp(head.magic, own.head.magic, sizeof(own.head.magic)) ||
 	    head.major != own.head.major || head.size != own.head.size ||
@@ -199,15 +206,10 @@ static int look_at_head(const struct haptic_page *page)
 
 static int take_page(struct haptic_page *page)
 {
-	const struct timespec pause = {.tv_nsec = LOOK_NS};
 	int rc = open_own(page);
 
 	if (!rc)
 		rc = look_at_head(page);
-	for (int i = 0; rc == -EAGAIN && i < LOOKS; i++) {
-		nanosleep(&pause, NULL);
-		rc = look_at_head(page);
-	}
 	if (!rc)
 		rc = lock_byte(page->fd, INCISE_HAPTIC_PAGE_USER_BYTE);
 	return rc ? rc : map_page(page);

@@ -45,8 +45,8 @@ int incise_haptic_page_new(struct haptic_page *page, const char *device,
 			   const char *where, struct incise_error *err);
 
 /*
- * The page of a device for its only user; waits while the owner prepares it. 0; -ENOENT: it has no owner;
- * -EBUSY: it has a user; -EACCES; -EPROTO: the page has another layout.
+ * The page of a device for its only user. 0; -ENOENT: it has no owner, or one without its lock; -EAGAIN: its
+ * owner prepares it; -EBUSY: it has a user; -EACCES; -EPROTO: the page has another layout.
  */
 int incise_haptic_page_open(struct haptic_page *page, const char *device,
 			    const char *where, struct incise_error *err);
@@ -89,16 +89,17 @@ const char *incise_haptic_gate(struct haptic_gate *gate,
 			       const struct incise_haptic_page_user *half, int64_t now_ns,
 			       double force_N[3], double torque_N_mm[3]) INCISE_REALTIME;
 
-/* Start incise device for a rig, and wait until it is ready. 0; -ENOENT (no such program), -EIO. */
+/* Start incise device for a rig, and wait until it is ready. 0; -ENOENT (no such program), its errno, or -EIO. */
 int incise_haptic_start_owner(const char *spec, const char *where,
 			      struct incise_error *err);
 
 /*
  * Attach to the page of a device: of "local:NAME", which somebody's own process serves; or of any other
  * backend, whose owner `incise device` is started unless it runs. @spec: of the rig, which the owner
- * reads its settings from. Waits until the owner is ready.
+ * reads its settings from. Waits until an owner that it starts is ready.
  *
- * NULL with errno of incise_haptic_open(); ENOENT (nobody serves that page), EBUSY (another
+ * NULL with errno of incise_haptic_open(); ENOENT (nobody serves that page), EAGAIN (its owner, which somebody
+ * else started, is not ready yet), EBUSY (another
  * program uses it), EPROTO (a page of another version, or not understood).
  */
 struct incise_haptic *incise_haptic_attach(const char *spec, const char *device,

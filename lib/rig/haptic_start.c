@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
  * Starting the owner of a haptic device; see haptic_page.h. `incise device --detach` prints `ready` on
- * standard error, which it leaves then, or a line with the reason why it fails.
+ * standard error, which it leaves then, or `errno N` and a line with the reason why it fails.
  */
 #include <errno.h>
 #include <fcntl.h> /* O_CLOEXEC */
@@ -14,6 +14,7 @@
 #include "haptic_page.h"
 
 #define PROGRAM "incise-device"
+#define ERRNO_MOST 4095
 
 extern char **environ;
 
@@ -48,10 +49,11 @@ static int spawn_owner(pid_t *pid, const char *path, const char *spec, int err_f
 	return rc;
 }
 
-/* The last line of a program, without its name. */
-static void read_line(int fd, char *line, size_t size)
+/* The last line of a program, without its name, and the errno that it gives; 0: none. */
+static int read_line(int fd, char *line, size_t size)
 {
 	size_t length = 0;
+	int code = 0;
 	char *last;
 	ssize_t n;
 
@@ -61,11 +63,16 @@ static void read_line(int fd, char *line, size_t size)
 	while (length && line[length - 1] == '\n')
 		length--;
 	line[length] = 0;
+	last = strstr(line, "errno ");
+	if (last && sscanf(last, "errno %d", &code) == 1 &&
+	    (code < 0 || code > ERRNO_MOST))
+		code = 0;
 	last = strrchr(line, '\n');
 	last = last ? last + 1 : line;
 	if (!strncmp(last, "incise device: ", strlen("incise device: ")))
 		last += strlen("incise device: ");
 	memmove(line, last, strlen(last) + 1);
+	return code;
 }
 
 int incise_haptic_start_owner(const char *spec, const char *where,
@@ -73,7 +80,7 @@ int incise_haptic_start_owner(const char *spec, const char *where,
 {
 	char path[PATH_MAX + 40], line[2000];
 	bool ready = false;
-	int fds[2], rc;
+	int fds[2], rc, code = 0;
 	pid_t pid;
 
 	find_program(path);
@@ -82,7 +89,7 @@ int incise_haptic_start_owner(const char *spec, const char *where,
 	rc = spawn_owner(&pid, path, spec, fds[1]);
 	close(fds[1]);
 	if (!rc) {
-		read_line(fds[0], line, sizeof(line));
+		code = read_line(fds[0], line, sizeof(line));
 		ready = !strcmp(line, "ready");
 		/* An owner that is ready outlives this process, or is reaped with it. */
 		while (!ready && waitpid(pid, NULL, 0) < 0 && errno == EINTR)
@@ -98,6 +105,6 @@ int incise_haptic_start_owner(const char *spec, const char *where,
 			where, strerror(rc));
 	if (ready)
 		return 0;
-	return incise_error_set(err, EIO, "%.490s",
+	return incise_error_set(err, code ? code : EIO, "%.490s",
 				*line ? line : "incise device ended without a reason");
 }

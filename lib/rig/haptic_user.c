@@ -4,6 +4,7 @@
  * others: each value is checked where it is read, and a page that makes no sense ends the stream.
  */
 #include <errno.h>
+#include <float.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -16,6 +17,8 @@
 #define PERIOD_SHARE 16 /* of a tick in the mean period */
 #define PERIOD_LEAST_NS 20000
 #define RATE_MOST_HZ 20000
+#define FINITE -DBL_MAX, DBL_MAX, "a finite number"
+#define FROM_0 0, DBL_MAX, "a finite number from 0"
 #define END_NS 10000000 /* between looks whether an owner has ended */
 #define END_LOOKS 1000
 #define REFUSED                                                                      \
@@ -30,10 +33,11 @@ struct haptic_user {
 	struct incise_haptic_page_owner owner; /* the last whole one */
 	struct incise_haptic_page_user own;    /* as written last */
 	uint64_t taken, lost;
-	bool reads;	   /* has read */
-	uint32_t flags;	   /* of the last sample */
-	int rc;		   /* negative errno that ended the stream */
-	const char *cause; /* in place of the owner's reason */
+	uint32_t cuts_before; /* of other users */
+	bool reads;	      /* has read */
+	uint32_t flags;	      /* of the last sample */
+	int rc;		      /* negative errno that ended the stream */
+	const char *cause;    /* in place of the owner's reason */
 	double period_ns;
 };
 
@@ -218,6 +222,18 @@ static uint64_t count_lost(const struct incise_haptic *haptic)
 	return user->lost + user->owner.lost;
 }
 
+static unsigned int count_cuts(const struct incise_haptic *haptic,
+			       char why[INCISE_HAPTIC_CUT_MAX])
+{
+	const struct haptic_user *user = (const struct haptic_user *)haptic;
+	unsigned int cuts = user->owner.cuts - user->cuts_before;
+
+	snprintf(why, INCISE_HAPTIC_CUT_MAX, "%.*s", cuts ? INCISE_HAPTIC_CUT_MAX - 1 : 0,
+		 user->owner.cut);
+	control_characters_hide(why);
+	return cuts;
+}
+
 static int tell_cause(struct incise_haptic *haptic, char *text, size_t size)
 {
 	struct haptic_user *user = of_user(haptic);
@@ -247,6 +263,7 @@ static const struct incise_haptic_ops ops = {
 	.lost = count_lost,
 	.close = close_user,
 	.cause = tell_cause,
+	.cuts = count_cuts,
 };
 
 /* --- attaching --------------------------------------------------------------------------- */
@@ -260,35 +277,66 @@ static bool take_text(char *text, size_t size)
 	return ends;
 }
 
-/* Whether the device part makes sense; it is a copy, which the owner cannot change. */
-static bool is_device_good(struct incise_haptic_info *device)
+/* Check the device part, a copy, which the owner cannot change. 0; -EPROTO, and *err says which property. */
+static int check_device(struct incise_haptic_info *d, const char *where, const char *path,
+			struct incise_error *err)
 {
-	const double *values = device->low_mm;
-	bool good = take_text(device->device, sizeof(device->device)) &&
-		    take_text(device->name, sizeof(device->name)) &&
-		    take_text(device->filters, sizeof(device->filters)) &&
-		    take_text(device->note, sizeof(device->note));
+	const struct {
+		const char *name;
+		double value, least, most;
+		const char *range;
+	} rows[] = {
+		{"low_mm[0]", d->low_mm[0], FINITE},
+		{"low_mm[1]", d->low_mm[1], FINITE},
+		{"low_mm[2]", d->low_mm[2], FINITE},
+		{"high_mm[0]", d->high_mm[0], FINITE},
+		{"high_mm[1]", d->high_mm[1], FINITE},
+		{"high_mm[2]", d->high_mm[2], FINITE},
+		{"peak_N", d->peak_N, FROM_0},
+		{"continuous_N", d->continuous_N, FROM_0},
+		{"torque_N_mm", d->torque_N_mm, FROM_0},
+		{"mass_kg", d->mass_kg, FROM_0},
+		{"damping_N_s_mm", d->damping_N_s_mm, FROM_0},
+		{"coulomb_N", d->coulomb_N, FROM_0},
+		{"encoder_mm", d->encoder_mm, FROM_0},
+		{"rate_hz", d->rate_hz, 1, RATE_MOST_HZ, "1 to 20000"},
+		{"latency_ns", (double)d->latency_ns, 0, INCISE_NS_PER_S, "0 to 1e9"},
+		{"force_latency_ns", (double)d->force_latency_ns, 0, INCISE_NS_PER_S,
+		 "0 to 1e9"},
+		{"deadman_s", d->deadman_s, FROM_0},
+		{"buttons", d->buttons, 0, 32, "0 to 32"},
+		{"features", d->features, 0, 2 * INCISE_HAPTIC_PAGE_GRAVITY - 1,
+		 "a sum of 1, 2 and 4"},
+	};
+	bool ends = take_text(d->device, sizeof(d->device)) &&
+		    take_text(d->name, sizeof(d->name)) &&
+		    take_text(d->filters, sizeof(d->filters)) &&
+		    take_text(d->note, sizeof(d->note));
 
-	for (const double *v = values; v <= &device->rate_hz; v++)
-		good = good && isfinite(*v) && (v < values + 6 || *v >= 0);
-	return good && isfinite(device->deadman_s) && device->deadman_s >= 0 &&
-	       device->rate_hz >= 1 && device->rate_hz <= RATE_MOST_HZ &&
-	       device->latency_ns >= 0 && device->latency_ns <= INCISE_NS_PER_S &&
-	       device->force_latency_ns >= 0 &&
-	       device->force_latency_ns <= INCISE_NS_PER_S && device->buttons <= 32 &&
-	       device->features < 2 * INCISE_HAPTIC_PAGE_GRAVITY;
+	if (!ends)
+		return incise_error_set(err, EPROTO,
+					"%s: %s: device, name, filters or note of the "
+					"device do not end with a 0; correct its owner",
+					where, path);
+	for (size_t i = 0; i < sizeof(rows) / sizeof(*rows); i++)
+		if (!(rows[i].value >= rows[i].least && rows[i].value <= rows[i].most))
+			return incise_error_set(
+				err, EPROTO,
+				"%s: %s: %s of the device: found %.9g, expected %s; "
+				"correct its owner",
+				where, path, rows[i].name, rows[i].value, rows[i].range);
+	return 0;
 }
 
 static int read_device(struct haptic_user *user, const char *device, const char *where,
 		       struct incise_error *err)
 {
+	int rc;
+
 	memcpy(&user->device, &user->page.map->device, sizeof(user->device));
-	if (!is_device_good(&user->device))
-		return incise_error_set(
-			err, EPROTO,
-			"%s: %s: the properties of the device are not "
-			"finite or not in their ranges; correct its owner",
-			where, user->page.path);
+	rc = check_device(&user->device, where, user->page.path, err);
+	if (rc)
+		return rc;
 	if (strcmp(user->device.device, device))
 		return incise_error_set(err, EPROTO,
 					"%s: %s: has the device \"%.80s\", not "
@@ -303,6 +351,7 @@ static int read_device(struct haptic_user *user, const char *device, const char 
 		return incise_error_set(err, -user->rc, "%s: %s", where, cause);
 	}
 	user->taken = user->owner.samples;
+	user->cuts_before = user->owner.cuts;
 	return 0;
 }
 
@@ -348,6 +397,7 @@ static int attach_owned(struct haptic_user *user, const char *spec, const char *
 			const char *where, const struct incise_haptic_setup *setup,
 			struct incise_error *err)
 {
+	struct incise_error own = {0};
 	int rc = attach_once(user, device, where, err), started;
 
 	if (!rc && user->device.settings == incise_haptic_page_settings(setup))
@@ -356,10 +406,12 @@ static int attach_owned(struct haptic_user *user, const char *spec, const char *
 		rc = end_owner(user, where, err);
 	if (rc && rc != -ENOENT)
 		return rc;
-	started = incise_haptic_start_owner(spec, where, err);
+	started = incise_haptic_start_owner(spec, where, &own);
 	/* It may be that of another program, which was faster. */
-	rc = attach_once(user, device, where, started ? NULL : err);
-	return rc && started ? started : rc;
+	rc = attach_once(user, device, where, err);
+	return rc && rc != -EAGAIN && started
+		       ? incise_error_set(err, -started, "%s", own.text)
+		       : rc;
 }
 
 struct incise_haptic *incise_haptic_attach(const char *spec, const char *device,

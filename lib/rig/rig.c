@@ -359,13 +359,12 @@ struct incise_stylus *incise_rig_stylus(struct incise_rig *rig)
 	return rig->stylus;
 }
 
-void incise_rig_haptic_place(struct incise_rig *rig, const double turn[4],
-			     const double origin_mm[3])
+void incise_rig_haptic_place(struct incise_rig *rig,
+			     const struct incise_calibration *calibration)
 {
-	if (!rig->stylus)
-		return;
-	memcpy(rig->stylus->setup.turn, turn, sizeof(rig->stylus->setup.turn));
-	v3_copy(rig->stylus->setup.origin_mm, origin_mm);
+	if (rig->stylus)
+		incise_calibration_frame(calibration, rig->stylus->setup.turn,
+					 rig->stylus->setup.origin_mm);
 }
 
 void incise_rig_haptic_assume(struct incise_rig *rig, int64_t latency_ns)

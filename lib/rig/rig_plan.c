@@ -692,6 +692,10 @@ static int plan_root(struct incise_rig_plan *plan, const config_setting_t *root,
 	if (plan->devices & INCISE_RIG_IF_NAMED &&
 	    !config_setting_get_member(root, "camera"))
 		plan->devices &= ~INCISE_RIG_CAMERA;
+	if (plan->devices & INCISE_RIG_FORCE_IF_NAMED &&
+	    config_setting_get_member(root, "haptic") &&
+	    !config_setting_get_member(root, "force"))
+		plan->devices &= ~INCISE_RIG_FORCE;
 	if (!rc)
 		rc = check_tube_station(&plan->tracker, root, path, err);
 	if (!rc)
@@ -803,6 +807,8 @@ static int plan_haptic_alone(struct incise_rig_plan *plan, const char *spec,
 	snprintf(plan->haptic_where, sizeof(plan->haptic_where), "%.200s", spec);
 	if (plan->devices & INCISE_RIG_IF_NAMED)
 		plan->devices &= ~INCISE_RIG_CAMERA;
+	if (plan->devices & INCISE_RIG_FORCE_IF_NAMED)
+		plan->devices &= ~INCISE_RIG_FORCE;
 	if (plan->devices & (INCISE_RIG_FORCE | INCISE_RIG_CAMERA))
 		return incise_error_set(err, ENODEV,
 					"%s: a haptic device alone has no %s; write a "

@@ -87,24 +87,26 @@ static int scan_page(const char *name, incise_scan_found *found, void *context)
 {
 	struct incise_scan_device device = {.kind = "haptic"};
 	struct incise_haptic_page page;
+	struct haptic_page opened;
 	struct stat st = {0};
 	char path[300];
 	ssize_t size = 0;
-	int fd;
 
 	snprintf(path, sizeof(path), PAGES "/%.255s", name);
-	fd = open(path, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
-	if (fd >= 0) {
-		if (!fstat(fd, &st) && st.st_uid == geteuid())
-			size = pread(fd, &page, sizeof(page), 0);
-		close(fd);
+	opened.fd = open(path, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+	if (opened.fd >= 0) {
+		if (!fstat(opened.fd, &st) && st.st_uid == geteuid())
+			size = pread(opened.fd, &page, sizeof(page), 0);
+		device.usable =
+			incise_haptic_page_held(&opened, INCISE_HAPTIC_PAGE_OWNER_BYTE);
+		close(opened.fd);
 	}
 	if (size != sizeof(page) ||
 	    memcmp(page.head.magic, INCISE_HAPTIC_PAGE_MAGIC, sizeof(page.head.magic)) ||
 	    strncmp(page.device.device, HAPTIC_PAGE_LOCAL, strlen(HAPTIC_PAGE_LOCAL)))
 		return 0;
-	device.usable = incise_monotonic_ns() - page.owner.heartbeat_ns <
-			INCISE_HAPTIC_PAGE_DEAD_NS;
+	device.usable &= incise_monotonic_ns() - page.owner.heartbeat_ns <
+			 INCISE_HAPTIC_PAGE_DEAD_NS;
 	snprintf(device.device, sizeof(device.device), "%.255s", page.device.device);
 	snprintf(device.what, sizeof(device.what), "%.63s%s", page.device.name,
 		 device.usable ? "" : ": its owner has died; start it again");

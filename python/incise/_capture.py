@@ -12,7 +12,7 @@ from . import _library
 from ._library import Invalid, c_char_p, c_int, c_void_p, call, function, path_bytes, text
 from ._recording import PathLike, Recording, load_calibration, open
 
-_TRACKER, _FORCE, _CAMERA = 1, 2, 4  # enum incise_rig_device
+_TRACKER, _FORCE, _CAMERA, _FORCE_IF_NAMED = 1, 2, 4, 128  # enum incise_rig_device
 _Warn = ctypes.CFUNCTYPE(None, c_void_p, c_char_p)
 
 
@@ -135,7 +135,7 @@ def capture(
     def interrupt() -> None:
         stop.value = 1
 
-    devices = _TRACKER | _FORCE | (_CAMERA if camera else 0)
+    devices = _TRACKER | _FORCE | _FORCE_IF_NAMED | (_CAMERA if camera else 0)
     opened = call("incise_rig_open", path_bytes(rig), devices)
     try:
         _library.call_interruptible(

@@ -56,6 +56,16 @@ serve() { # ARGUMENT…
 	await ended
 }
 
+# It measures the noise for 10 s.
+@test "the protocol waits for nobody without a terminal, and gives no force then" {
+	compile openhaptics
+	serve
+	incise doctor --rig "local:$id" --report r.json --protocol <&- >out 2>said || :
+	grep -q "walls *not measured: standard input is no terminal" out
+	[ ! -s said ]
+	[ "$(jq '[.haptic.protocol[] | select(.step == "wall" and .value == null)] | length' r.json)" = 4 ]
+}
+
 # bats test_tags=check
 @test "openhaptics: a tick with an error has neither force nor sample" {
 	"${CC:-cc}" -std=gnu11 -D_GNU_SOURCE -Wall -Wextra -Werror "-I$root/lib/include" "-I$root/tests/haptic/stub" \
@@ -71,7 +81,8 @@ serve() { # ARGUMENT…
 	grep -q "haptic = \"local:$id\";    # stub of dhd" out
 	[ "$(key r.json haptic.peak_N)" = 12.0 ] || [ "$(key r.json haptic.peak_N)" = 12 ]
 	kill -9 "$device"
-	sleep 1.1
+	wait "$device" || :
+	device=
 	incise info devices >out
 	grep -q "stub of dhd: its owner has died" out
 	rm "/dev/shm/incise-$id"

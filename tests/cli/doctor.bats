@@ -175,9 +175,25 @@ group() {
 		assert abs(noise["value"] - 0.0301) < 0.001 and noise["pass"], noise
 		line = value["noise", "strongest line above 5 Hz"]
 		assert 0.002 < line["value"] < 0.01, line
-		assert [s["value"] for s in steps if s["step"] in ("weight", "wall")] == [None, None]
-		assert all(s["pass"] is None for s in steps if s["value"] is None)
+		# the plan's largest is 1.08 N/mm; the weight's force is that of gravity
+		walls = [s["value"] for s in steps if s["step"] == "wall"]
+		assert walls == [0, 0, 0, 0] and 0.9 < report["haptic"]["limit_N_mm"] < 1.2, report["haptic"]
+		assert [s["pass"] for s in steps if s["step"] == "weight"] == [True]
 	END
+	[[ "$(finding devices walls)" == "  ok "*"0, 0, 0, 0 swings a second at 25, 50, 75, 90 % of 1."* ]]
+	# a device with less damping than it states swings, and friction holds a weight
+	cat >rig.conf <<-'END'
+		clock = "simulated";
+		haptic = "sim:motion=lean,lean_N=2,z_mm=5,begin_s=3,damping_N_s_mm=0.001,hand_kg=0,hand_N_mm=0,hand_N_s_mm=0";
+		haptic_setup = { damping_N_s_mm = 0.01; };
+	END
+	run --separate-stderr incise doctor --protocol </dev/null
+	[[ "$(finding devices walls)" =~ "  warning "\ *walls\ *0,\ 0,\ [1-9][0-9],\ [1-9][0-9]\ swings ]] || complain "$output"
+	run --separate-stderr incise doctor --rig sim:haptic,clock=simulated,coulomb_N=0.3 --protocol </dev/null
+	[[ "$(finding devices walls)" == "  warning "*"100 g: "[1-9][0-9].*" % off"* ]]
+	rm rig.conf
+	run --separate-stderr incise doctor --rig sim:haptic,clock=simulated,peak_N=0.01 --protocol </dev/null
+	[[ "$(finding devices walls)" == "  problem "*"nothing leant on the wall of 0.27 N/mm"* ]]
 	# a device that stops is a problem with its reason
 	run -1 --separate-stderr incise doctor --rig "$rig,unplugged_s=0.5"
 	[[ "$(finding devices samples)" == "  problem "*"unplugged"* ]]

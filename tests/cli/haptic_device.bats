@@ -77,8 +77,30 @@ largest() {
 	sed 's/^tissue *= *{/&gain = 10.0; /' wall.scene >stiff.scene
 	run -1 --separate-stderr incise haptic stiff.scene --rig sim:haptic,clock=simulated,mass_kg=0.2 --duration 1s
 	[[ "$stderr" == *"not stable"*"on a device of 0.2 kg"*"set tissue.gain to at most"* ]]
-	run -1 --separate-stderr incise capture --rig sim:haptic,clock=simulated -o r.rec --duration 1s
+	run -1 --separate-stderr incise capture --rig sim:haptic,clock=simulated -o r.rec --duration 1s --only force
 	[[ "$stderr" == *"sim:haptic,clock=simulated: a haptic device alone has no force channel"* ]]
+}
+
+# bats test_tags=check
+@test "capture records the poses of a haptic device in the frame of the calibration" {
+	# a quarter turn about x brings z = -3 to y = 3
+	printf 'frame_turn_deg = [90.0, 0.0, 0.0];\nframe_mm = [1.0, 0.0, 50.0];\n' >turned.conf
+	run -0 --separate-stderr incise capture --rig sim:haptic,clock=simulated,motion=still,z_mm=-3 -c turned.conf \
+		-o r.rec --duration 1s
+	[[ "$stderr" == *"no force is recorded: the rig has no force channel"* ]]
+	[ "$(sqlite3 -readonly r.rec/recording.db \
+		'SELECT DISTINCT x_mm, round(y_mm, 6), round(z_mm, 6) FROM tracker')" = "1.0|3.0|50.0" ]
+	# beside a force channel nothing is left out
+	cat >rig.conf <<-E
+	clock = "simulated";
+	haptic = "sim:motion=still,z_mm=-3";
+	force = "sim:";
+	E
+	run -0 --separate-stderr incise capture -c turned.conf -o both.rec --duration 1s --json
+	[[ "$stderr" != *"no force"* ]]
+	[ "$(jq '.force > 0 and .tracker > 0' <<<"$output")" = true ]
+	run -1 --separate-stderr incise capture --rig sim:haptic,clock=simulated -o f.rec --trigger 0.2N
+	[[ "$stderr" == *"f.rec: a force triggers, but the rig sim:haptic,clock=simulated has no force channel; "* ]]
 }
 
 # bats test_tags=check

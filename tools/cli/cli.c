@@ -29,7 +29,8 @@
 
 #define OPTIONS_MAX 40
 #define KEYS_MAX 16
-#define LONG 256 /* first of the numbers of long options */
+#define OWNER_S 30 /* in which the owner of a haptic device gets ready */
+#define LONG 256   /* first of the numbers of long options */
 
 static const struct cli_command *current;
 static bool status_line, verbose;
@@ -813,9 +814,19 @@ const char *cli_rig(const char *given)
 
 struct incise_rig *cli_open_rig(const char *given, unsigned int devices)
 {
+	const struct timespec pause = {.tv_nsec = 10000000};
+	const char *spec = cli_rig(given);
 	struct incise_error err = {0};
+	struct incise_rig *rig = incise_rig_open(spec, devices, &err);
+	int looks = OWNER_S * 100;
 
-	return cli_require(incise_rig_open(cli_rig(given), devices, &err), &err);
+	if (!rig && err.code == EAGAIN)
+		cli_warn("%s; waiting for it, at most %d s", err.text, OWNER_S);
+	while (!rig && err.code == EAGAIN && looks-- && !cli_stop) {
+		nanosleep(&pause, NULL);
+		rig = incise_rig_open(spec, devices, &err);
+	}
+	return cli_require(rig, &err);
 }
 
 const char *cli_command_name(void)

@@ -264,7 +264,10 @@ const char *cli_default_rig(void);
 /* The places before that one with the reason, "rig.conf: No such file …"; NULL beyond the last. */
 const char *cli_rig_passed_over(int i);
 
-/* Open that rig with some devices (INCISE_RIG_TRACKER, …), or fail. */
+/*
+ * Open that rig with some devices (INCISE_RIG_TRACKER, …), or fail. An owner of a haptic device that is not
+ * ready yet is waited for, with a warning.
+ */
 struct incise_rig *cli_open_rig(const char *given, unsigned int devices);
 
 /* Name of the command that runs, such as "calibrate force"; "" before cli_parse(). */

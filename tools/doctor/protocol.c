@@ -14,6 +14,9 @@
 #define LINE_LEAST_HZ 5.0 /* below, a hand or a table moves */
 #define POLL_MS 1.0	  /* an age is known to this */
 
+#define SWINGS_AT(percent) \
+	"swings of more than 0.1 mm at " percent " % of the plan's largest stiffness"
+
 /* A mark of 0 depends on the device: see set_marks(). */
 static const struct {
 	const char *step, *quantity, *unit;
@@ -26,7 +29,10 @@ static const struct {
 	[JITTER] = {"latency", "period of samples, standard deviation", "ms", 0},
 	[LOST] = {"latency", "samples lost", "%", 0.1},
 	[WEIGHT] = {"weight", "force commanded for a hung weight, deviation", "%", 10},
-	[SWING] = {"wall", "swing at the plan's limit of stiffness", "mm", 0.1},
+	[SWINGS] = {"wall", SWINGS_AT("25"), "1/s", 1},
+	{"wall", SWINGS_AT("50"), "1/s", 1},
+	{"wall", SWINGS_AT("75"), "1/s", 1},
+	{"wall", SWINGS_AT("90"), "1/s", 1},
 };
 
 static void set_marks(struct protocol *protocol)
@@ -102,9 +108,9 @@ void protocol_measure(struct protocol *protocol, const struct handle *handle, bo
 	protocol->value[LINE] = find_line(handle, mean_mm, protocol->rate_hz);
 }
 
-const char *protocol_failed(const struct protocol *protocol)
+const char *protocol_failed(const struct protocol *protocol, enum protocol_step from)
 {
-	for (int i = 0; i < PROTOCOL_STEPS; i++)
+	for (int i = from; i < PROTOCOL_STEPS; i++)
 		if (protocol->value[i] > protocol->mark[i])
 			return steps[i].quantity;
 	return NULL;
@@ -128,13 +134,14 @@ json_t *protocol_json(const struct protocol *protocol)
 						      protocol->mark[i])
 				       : json_null()));
 	}
-	return json_pack("{so sf sf sf sf sf sf sf sb so so so}", "name",
-			 json_text(info->name), "rate_hz", protocol->rate_hz,
-			 "nominal_hz", info->rate_hz, "latency_ms",
-			 (double)info->latency_ns * 1e-6, "age_median_ms",
-			 protocol->age_median_ms, "peak_N", info->peak_N, "continuous_N",
-			 info->continuous_N, "deadman_s", info->deadman_s, "own_gravity",
-			 !!(info->features & INCISE_HAPTIC_PAGE_GRAVITY), "filters",
-			 json_text(info->filters), "note", json_text(info->note),
-			 "protocol", list);
+	return json_pack(
+		"{so sf sf sf sf sf sf sf so sb so so so}", "name", json_text(info->name),
+		"rate_hz", protocol->rate_hz, "nominal_hz", info->rate_hz, "latency_ms",
+		(double)info->latency_ns * 1e-6, "age_median_ms", protocol->age_median_ms,
+		"peak_N", info->peak_N, "continuous_N", info->continuous_N, "deadman_s",
+		info->deadman_s, "limit_N_mm",
+		json_number(protocol->limit_N_mm > 0 ? protocol->limit_N_mm : NAN),
+		"own_gravity", !!(info->features & INCISE_HAPTIC_PAGE_GRAVITY), "filters",
+		json_text(info->filters), "note", json_text(info->note), "protocol",
+		list);
 }

@@ -2,7 +2,6 @@
 /*
  * The devices of a rig as a source. No loop may use them meanwhile: a device has one reader.
  */
-#include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <incise/rig.h>
@@ -188,22 +187,6 @@ static int64_t delay_ns(double ms, int64_t own_ns)
 	return isnan(ms) ? own_ns : (int64_t)(ms * 1e6);
 }
 
-/* A haptic device may be all that a rig has: then there are poses only. */
-static struct incise_rig *open_served(const char *spec, unsigned int camera)
-{
-	struct incise_error err = {0};
-	struct incise_rig *rig = incise_rig_open(
-		spec, INCISE_RIG_TRACKER | INCISE_RIG_FORCE | camera, &err);
-
-	if (!rig && err.code == ENODEV)
-		rig = incise_rig_open(spec, INCISE_RIG_TRACKER | camera, NULL);
-	if (rig && !incise_rig_force(rig) && !incise_rig_haptic(rig)) {
-		incise_rig_close(rig);
-		rig = NULL;
-	}
-	return cli_require(rig, &err);
-}
-
 struct serve_source *serve_rig_open(const struct serve_source_options *options,
 				    struct serve_info *info)
 {
@@ -214,7 +197,9 @@ struct serve_source *serve_rig_open(const struct serve_source_options *options,
 				      : INCISE_RIG_CAMERA | INCISE_RIG_IF_NAMED;
 
 	rig->base.ops = &rig_ops;
-	rig->rig = open_served(options->rig, camera);
+	rig->rig = cli_open_rig(options->rig, INCISE_RIG_TRACKER | INCISE_RIG_FORCE |
+						      INCISE_RIG_FORCE_IF_NAMED | camera);
+	incise_rig_haptic_place(rig->rig, &options->calibration);
 	if (!incise_clock_is_real(incise_rig_clock(rig->rig)))
 		cli_fail("%s: its clock is simulated, and clients live in real time; use "
 			 "clock=real",

@@ -147,6 +147,17 @@ INCISE_API void incise_haptic_info(const struct incise_haptic *haptic,
 /** Samples lost so far. */
 INCISE_API uint64_t incise_haptic_lost(const struct incise_haptic *haptic);
 
+#define INCISE_HAPTIC_CUT_MAX 16 /**< bytes of the reason of a cut */
+
+/**
+ * Count how often the device's owner has taken the force away, since the rig was opened, though the loop asked
+ * for one: its heartbeat was late, or its force was invalid. 0 of a device without an owner.
+ *
+ * @param why reason of the last one, as the word in the log of incise device; "": none
+ */
+INCISE_API unsigned int incise_haptic_cuts(const struct incise_haptic *haptic,
+					   char why[INCISE_HAPTIC_CUT_MAX]);
+
 /**
  * Print the cause of an error, or why there is no force, in one line that says what to do.
  *

@@ -101,7 +101,9 @@ struct incise_haptic_page_owner {
 	uint32_t error;	      /**< of a failed device, a positive errno, or 0 */
 	uint32_t reserved0;
 	char reason[256]; /**< of a failure, or of a sample's flags; ends with a 0 */
-	uint32_t reserved[6];
+	uint32_t cuts;	  /**< times that a user's force was taken away; 0: not counted */
+	char cut[16];	  /**< the reason of the last one, a word; ends with a 0 */
+	uint32_t reserved;
 };
 
 /** Request of a user. */

@@ -85,11 +85,11 @@ INCISE_API int incise_recorder_check_clock_source(const char *source,
  *
  * @param path  folder NAME.rec; must not exist
  * @param rig   opened with INCISE_RIG_TRACKER | INCISE_RIG_FORCE, optionally with
- *              INCISE_RIG_CAMERA; not owned
+ *              INCISE_RIG_CAMERA; not owned. Its haptic device is placed by the calibration.
  * @param setup not used after the call
  * @return recorder, to be ended with incise_recorder_close(); NULL with errno EEXIST, EINVAL
  *         (a path without a name; vision's thresholds; the source of wall time), ENODEV (the rig has neither a tracker nor
- *         force channel), EOPNOTSUPP (its tracker reads more than one sensor), ENOSPC (too
+ *         force channel, or none for the force that triggers), EOPNOTSUPP (its tracker reads more than one sensor), ENOSPC (too
  *         little space for planned_s), ENODATA (the program of a source of wall time that was
  *         named does not answer for 2 s), errno of mkdir(2), EIO, ENOMEM; ENOENT, ENOEXEC (a
  *         module for frames is not installed, or broken).

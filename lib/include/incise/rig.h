@@ -17,6 +17,7 @@
 #define INCISE_RIG_H
 
 #include <stdbool.h>
+#include <incise/calibration.h>
 #include <incise/camera.h>
 #include <incise/clock.h>
 #include <incise/error.h>
@@ -52,6 +53,8 @@ enum incise_rig_device {
 	 * The haptic device. It is opened for TRACKER and STEPPER, too, in a rig that has one.
 	 */
 	INCISE_RIG_HAPTIC = 64,
+	/** With FORCE: a rig with a haptic device need not name a force channel. */
+	INCISE_RIG_FORCE_IF_NAMED = 128,
 };
 
 /**
@@ -106,14 +109,12 @@ INCISE_API struct incise_stepper *incise_rig_axis(struct incise_rig *rig, int i,
 INCISE_API struct incise_haptic *incise_rig_haptic(struct incise_rig *rig);
 
 /**
- * Place the frame of the rig's haptic device in the scene, in place of rig.conf. A rig without one
- * ignores these three calls; its ages are 0.
- *
- * @param turn from the device's frame, unit, w first
- * @param origin_mm of the device, in the scene
+ * Place the rig's haptic device in the scene by the frame of a calibration, in place of rig.conf's. A
+ * calibration without a frame changes nothing. A rig without a haptic device ignores these three calls; its
+ * ages are 0.
  */
-INCISE_API void incise_rig_haptic_place(struct incise_rig *rig, const double turn[4],
-					const double origin_mm[3]);
+INCISE_API void incise_rig_haptic_place(struct incise_rig *rig,
+					const struct incise_calibration *calibration);
 
 /** Assume another latency than the device's nominal one, for plans that are made later. */
 INCISE_API void incise_rig_haptic_assume(struct incise_rig *rig, int64_t latency_ns);

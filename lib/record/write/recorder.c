@@ -324,7 +324,8 @@ static void recorder_free(struct incise_recorder *rec)
 	free(rec);
 }
 
-static int check_rig(const char *path, struct incise_rig *rig, struct incise_error *err)
+static int check_rig(const char *path, struct incise_rig *rig,
+		     const struct incise_recorder_setup *setup, struct incise_error *err)
 {
 	struct incise_tracker_info tracker;
 
@@ -334,6 +335,11 @@ static int check_rig(const char *path, struct incise_rig *rig, struct incise_err
 			"%s: a recording needs a tracker or a force channel, but the "
 			"rig %s was opened without them",
 			path, incise_rig_spec(rig));
+	if (setup->trigger_force_N > 0 && !incise_rig_force(rig))
+		return incise_error_set(err, ENODEV,
+					"%s: a force triggers, but the rig %s has no "
+					"force channel; choose another trigger",
+					path, incise_rig_spec(rig));
 	if (!incise_rig_tracker(rig))
 		return 0;
 	incise_tracker_info(incise_rig_tracker(rig), &tracker);
@@ -412,7 +418,7 @@ struct incise_recorder *incise_recorder_new(const char *path, struct incise_rig 
 	double point_mm[3], normal[3];
 	int rc;
 
-	if (check_rig(path, rig, err))
+	if (check_rig(path, rig, setup, err))
 		return NULL;
 	rec = calloc(1, sizeof(*rec));
 	if (!rec) {
@@ -433,6 +439,7 @@ struct incise_recorder *incise_recorder_new(const char *path, struct incise_rig 
 	rec->stats.full_scale_N =
 		rec->force_info.full_scale_V * 1e3 / rec->calibration.force_mV_N;
 	rec->stats.zero_mV = rec->calibration.force_zero_mV;
+	incise_rig_haptic_place(rig, &rec->calibration);
 	if (incise_rig_tracker(rig))
 		incise_tracker_info(incise_rig_tracker(rig), &rec->tracker_info);
 	if (incise_rig_camera(rig))

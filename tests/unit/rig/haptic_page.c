@@ -132,13 +132,82 @@ TEST(one_owner_one_user_and_a_dead_owners_page_is_replaced, open_page, close_pag
 	assert_int_equal(incise_haptic_page_new(&other, device, "test", &err), -EBUSY);
 	assert_int_equal(stat(page.path, &st), 0);
 	before = st.st_ino;
+	page.map->head.pid = INT32_MAX;		/* no process has it */
 	incise_haptic_page_close(&page, false); /* as by kill -9 */
 	assert_null(incise_haptic_attach("", device, "test", &setup, clock_, &err));
 	assert_int_equal(errno, ENOENT);
+	assert_non_null(strstr(err.text, "its owner has died; start it again"));
 	assert_int_equal(incise_haptic_page_new(&page, device, "test", &err), 0);
 	assert_int_equal(stat(page.path, &st), 0);
 	assert_true(st.st_ino != before &&
 		    st.st_size == sizeof(struct incise_haptic_page));
+}
+
+TEST(a_page_without_lock_or_magic_is_refused_at_once, open_page, close_page)
+{
+	page.map->head.magic[0] = 0;
+	assert_null(incise_haptic_attach("", device, "test", &setup, clock_, &err));
+	assert_int_equal(errno, EAGAIN);
+	assert_non_null(strstr(err.text, page.path));
+	assert_non_null(strstr(err.text, "its owner has not written the magic yet"));
+	page.map->head.magic[0] = 'I';
+	page.map->head.pid = (uint32_t)getpid();
+	incise_haptic_page_close(&page, false);
+	assert_null(incise_haptic_attach("", device, "test", &setup, clock_, &err));
+	assert_int_equal(errno, ENOENT);
+	assert_non_null(strstr(err.text, "a process serves it without a lock of byte 0"));
+	assert_int_equal(incise_haptic_page_new(&page, device, "test", &err), 0);
+}
+
+TEST(a_property_that_makes_no_sense_is_named, open_page, close_page)
+{
+	struct incise_haptic_page_device *d = &page.map->device, good = *d;
+
+	for (int i = 0; i < 7; i++) {
+		static const char *const words[] = {
+			"low_mm[2] of the device: found nan, expected a finite number;",
+			"peak_N of the device: found -1, expected a finite number from 0;",
+			"rate_hz of the device: found 20001, expected 1 to 20000;",
+			"force_latency_ns of the device: found -5, expected 0 to 1e9;",
+			"deadman_s of the device: found inf,",
+			"buttons of the device: found 33, expected 0 to 32;",
+			"device, name, filters or note of the device do not end with a 0;",
+		};
+
+		*d = good;
+		d->low_mm[2] = i == 0 ? NAN : 0;
+		d->peak_N = i == 1 ? -1 : 3;
+		d->rate_hz = i == 2 ? 20001 : 1000;
+		d->force_latency_ns = i == 3 ? -5 : 0;
+		d->deadman_s = i == 4 ? INFINITY : 0;
+		d->buttons = i == 5 ? 33 : 0;
+		if (i == 6)
+			memset(d->note, 'x', sizeof(d->note));
+		assert_null(
+			incise_haptic_attach("", device, "test", &setup, clock_, &err));
+		assert_int_equal(errno, EPROTO);
+		if (!strstr(err.text, words[i]))
+			fail_msg("%s: %s", words[i], err.text);
+	}
+}
+
+TEST(cuts_are_counted_since_the_user_came, open_page, close_page)
+{
+	struct incise_haptic_sample sample;
+	char why[INCISE_HAPTIC_CUT_MAX];
+
+	half.cuts = 3;
+	strcpy(half.cut, "late");
+	put_half();
+	succeeds(attach());
+	assert_int_equal(incise_haptic_cuts(user, why), 0);
+	assert_string_equal(why, "");
+	half.cuts = 5;
+	memset(half.cut, '\n', sizeof(half.cut));
+	put_half();
+	assert_int_equal(incise_haptic_read(user, &sample, 1), 0);
+	assert_int_equal(incise_haptic_cuts(user, why), 2);
+	assert_string_equal(why, "???????????????");
 }
 
 TEST(names_are_checked)
@@ -285,9 +354,6 @@ TEST(no_page_gets_past_the_checks, open_page, close_page)
 		memcpy(page.map, &whole, sizeof(whole));
 		if (k & 1)
 			mutate((uint32_t *)page.map, key, &n);
-		/* An owner that never finishes its page is waited for. */
-		if (!page.map->head.magic[0])
-			continue;
 		if (!attach())
 			continue;
 		attached++;
