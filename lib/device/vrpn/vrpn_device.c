@@ -10,7 +10,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include "../../base/monotonic.h"
 #include "../../base/vector.h"
 #include "vrpn_device.h"
@@ -56,14 +55,6 @@ static const struct {
 	[VRPN_FORCE_FIELD] = {"vrpn_ForceDevice Force_Field", 0},
 };
 
-static int64_t get_utc_ns(void)
-{
-	struct timespec now;
-
-	clock_gettime(CLOCK_REALTIME, &now);
-	return now.tv_sec * SECOND_NS + now.tv_nsec;
-}
-
 static uint32_t get_word(const uint8_t *from)
 {
 	uint32_t word;
@@ -97,7 +88,7 @@ static uint8_t *put_word(uint8_t *to, uint32_t word)
 
 static size_t pack_header(uint8_t *to, size_t n, int32_t sender, int32_t type)
 {
-	int64_t utc_ns = get_utc_ns();
+	int64_t utc_ns = incise_read_clock_ns(CLOCK_REALTIME);
 
 	memset(to, 0, HEADER + pad(n));
 	to = put_word(to, (uint32_t)(HEADER + n));
@@ -273,7 +264,8 @@ static bool take_description(struct vrpn_device *device, int32_t kind, int32_t n
 
 static int64_t find_time(struct vrpn_device *device, int64_t utc_ns)
 {
-	int64_t t_ns = utc_ns - (get_utc_ns() - incise_monotonic_ns());
+	int64_t t_ns =
+		utc_ns - (incise_read_clock_ns(CLOCK_REALTIME) - incise_monotonic_ns());
 
 	if (!utc_ns)
 		return device->arrival_ns;
@@ -620,20 +612,6 @@ static int explain_absence(const struct vrpn_device *device, const char *where,
 	return 0;
 }
 
-static int open_vrpn(struct vrpn_device *device,
-		     const struct incise_backend_request *request,
-		     struct incise_error *err)
-{
-	int rc = parse_device(device, request->arguments, request->where, err);
-
-	rc = rc ? rc : server_link_find(&device->link, "VRPN", request->where, err);
-	if (rc)
-		return rc;
-	device->own_machine = is_own_machine(&device->link);
-	learn_device(device);
-	return explain_absence(device, request->where, err);
-}
-
 void vrpn_device_free(struct vrpn_device *device)
 {
 	close_link(device);
@@ -644,15 +622,22 @@ struct vrpn_device *vrpn_device_new(const struct incise_backend_request *request
 				    uint32_t sensors, int64_t silent_ns, bool forces,
 				    struct incise_error *err)
 {
-	struct vrpn_device *device =
-		incise_haptic_new(sizeof(*device), NULL, request->where, err);
+	const char *where = request->where;
+	struct vrpn_device *device = incise_haptic_new(sizeof(*device), NULL, where, err);
 	int rc;
 
 	if (!device)
 		return NULL;
 	vrpn_device_init(device, sensors, silent_ns);
 	device->forces = forces;
-	rc = open_vrpn(device, request, err);
+	rc = parse_device(device, request->arguments, where, err);
+	if (!rc)
+		rc = server_link_find(&device->link, "VRPN", where, err);
+	if (!rc) {
+		device->own_machine = is_own_machine(&device->link);
+		learn_device(device);
+		rc = explain_absence(device, where, err);
+	}
 	if (!rc)
 		return device;
 	vrpn_device_free(device);
