@@ -166,23 +166,25 @@ void vrpn_device_init(struct vrpn_device *device, uint32_t sensors, int64_t sile
 	forget_numbers(device);
 }
 
-/*
- * It waits until the server has read that there is no force: a connection that is closed while poses
- * wait on it is reset, and a reset may overtake the force.
- */
-static void close_link(struct vrpn_device *device)
+static void end_force(struct vrpn_device *device)
 {
-	const struct server_link *link = &device->link;
+	if (!device->named)
+		return;
+	send_field(device, (const double[3]){0}, 0);
+	shutdown(device->link.fd, SHUT_WR);
+	device->named = false;
+	device->leaving = true;
+}
+
+/*
+ * Poses that wait on a connection as it is closed reset it, and a reset may overtake the force. False: the
+ * server has closed, too.
+ */
+static bool drop_poses(const struct vrpn_device *device)
+{
 	uint8_t bytes[4096];
 
-	if (device->named) {
-		send_field(device, (const double[3]){0}, 0);
-		shutdown(link->fd, SHUT_WR);
-		for (int i = 0; i < CLOSE_MS && recv(link->fd, bytes, sizeof(bytes), 0);
-		     i++)
-			server_link_wait(link, link->fd, POLLIN, 1);
-	}
-	server_link_close(&device->link);
+	return recv(device->link.fd, bytes, sizeof(bytes), 0);
 }
 
 static int fail(struct vrpn_device *device, int code, const char *what)
@@ -217,10 +219,10 @@ static int break_link(struct vrpn_device *device, int code, const char *what)
 		return fail(device, code, what);
 	if (new)
 		device->broken_ns = device->arrival_ns;
-	close_link(device);
+	end_force(device);
 	device->at = device->n = 0;
-	device->greeted = device->met = device->named = device->waits = false;
-	device->held = true;
+	device->greeted = device->met = device->waits = false;
+	device->held = device->leaving = true;
 	device->clock = (struct incise_sender_clock){0};
 	device->retry_ns = device->arrival_ns + RETRY_NS;
 	forget_numbers(device);
@@ -460,8 +462,12 @@ int vrpn_device_force(struct vrpn_device *device, const double force_N[3])
 
 static void try_again(struct vrpn_device *device)
 {
+	if (device->leaving)
+		drop_poses(device);
 	if (device->arrival_ns < device->retry_ns)
 		return;
+	server_link_close(&device->link);
+	device->leaving = false;
 	device->retry_ns = device->sound_ns = device->arrival_ns;
 	device->retry_ns += RETRY_NS;
 	server_link_start(&device->link);
@@ -500,7 +506,7 @@ int vrpn_device_receive(struct vrpn_device *device)
 	    device->arrival_ns - device->broken_ns > GONE_NS)
 		return fail(device, ENODEV,
 			    "broke its connection, and was not back after 10 s");
-	if (device->link.fd >= 0)
+	if (device->link.fd >= 0 && !device->leaving)
 		return receive_bytes(device);
 	try_again(device);
 	return 0;
@@ -614,7 +620,12 @@ static int explain_absence(const struct vrpn_device *device, const char *where,
 
 void vrpn_device_free(struct vrpn_device *device)
 {
-	close_link(device);
+	const struct server_link *link = &device->link;
+
+	end_force(device);
+	for (int i = 0; i < CLOSE_MS && device->leaving && drop_poses(device); i++)
+		server_link_wait(link, link->fd, POLLIN, 1);
+	server_link_close(&device->link);
 	free(device);
 }
 

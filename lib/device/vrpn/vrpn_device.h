@@ -78,10 +78,11 @@ struct vrpn_device {
 	uint32_t sensors;	      /* that are used, as bits */
 	double origin_m[3];	      /* the last sound position */
 	uint32_t pressed;
-	int force_error;   /* of the device, by its server; 0: none */
-	bool forces;	   /* it is to take them … */
-	bool held;	   /* … after a push of none */
-	bool learnt;	   /* rate and age are known: a link that breaks is made again */
+	int force_error; /* of the device, by its server; 0: none */
+	bool forces;	 /* it is to take them … */
+	bool held;	 /* … after a push of none */
+	bool leaving; /* it has sent its last force, and drops poses until it is closed */
+	bool learnt;  /* rate and age are known: a link that breaks is made again */
 	int64_t broken_ns; /* without a sound pose since; 0: not broken */
 	int64_t retry_ns;  /* of the next connection */
 	/* A tracker has these. */

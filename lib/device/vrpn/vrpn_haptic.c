@@ -59,7 +59,9 @@ static int haptic_push(struct incise_haptic *haptic, const double force_N[3],
 
 static int haptic_wait(struct incise_haptic *haptic, int64_t most_ns)
 {
-	struct pollfd on = {.fd = device_of(haptic)->link.fd, .events = POLLIN};
+	const struct vrpn_device *device = device_of(haptic);
+	struct pollfd on = {.fd = device->leaving ? -1 : device->link.fd,
+			    .events = POLLIN};
 	struct timespec most = {most_ns / 1000000000, most_ns % 1000000000};
 
 	return ppoll(&on, 1, &most, NULL) < 0 ? -errno : 0;
