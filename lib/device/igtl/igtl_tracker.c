@@ -353,11 +353,4 @@ static void *tracker_open(const struct incise_backend_request *request,
 	return NULL;
 }
 
-const struct incise_backend incise_tracker_igtl = {
-	.abi = INCISE_BACKEND_ABI,
-	.kind = "tracker",
-	.name = "igtl",
-	.open = tracker_open,
-};
-
-INCISE_MODULE(incise_tracker_igtl);
+INCISE_BACKEND(incise_tracker_igtl, "tracker", "igtl", .open = tracker_open);
