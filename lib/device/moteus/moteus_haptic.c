@@ -504,12 +504,7 @@ static void *open_moteus(const struct incise_backend_request *request,
 
 /* --- search -------------------------------------------------------------------------- */
 
-struct found_drive {
-	int answers;
-	struct moteus_reply last;
-};
-
-static void receive_answers(struct can_bus *bus, struct found_drive *drives, int64_t ns)
+static void receive_answers(struct can_bus *bus, struct motor *drives, int64_t ns)
 {
 	int64_t until_ns = bus->ops->now(bus) + ns, t_ns;
 	struct moteus_reply reply;
@@ -524,7 +519,7 @@ static void receive_answers(struct can_bus *bus, struct found_drive *drives, int
 			}
 }
 
-static int report_drive(const char *interface, int id, const struct found_drive *drive,
+static int report_drive(const char *interface, int id, const struct motor *drive,
 			incise_scan_found *found, void *context)
 {
 	const struct moteus_reply *last = &drive->last;
@@ -549,7 +544,7 @@ int moteus_scan_on(const struct can_transport *transport, const char *interface,
 {
 	const struct can_bus_request request = {
 		.where = "moteus", .device = interface, .node = LOCK, .fd = true};
-	struct found_drive drives[MOTEUS_ID_MAX + 1] = {0};
+	struct motor drives[MOTEUS_ID_MAX + 1] = {0};
 	struct canfd_frame frame;
 	struct can_bus *bus;
 	int rc = transport->open(&bus, &request, err), sent = 0;

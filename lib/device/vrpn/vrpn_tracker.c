@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
  * A tracker of a VRPN server, "vrpn:NAME@HOST[:PORT]": sensor n - 1 is station n.
- * incise_tracker_read() receives without waiting: one or two system calls, no lock.
+ * incise_tracker_read() receives without waiting: one or two system calls, no lock; while it is connected
+ * again, some more each 250 ms.
  */
 #include <stdio.h>
 #include <string.h>
