@@ -1,15 +1,11 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * The same in each backend of a haptic device: opening, failing, and the largest force.
+ * The same in each backend of a haptic device: how it is opened and ends, and the largest force.
  */
 #ifndef INCISE_RIG_HAPTIC_BACKEND_H
 #define INCISE_RIG_HAPTIC_BACKEND_H
 
 #include <incise/backend.h>
-
-/* A struct of @size zeros that begins with a struct incise_haptic. NULL with errno and a message. */
-void *incise_haptic_new(size_t size, const struct incise_haptic_ops *ops,
-			const char *where, struct incise_error *err);
 
 /* Return @haptic from open(), or after an error @rc close it: NULL with errno. */
 void *incise_haptic_opened(struct incise_haptic *haptic, int rc);

@@ -494,11 +494,12 @@ static int choose_inverse3(struct haply *h, const char *where, struct incise_err
 static void *open_haply(const struct incise_backend_request *request,
 			struct incise_error *err)
 {
-	struct haply *h = incise_haptic_new(sizeof(*h), &ops, request->where, err);
+	struct haply *h = incise_device_new(sizeof(*h), request->where, err);
 	int rc;
 
 	if (!h)
 		return NULL;
+	h->haptic.ops = &ops;
 	h->clock = request->clock;
 	rc = connect_service(h, request->arguments, request->where, err);
 	if (!rc)
@@ -512,7 +513,7 @@ static void *open_haply(const struct incise_backend_request *request,
 static int scan_haply(const char *arguments, incise_scan_found *found, void *context,
 		      struct incise_error *err)
 {
-	struct haply *h = incise_haptic_new(sizeof(*h), &ops, "haply", err);
+	struct haply *h = incise_device_new(sizeof(*h), "haply", err);
 	struct incise_clock *clock = incise_clock_new_real();
 	char *rest, *id;
 	int rc = h && clock ? 0 : -ENOMEM;

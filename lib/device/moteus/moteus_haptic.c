@@ -477,11 +477,12 @@ void *moteus_open_on(const struct can_transport *transport,
 	char interface[INTERFACE];
 	const struct can_bus_request bus = {
 		.where = where, .device = interface, .node = LOCK, .fd = true};
-	struct moteus *m = incise_haptic_new(sizeof(*m), &moteus_ops, where, err);
+	struct moteus *m = incise_device_new(sizeof(*m), where, err);
 	int rc;
 
 	if (!m)
 		return NULL;
+	m->haptic.ops = &moteus_ops;
 	m->haptic.info.rate_hz =
 		request->haptic->rate_hz > 0 ? request->haptic->rate_hz : RATE_HZ;
 	rc = take_words(m, request->arguments, interface, where, err);

@@ -634,7 +634,7 @@ struct vrpn_device *vrpn_device_new(const struct incise_backend_request *request
 				    struct incise_error *err)
 {
 	const char *where = request->where;
-	struct vrpn_device *device = incise_haptic_new(sizeof(*device), NULL, where, err);
+	struct vrpn_device *device = incise_device_new(sizeof(*device), where, err);
 	int rc;
 
 	if (!device)

@@ -27,6 +27,7 @@
 #define INCISE_VRPN_DEVICE_H
 
 #include <incise/backend.h>
+#include "../../rig/backends.h"
 #include "../../rig/haptic_backend.h"
 #include "../../rig/pace.h"
 #include "../../rig/sender_clock.h"

@@ -15,7 +15,6 @@
 #include <float.h>
 #include <poll.h>
 #include <stdio.h>
-#include "../../rig/backends.h"
 #include "vrpn_device.h"
 
 #define SILENT_NS INT64_C(1000000000)

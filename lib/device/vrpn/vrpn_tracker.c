@@ -7,7 +7,6 @@
 #include <stdio.h>
 #include <string.h>
 #include "../../base/vector.h"
-#include "../../rig/backends.h"
 #include "vrpn_device.h"
 
 #define SLIP 2 /* periods */

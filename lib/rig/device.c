@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The same in each backend of a haptic device; see haptic_backend.h.
+ * The same in each backend; see backends.h and haptic_backend.h.
  */
 #include <errno.h>
 #include <stdarg.h>
@@ -8,18 +8,19 @@
 #include <stdlib.h>
 #include <string.h>
 #include "../base/vector.h"
+#include "backends.h"
 #include "haptic_backend.h"
 
-void *incise_haptic_new(size_t size, const struct incise_haptic_ops *ops,
-			const char *where, struct incise_error *err)
-{
-	struct incise_haptic *haptic = calloc(1, size);
+#define CACHE_LINE 64
 
-	if (haptic)
-		haptic->ops = ops;
-	else
-		errno = -incise_error_set(err, ENOMEM, "%s: %s", where, strerror(ENOMEM));
-	return haptic;
+void *incise_device_new(size_t size, const char *where, struct incise_error *err)
+{
+	void *device = aligned_alloc(CACHE_LINE, size + CACHE_LINE - size % CACHE_LINE);
+
+	if (!device)
+		return INCISE_ERROR_NULL(err, ENOMEM,
+					 "%s: out of memory; end other programs", where);
+	return memset(device, 0, size);
 }
 
 void *incise_haptic_opened(struct incise_haptic *haptic, int rc)
