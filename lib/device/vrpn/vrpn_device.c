@@ -230,7 +230,7 @@ static int break_link(struct vrpn_device *device, int code, const char *what)
 	if (new && device->forces)
 		put_break(device);
 	snprintf(device->haptic.cause, sizeof(device->haptic.cause),
-		 "%s %s, and is connected again; see its server's messages",
+		 "%s %s; it is connected again for 10 s, see its server's messages",
 		 device->haptic.info.name, what);
 	return 0;
 }
