@@ -188,6 +188,8 @@ static void measure_torque(struct torque_job *job)
 			"%s: its largest force is not known; set haptic_setup.peak_N in rig.conf",
 			job->handle.info.name);
 	rc = handle_record(&job->handle, 0.3, &err);
+	/* While it starts a device is not ready. */
+	job->handle.flags = job->handle.last.flags;
 	v3_copy(job->start_mm, job->handle.last.position_mm);
 	for (int i = 0; !rc && i < 2 * PASSES; i++)
 		rc = move_once(job, i / 2, i % 2, &err);

@@ -22,6 +22,9 @@
 	INCISE_API extern const struct incise_backend incise_backend \
 		__attribute__((weak, alias(#backend)))
 
+/* A device of zeros, which has its own cache lines; free(3) frees it. NULL with errno and a message. */
+void *incise_device_new(size_t size, const char *where, struct incise_error *err);
+
 /* A backend and the module that it came from. */
 struct incise_loaded {
 	const struct incise_backend *backend;

@@ -27,8 +27,10 @@ void incise_haptic_set_info(struct incise_haptic *haptic,
 		{setup->rate_hz, &info->rate_hz},
 	};
 
-	memset(info, 0, sizeof(*info));
-	haptic->ops->info(haptic, info);
+	if (haptic->ops->info) {
+		memset(info, 0, sizeof(*info));
+		haptic->ops->info(haptic, info);
+	}
 	for (size_t i = 0; i < sizeof(rows) / sizeof(*rows); i++)
 		if (rows[i].of_rig > 0)
 			*rows[i].to = rows[i].of_rig;
@@ -94,7 +96,7 @@ void incise_haptic_close(struct incise_haptic *haptic)
 int incise_haptic_read(struct incise_haptic *haptic, struct incise_haptic_sample *samples,
 		       int n)
 {
-	return haptic->ops->read(haptic, samples, n);
+	return haptic->error ? haptic->error : haptic->ops->read(haptic, samples, n);
 }
 
 int incise_haptic_push(struct incise_haptic *haptic, const double force_N[3],
@@ -105,7 +107,7 @@ int incise_haptic_push(struct incise_haptic *haptic, const double force_N[3],
 
 	if (!v3_finite(force_N) || !v3_finite(torque))
 		return -EDOM;
-	return haptic->ops->push(haptic, force_N, torque);
+	return haptic->error ? haptic->error : haptic->ops->push(haptic, force_N, torque);
 }
 
 void incise_haptic_info(const struct incise_haptic *haptic,
@@ -116,7 +118,7 @@ void incise_haptic_info(const struct incise_haptic *haptic,
 
 uint64_t incise_haptic_lost(const struct incise_haptic *haptic)
 {
-	return haptic->ops->lost(haptic);
+	return haptic->ops->lost ? haptic->ops->lost(haptic) : haptic->lost;
 }
 
 int64_t incise_haptic_ages_add(struct incise_haptic_ages *ages, int64_t t_ns,
@@ -136,7 +138,7 @@ int64_t incise_haptic_ages_add(struct incise_haptic_ages *ages, int64_t t_ns,
 int incise_haptic_cause(struct incise_haptic *haptic, char *text, size_t size)
 {
 	return haptic->ops->cause ? haptic->ops->cause(haptic, text, size)
-				  : snprintf(text, size, "%s", "");
+				  : snprintf(text, size, "%s", haptic->cause);
 }
 
 unsigned int incise_haptic_cuts(const struct incise_haptic *haptic,

@@ -4,6 +4,7 @@
  */
 #include <math.h>
 #include "../base/vector.h"
+#include "haptic_backend.h"
 #include "haptic_page.h"
 
 /* Without a decision for so long the device may have dropped the force by itself. */
@@ -48,18 +49,6 @@ static INCISE_REALTIME void ramp_up(struct haptic_gate *gate, int64_t now_ns)
 							    INCISE_HAPTIC_PAGE_RAMP_NS);
 }
 
-/* @most: 0: not known, or none is taken: nothing is given. */
-static INCISE_REALTIME void give(double to[3], const double from[3], double share,
-				 double most)
-{
-	double length = v3_length(from), factor = most > 0 ? share : 0;
-
-	if (length * factor > most)
-		factor = most / length;
-	for (int i = 0; i < 3; i++)
-		to[i] = factor > 0 ? factor * from[i] : 0;
-}
-
 const char *incise_haptic_gate(struct haptic_gate *gate,
 			       const struct incise_haptic_page_user *half, int64_t now_ns,
 			       double force_N[3], double torque_N_mm[3])
@@ -81,7 +70,8 @@ const char *incise_haptic_gate(struct haptic_gate *gate,
 	else
 		gate->share = 0;
 	gate->now_ns = now_ns;
-	give(force_N, gate->last.force_N, gate->share, gate->peak_N);
-	give(torque_N_mm, gate->last.torque_N_mm, gate->share, gate->torque_N_mm);
+	incise_haptic_limit(force_N, gate->last.force_N, gate->share, gate->peak_N);
+	incise_haptic_limit(torque_N_mm, gate->last.torque_N_mm, gate->share,
+			    gate->torque_N_mm);
 	return why;
 }

@@ -45,31 +45,37 @@ static void watch_peer(int fd)
 			   sizeof(options[i].value));
 }
 
-int server_link_connect(struct server_link *link)
+int server_link_start(struct server_link *link)
 {
-	int fd = socket(link->address.ss_family,
-			SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-	socklen_t size = sizeof(int);
-	int rc, code = 0;
+	int rc = 0, fd = socket(link->address.ss_family,
+				SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
 
 	if (fd < 0)
 		return -errno;
-	rc = connect(fd, (const struct sockaddr *)&link->address, link->address_n)
-		     ? -errno
-		     : 0;
-	if (rc == -EINPROGRESS) {
-		rc = server_link_wait(link, fd, POLLOUT, CONNECT_MS);
-		rc = rc == 1 ? 0 : rc ? rc : -ETIMEDOUT;
-		if (!rc && !getsockopt(fd, SOL_SOCKET, SO_ERROR, &code, &size))
-			rc = -code;
-	}
-	if (rc) {
-		close(fd);
-		return rc;
-	}
-	watch_peer(fd);
 	link->fd = fd;
-	return 0;
+	watch_peer(fd);
+	if (connect(fd, (const struct sockaddr *)&link->address, link->address_n) &&
+	    errno != EINPROGRESS) {
+		rc = -errno;
+		server_link_close(link);
+	}
+	return rc;
+}
+
+int server_link_connect(struct server_link *link)
+{
+	socklen_t size = sizeof(int);
+	int code = 0, rc = server_link_start(link);
+
+	if (rc)
+		return rc;
+	rc = server_link_wait(link, link->fd, POLLOUT, CONNECT_MS);
+	rc = rc == 1 ? 0 : rc ? rc : -ETIMEDOUT;
+	if (!rc && !getsockopt(link->fd, SOL_SOCKET, SO_ERROR, &code, &size))
+		rc = -code;
+	if (rc)
+		server_link_close(link);
+	return rc;
 }
 
 void server_link_close(struct server_link *link)

@@ -30,6 +30,9 @@ int server_link_find(struct server_link *link, const char *protocol, const char 
 
 /* Connect to the address that was found, within 2 s. 0 or -errno; -ECANCELED: to stop. */
 int server_link_connect(struct server_link *link);
+
+/* The same without waiting: it is connected, or has failed, once it has POLLOUT. */
+int server_link_start(struct server_link *link);
 void server_link_close(struct server_link *link);
 
 /* Until @fd has @events, it is to stop (-ECANCELED), or @ms are over (0). 1: ready. */

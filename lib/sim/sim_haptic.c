@@ -213,7 +213,8 @@ static INCISE_REALTIME void take_pushes(struct sim_haptic *sim)
 
 /* --- samples ---------------------------------------------------------------------------- */
 
-static INCISE_REALTIME double measure(const struct sim_haptic *sim, int i, double ahead_s)
+static INCISE_REALTIME double measure_axis(const struct sim_haptic *sim, int i,
+					   double ahead_s)
 {
 	const struct axis *axis = &sim->axis[i];
 	const struct config *config = &sim->config;
@@ -233,7 +234,7 @@ static INCISE_REALTIME void acquire_sample(struct sim_haptic *sim, int64_t t_ns)
 	bool spoilt = has_fault(sim, GIVES_NAN, t_ns);
 
 	for (int i = 0; i < 3; i++) {
-		to.position_mm[i] = spoilt ? NAN : measure(sim, i, ahead_s);
+		to.position_mm[i] = spoilt ? NAN : measure_axis(sim, i, ahead_s);
 		to.velocity_mm_s[i] = sim->axis[i].v;
 	}
 	for (int i = 0; i < BUTTONS; i++)

@@ -37,7 +37,8 @@ static void check(struct vrpn_device *device, int64_t *last_ns)
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+/* @learnt: behind what is no VRPN a new connection begins. */
+static void feed(const uint8_t *data, size_t size, bool learnt)
 {
 	static struct vrpn_device device;
 	size_t part = size ? data[size - 1] + 1u : 1;
@@ -48,6 +49,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 	vrpn_device_init(&device, 1, INT64_MAX);
 	snprintf(device.device, sizeof(device.device), "Tool");
 	device.last.sample.t_ns = INT64_MIN;
+	device.learnt = device.forces = learnt;
 	/* As a connection gives them, without one. */
 	for (size_t at = 0; at < size; at += part) {
 		size_t n = part < size - at ? part : size - at;
@@ -62,5 +64,11 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 		device.arrival_ns += 1000000;
 		check(&device, &last_ns);
 	}
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+	feed(data, size, false);
+	feed(data, size, true);
 	return 0;
 }

@@ -14,7 +14,7 @@ a line each, print one line when they are done:
 
     say PATH JSON       set a value of the frames: inverse3.state.cursor_position.x 0.1
     drop PATH           take it out
-    late MS N           the next N answers come later
+    hold, release       no answers, and those that were held
     raw N TEXT          answer N messages by TEXT as it is
     id ID               the Inverse3 has another id: it was plugged in again; "" takes it away
     event JSON          send an event
@@ -97,7 +97,8 @@ class Service:
         self.force = None
         self.profile = None
         self.complaints = []
-        self.late = [0, 0]
+        self.answers = asyncio.Event()
+        self.answers.set()
         self.raw = [0, ""]
         self.writers, self.listeners = [], []
         config = {"type": "inverse3", "port": "/dev/ttyACM0",
@@ -186,9 +187,7 @@ class Service:
                     full = False
                 first = False
                 answer = self.frame(full)
-                if self.late[1]:
-                    self.late[1] -= 1
-                    await asyncio.sleep(self.late[0] / 1000)
+                await self.answers.wait()
                 if self.raw[0]:
                     self.raw[0] -= 1
                     answer = self.raw[1]
@@ -221,8 +220,10 @@ class Service:
                 at[name] = json.loads(value)
             else:
                 at.pop(name, None)
-        elif word == "late":
-            self.late = [float(rest.split()[0]), int(rest.split()[1])]
+        elif word == "hold":
+            self.answers.clear()
+        elif word == "release":
+            self.answers.set()
         elif word == "raw":
             self.raw = [int(rest.partition(" ")[0]), rest.partition(" ")[2]]
         elif word == "id":

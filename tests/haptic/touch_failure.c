@@ -1,7 +1,21 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * touch_failure NAME: ticks of examples/openhaptics around an error of the device, under a force of its user.
+ * touch_failure NAME: ticks of examples/openhaptics around an error of the device, under a force of its user,
+ * on a clock that stands still between ticks.
  */
+#include <stdint.h>
+#include <time.h>
+
+static int64_t clock_ns = 1000000000;
+
+static int read_clock(struct timespec *t)
+{
+	t->tv_sec = clock_ns / 1000000000;
+	t->tv_nsec = clock_ns % 1000000000;
+	return 0;
+}
+
+#define clock_gettime(id, t) read_clock(t)
 #define main device_main
 #include "../../examples/openhaptics/device.c"
 #undef main
@@ -16,7 +30,7 @@ static HDCallbackCode tick(struct touch *touch)
 	user.period_ns = INCISE_HAPTIC_PAGE_PERIOD_NS;
 	user.force_N[0] = 1;
 	incise_haptic_page_put(&touch->owner.page->user, &user, sizeof(user));
-	usleep(1000);
+	clock_ns += 1000000;
 	return serve(touch);
 }
 

@@ -180,11 +180,9 @@ static void *force_open(const struct incise_backend_request *request,
 			"%s: expected iio:NAME, for example iio:iio:device0; "
 			"see `incise info devices`",
 			request->where);
-	f = aligned_alloc(_Alignof(struct iio_force), sizeof(*f));
+	f = incise_device_new(sizeof(*f), request->where, err);
 	if (!f)
-		return INCISE_ERROR_NULL(err, ENOMEM, "%s: out of memory",
-					 request->where);
-	memset(f, 0, sizeof(*f));
+		return NULL;
 	f->feed.force.ops = &force_ops;
 	f->feed.stop = -1;
 	f->source.fd = -1;

@@ -10,18 +10,26 @@
  *     read()            ·                  state       ·                  state
  *     push()          force                          force
  *
- * A state is as young as its message, or younger. No message follows one that has no answer yet.
+ * A state is as young as its message, or younger. No message follows one that has no answer yet: the
+ * service holds its force so long. Behind a late answer
+ *
+ *     late by periods     0 ─────── 2 ─────── 3 ───────▶ deadman
+ *     force               all of it   fades to 0      0   not ready
+ *
+ * beyond the latency, and it returns by the ramp of each owner.
+ *
  * Safety and batteries are events of a second port, where there is one.
  */
 #include <errno.h>
 #include <poll.h>
+#include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <libwebsockets.h>
-#include "../../base/monotonic.h"
+#include <incise/haptic_page.h>
 #include "../../base/vector.h"
 #include "../../rig/backends.h"
+#include "../../rig/haptic_backend.h"
 #include "haply_message.h"
 
 #define MS INT64_C(1000000)
@@ -31,7 +39,7 @@
 #define OPEN_NS (3000 * MS)
 #define ANSWER_NS MS /* assumed, of poses and forces */
 #define CLOSE_NS (100 * MS)
-#define LATE_PERIODS 4
+#define HELD_PERIODS 2	      /* missed, with all of the force */
 #define CONFIG_NS (1000 * MS) /* between two requests for the config */
 #define BRIEF_NS (1000 * MS)  /* a protection counts that no event ends */
 #define REPEATS 2	      /* messages with the force of one push */
@@ -52,7 +60,7 @@ struct haply_link {
 
 struct haply {
 	struct incise_haptic haptic; /* first */
-	struct incise_haptic_info info;
+	struct incise_clock *clock;
 	char host[256], id[HAPLY_ID_SIZE], grip[HAPLY_ID_SIZE];
 	int port;
 	struct lws_context *context;
@@ -62,20 +70,20 @@ struct haply {
 	struct haply_frame frame; /* the last one */
 	enum haply_format format;
 	int64_t period_ns, due_ns, sent_ns, config_ns;
-	bool waits; /* for the answer of a message; at first, for the inventory */
-	bool late;  /* it is, and a sample has said so */
+	bool waits;   /* for the answer of a message; at first, for the inventory */
+	bool late;    /* it is beyond the deadman, and a sample has said so */
+	double share; /* 0 … 1, of the force, as answers are in time */
+	int64_t answered_ns;
 	double force_N[3];
 	int repeats; /* messages with this force */
 	struct incise_haptic_sample sample;
 	bool has_sample, mount_scaled;
-	uint64_t seq, lost;
+	uint64_t seq;
 	int bad;	  /* frames in a row */
 	uint32_t states;  /* haply_protection, BATTERY and CHANGED */
 	int64_t brief_ns; /* HAPLY_BRIEF began */
 	char event[160];  /* the last state's */
 	char ended[300];  /* why there is no force until it is opened again; or "" */
-	int error;	  /* negative; for good */
-	char cause[400];
 };
 
 static struct haply *haply_of(const struct incise_haptic *haptic)
@@ -85,17 +93,21 @@ static struct haply *haply_of(const struct incise_haptic *haptic)
 
 /* --- samples -------------------------------------------------------------------------- */
 
+static int64_t get_now(const struct haply *h)
+{
+	return incise_clock_now(h->clock);
+}
+
 static void fail(struct haply *h, int error, const char *cause)
 {
-	h->error = error;
-	snprintf(h->cause, sizeof(h->cause), "the Inverse Service at %s port %d %s",
-		 h->host, h->port, cause);
+	incise_haptic_end(&h->haptic, error, "the Inverse Service at %s port %d %s",
+			  h->host, h->port, cause);
 }
 
 /* Position and orientation are there already. */
 static void add_sample(struct haply *h, int64_t t_ns, const char *not_ready)
 {
-	if (incise_monotonic_ns() - h->brief_ns > BRIEF_NS)
+	if (get_now(h) - h->brief_ns > BRIEF_NS)
 		h->states &= ~(uint32_t)HAPLY_BRIEF;
 	h->sample.t_ns = t_ns;
 	h->sample.seq = h->seq++;
@@ -106,22 +118,24 @@ static void add_sample(struct haply *h, int64_t t_ns, const char *not_ready)
 	h->has_sample = true;
 	if (h->states & INCISE_HAPTIC_CHANGED)
 		not_ready = "was unplugged, or is another one now; start again";
-	snprintf(h->cause, sizeof(h->cause), h->sample.flags ? "Inverse3 %s %s%s" : "",
-		 h->id, not_ready ? not_ready : h->event,
+	snprintf(h->haptic.cause, sizeof(h->haptic.cause),
+		 h->sample.flags ? "Inverse3 %s %s%s" : "", h->id,
+		 not_ready ? not_ready : h->event,
 		 not_ready ? "" : "; see the manual of the device");
 	if (*h->ended)
-		snprintf(h->cause, sizeof(h->cause), "Inverse3 %s: %s", h->id, h->ended);
+		snprintf(h->haptic.cause, sizeof(h->haptic.cause), "Inverse3 %s: %s",
+			 h->id, h->ended);
 }
 
 static void use_config(struct haply *h)
 {
 	h->mount_scaled = h->frame.mount_scaled;
-	if (*h->info.filters && strcmp(h->info.filters, h->frame.filters))
+	if (*h->haptic.info.filters && strcmp(h->haptic.info.filters, h->frame.filters))
 		snprintf(h->ended, sizeof(h->ended),
 			 "its filters changed (now %s): start again", h->frame.filters);
 }
 
-static void use_frame(struct haply *h, bool late)
+static void use_frame(struct haply *h)
 {
 	const struct haply_frame *frame = &h->frame;
 	const char *not_ready = frame->not_ready;
@@ -137,25 +151,37 @@ static void use_frame(struct haply *h, bool late)
 	h->sample.buttons = frame->buttons;
 	if (!not_ready && (frame->scaled || h->mount_scaled))
 		not_ready = SCALED;
-	add_sample(h, h->sent_ns, !not_ready && late ? LATE : not_ready);
+	add_sample(h, h->sent_ns, not_ready);
+}
+
+static void share_force(struct haply *h)
+{
+	int64_t t_ns = get_now(h);
+	double late_ns = (double)(t_ns - h->sent_ns - h->haptic.info.latency_ns);
+	double ramp = (double)(t_ns - h->answered_ns) / INCISE_HAPTIC_PAGE_RAMP_NS;
+
+	h->share =
+		fmin(h->share + ramp, HELD_PERIODS + 1 - late_ns / (double)h->period_ns);
+	h->share = fmin(fmax(h->share, 0), 1);
+	h->answered_ns = t_ns;
 }
 
 static void take_frame(struct haply *h, const char *text, size_t n)
 {
-	bool late = incise_monotonic_ns() - h->sent_ns > LATE_PERIODS * h->period_ns;
-
 	/* No message asked for this frame. */
 	if (!h->waits)
 		return;
 	h->waits = h->late = false;
+	if (h->period_ns)
+		share_force(h);
 	/* A VerseGrip that comes after the start is not that of the plan. */
 	if (!haply_frame_parse(&h->frame, text, n, h->id,
 			       h->period_ns && !*h->grip ? NULL : h->grip)) {
 		h->bad = 0;
-		use_frame(h, late && h->period_ns);
+		use_frame(h);
 		return;
 	}
-	h->lost++;
+	h->haptic.lost++;
 	add_sample(
 		h, h->sample.t_ns,
 		"sent a frame that is not understood; see the messages of its service");
@@ -171,7 +197,7 @@ static void take_event(struct haply *h, const char *text, size_t n)
 	h->states |= (uint32_t)(state > 0 ? state : 0);
 	h->states &= ~(uint32_t)(state < 0 ? -state : 0);
 	if (state == HAPLY_BRIEF)
-		h->brief_ns = incise_monotonic_ns();
+		h->brief_ns = get_now(h);
 }
 
 /* --- connections ---------------------------------------------------------------------- */
@@ -243,6 +269,12 @@ static void connect_link(struct haply *h, struct haply_link *link, int port)
 		link->wsi = NULL;
 }
 
+/* While it is opened, the port of the events counts, too. */
+static bool is_awaited(const struct haply *h)
+{
+	return h->waits || (!h->period_ns && h->events.wsi && !h->events.is_open);
+}
+
 /* Until the answer is there, the connection ends, or the time is over. 0 or -EINTR. */
 static int wait_answer(struct haply *h, int64_t until_ns)
 {
@@ -253,8 +285,8 @@ static int wait_answer(struct haply *h, int64_t until_ns)
 		int64_t left_ns;
 
 		lws_service(h->context, -1);
-		left_ns = until_ns - incise_monotonic_ns();
-		if (!h->waits || !link->wsi || left_ns <= 0)
+		left_ns = until_ns - get_now(h);
+		if (!is_awaited(h) || !link->wsi || left_ns <= 0)
 			return 0;
 		/* While it connects, the library has sockets and timers of its own. */
 		on.fd = link->is_open ? lws_get_socket_fd(link->wsi) : -1;
@@ -270,7 +302,7 @@ static int wait_answer(struct haply *h, int64_t until_ns)
 static void send_message(struct haply *h)
 {
 	const double none_N[3] = {0};
-	int64_t now_ns = incise_monotonic_ns();
+	int64_t now_ns = get_now(h);
 	const char *session = NULL;
 
 	if (!h->config_ns)
@@ -293,22 +325,21 @@ static void send_message(struct haply *h)
 static int wait_haply(struct incise_haptic *haptic, int64_t most_ns)
 {
 	struct haply *h = haply_of(haptic);
-	int64_t now_ns = incise_monotonic_ns(), until_ns = now_ns + most_ns, late_ns;
+	int64_t now_ns = get_now(h), until_ns = now_ns + most_ns, dead_ns;
 	int rc;
 
-	if (h->error || (!h->waits && now_ns < h->due_ns)) {
-		if (!h->error && h->due_ns < until_ns)
-			until_ns = h->due_ns;
-		incise_monotonic_sleep_until(until_ns);
-		return 0;
-	}
+	if (haptic->error)
+		return incise_clock_wait_until(h->clock, until_ns);
+	if (!h->waits && now_ns < h->due_ns)
+		return incise_clock_wait_until(h->clock, h->due_ns < until_ns ? h->due_ns
+									      : until_ns);
 	if (!h->waits)
 		send_message(h);
-	late_ns = h->sent_ns + LATE_PERIODS * h->period_ns;
-	rc = wait_answer(h, until_ns > late_ns && !h->late ? late_ns : until_ns);
+	dead_ns = h->sent_ns + (int64_t)(DEADMAN_S * INCISE_NS_PER_S);
+	rc = wait_answer(h, until_ns > dead_ns && !h->late ? dead_ns : until_ns);
 	if (!h->frames.wsi)
 		fail(h, -ENODEV, "closed the connection; start it, then start again");
-	if (h->waits && !h->late && incise_monotonic_ns() >= late_ns) {
+	if (h->waits && !h->late && get_now(h) >= dead_ns) {
 		h->late = true;
 		add_sample(h, h->sample.t_ns, LATE);
 	}
@@ -320,8 +351,6 @@ static int read_haply(struct incise_haptic *haptic, struct incise_haptic_sample 
 {
 	struct haply *h = haply_of(haptic);
 
-	if (h->error)
-		return h->error;
 	if (n < 1 || !h->has_sample)
 		return 0;
 	*samples = h->sample;
@@ -329,36 +358,17 @@ static int read_haply(struct incise_haptic *haptic, struct incise_haptic_sample 
 	return 1;
 }
 
-/* Without a known largest force there is none. */
 static int push_haply(struct incise_haptic *haptic, const double force_N[3],
 		      const double torque_N_mm[3])
 {
 	struct haply *h = haply_of(haptic);
-	double size_N = v3_length(force_N), peak_N = haptic->info.peak_N;
-	double share = size_N > peak_N ? peak_N / size_N * (1 - 1e-12) : 1;
+	bool off = h->sample.flags & ~(uint32_t)INCISE_HAPTIC_BATTERY;
 
 	(void)torque_N_mm;
-	if (h->sample.flags & ~(uint32_t)INCISE_HAPTIC_BATTERY)
-		share = 0;
-	for (int i = 0; i < 3; i++)
-		h->force_N[i] = force_N[i] * share;
+	incise_haptic_limit(h->force_N, force_N, off ? 0 : h->share,
+			    haptic->info.peak_N * (1 - 1e-12));
 	h->repeats = 0;
-	return h->error;
-}
-
-static void get_info(const struct incise_haptic *haptic, struct incise_haptic_info *info)
-{
-	*info = haply_of(haptic)->info;
-}
-
-static uint64_t count_lost(const struct incise_haptic *haptic)
-{
-	return haply_of(haptic)->lost;
-}
-
-static int print_cause(struct incise_haptic *haptic, char *text, size_t size)
-{
-	return snprintf(text, size, "%s", haply_of(haptic)->cause);
+	return 0;
 }
 
 static void close_haply(struct incise_haptic *haptic)
@@ -368,7 +378,7 @@ static void close_haply(struct incise_haptic *haptic)
 	if (h->frames.is_open && h->config_ns) {
 		h->repeats = REPEATS;
 		send_message(h);
-		wait_answer(h, incise_monotonic_ns() + CLOSE_NS);
+		wait_answer(h, get_now(h) + CLOSE_NS);
 	}
 	if (h->context)
 		lws_context_destroy(h->context);
@@ -379,10 +389,7 @@ static const struct incise_haptic_ops ops = {
 	.read = read_haply,
 	.push = push_haply,
 	.wait = wait_haply,
-	.info = get_info,
-	.lost = count_lost,
 	.close = close_haply,
-	.cause = print_cause,
 };
 
 /* --- opening -------------------------------------------------------------------------- */
@@ -424,8 +431,6 @@ static bool create_context(struct haply *h)
 static int connect_service(struct haply *h, const char *arguments, const char *where,
 			   struct incise_error *err)
 {
-	int64_t until_ns = incise_monotonic_ns() + OPEN_NS;
-
 	if (!parse_arguments(h, arguments))
 		return incise_error_set(err, EINVAL,
 					"%s: \"%.80s\": expected haply:[HOST:PORT][/ID], "
@@ -434,25 +439,21 @@ static int connect_service(struct haply *h, const char *arguments, const char *w
 	if (!create_context(h))
 		return incise_error_set(err, ENOMEM, "%s: %s", where, strerror(ENOMEM));
 	h->waits = true;
-	h->sent_ns = incise_monotonic_ns();
+	h->sent_ns = get_now(h);
 	connect_link(h, &h->frames, h->port);
 	connect_link(h, &h->events, h->port + EVENTS_AFTER);
-	wait_answer(h, until_ns);
+	wait_answer(h, h->sent_ns + OPEN_NS);
 	if (h->waits || h->bad)
 		return incise_error_set(err, h->bad ? EPROTO : ENODEV,
 					"%s: no Inverse Service at %.100s port %d; start "
 					"haply-inverse-service, or correct host and port",
 					where, h->host, h->port);
-	while (h->events.wsi && !h->events.is_open && incise_monotonic_ns() < until_ns) {
-		lws_service(h->context, -1);
-		incise_monotonic_sleep_until(incise_monotonic_ns() + MS);
-	}
 	return 0;
 }
 
 static void fill_info(struct haply *h, double rate_hz)
 {
-	struct incise_haptic_info *info = &h->info;
+	struct incise_haptic_info *info = &h->haptic.info;
 
 	snprintf(info->name, sizeof(info->name), "Haply Inverse3 %s", h->id);
 	info->rate_hz = rate_hz > 0 ? rate_hz : RATE_HZ;
@@ -493,34 +494,35 @@ static int choose_inverse3(struct haply *h, const char *where, struct incise_err
 static void *open_haply(const struct incise_backend_request *request,
 			struct incise_error *err)
 {
-	struct haply *h = calloc(1, sizeof(*h));
+	struct haply *h = incise_device_new(sizeof(*h), request->where, err);
 	int rc;
 
-	if (!h) {
-		incise_error_set(err, ENOMEM, "%s: %s", request->where, strerror(ENOMEM));
+	if (!h)
 		return NULL;
-	}
 	h->haptic.ops = &ops;
+	h->clock = request->clock;
 	rc = connect_service(h, request->arguments, request->where, err);
 	if (!rc)
 		rc = choose_inverse3(h, request->where, err);
-	if (!rc) {
+	if (!rc)
 		fill_info(h, request->haptic->rate_hz);
-		return &h->haptic;
-	}
-	close_haply(&h->haptic);
-	errno = -rc;
-	return NULL;
+	return incise_haptic_opened(&h->haptic, rc);
 }
 
 /* Each Inverse3 of a service; where there is none, none. Few machines have one at the default address. */
 static int scan_haply(const char *arguments, incise_scan_found *found, void *context,
 		      struct incise_error *err)
 {
-	struct haply *h = calloc(1, sizeof(*h));
-	int rc = h ? connect_service(h, arguments, "haply", err) : -ENOMEM;
-	char *rest = rc ? NULL : h->frame.ids, *id;
+	struct haply *h = incise_device_new(sizeof(*h), "haply", err);
+	struct incise_clock *clock = incise_clock_new_real();
+	char *rest, *id;
+	int rc = h && clock ? 0 : -ENOMEM;
 
+	if (!rc) {
+		h->clock = clock;
+		rc = connect_service(h, arguments, "haply", err);
+	}
+	rest = rc ? NULL : h->frame.ids;
 	while (!rc && (id = strsep(&rest, ", "))) {
 		struct incise_scan_device device = {.usable = true};
 
@@ -533,17 +535,11 @@ static int scan_haply(const char *arguments, incise_scan_found *found, void *con
 	}
 	if (h)
 		close_haply(&h->haptic);
+	incise_clock_free(clock);
 	if (rc == -ENODEV && !*arguments && err)
 		err->code = 0;
 	return rc == -ENODEV ? 0 : rc;
 }
 
-const struct incise_backend incise_haptic_haply = {
-	.abi = INCISE_BACKEND_ABI,
-	.kind = "haptic",
-	.name = "haply",
-	.open = open_haply,
-	.scan = scan_haply,
-};
-
-INCISE_MODULE(incise_haptic_haply);
+INCISE_BACKEND(incise_haptic_haply, "haptic", "haply", .open = open_haply,
+	       .scan = scan_haply);

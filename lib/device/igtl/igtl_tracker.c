@@ -331,17 +331,11 @@ static int begin_igtl_tracker(struct igtl_tracker *t,
 static void *tracker_open(const struct incise_backend_request *request,
 			  struct incise_error *err)
 {
-	/* The indices of the ring have their own cache lines. */
-	struct igtl_tracker *t =
-		aligned_alloc(_Alignof(struct igtl_tracker), sizeof(struct igtl_tracker));
+	struct igtl_tracker *t = incise_device_new(sizeof(*t), request->where, err);
 	int rc;
 
-	if (!t) {
-		incise_error_set(err, ENOMEM, "%s: out of memory; end other programs",
-				 request->where);
+	if (!t)
 		return NULL;
-	}
-	memset(t, 0, sizeof(*t));
 	t->feed.tracker.ops = &ops;
 	t->feed.ring = &t->poses.ring;
 	t->link.fd = t->link.stop = -1;
@@ -353,11 +347,4 @@ static void *tracker_open(const struct incise_backend_request *request,
 	return NULL;
 }
 
-const struct incise_backend incise_tracker_igtl = {
-	.abi = INCISE_BACKEND_ABI,
-	.kind = "tracker",
-	.name = "igtl",
-	.open = tracker_open,
-};
-
-INCISE_MODULE(incise_tracker_igtl);
+INCISE_BACKEND(incise_tracker_igtl, "tracker", "igtl", .open = tracker_open);

@@ -59,4 +59,8 @@ void *moteus_open_on(const struct can_transport *transport,
 		     const struct incise_backend_request *request,
 		     struct incise_error *err);
 
+/* Ask each id once, within 0.2 s. As struct incise_backend.scan. */
+int moteus_scan_on(const struct can_transport *transport, const char *interface,
+		   incise_scan_found *found, void *context, struct incise_error *err);
+
 #endif

@@ -5,11 +5,13 @@
  *   position  = Σ turns[i] × mm_turn[i] × dual[i]
  *   torque[i] = dual[i] · force × mm_turn[i] / 2π
  *
- * A cycle is a push, which asks for answers, and the read that makes a sample of them. The first push, and one after a pause in which the watchdogs may have run out, stop the motors,
- * as only that ends their time-out; torques follow when all are in mode 10 again. A fault, a jump
- * of a position and a motor that does not answer end all torques for good.
+ * A cycle is a push, which asks for answers, and the read that makes a sample of them. The first push,
+ * and one after a pause in which the watchdogs may have run out, stop the motors, as only that ends
+ * their time-out; torques follow when all are in mode 10 again. A fault, a jump of a position and a
+ * motor that does not answer end all torques for good.
  */
 #include <errno.h>
+#include <net/if.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -17,6 +19,7 @@
 #include "../../base/vector.h"
 #include "../../rig/axes.h"
 #include "../../rig/backends.h"
+#include "../../rig/haptic_backend.h"
 #include "moteus.h"
 
 #define MOTORS INCISE_HAPTIC_MOTORS_MAX
@@ -24,8 +27,9 @@
 #define WATCHDOG_MS 50
 #define WATCHDOG_NS (WATCHDOG_MS * INT64_C(1000000))
 #define ANSWER_NS \
-	INT64_C(20000000) /* all of it is waited for: two answers are an error */
-#define TEST_ROUNDS 25	  /* of an answer each; a drive needs time to start */
+	INT64_C(20000000)	 /* all of it is waited for: two answers are an error */
+#define SCAN_NS INT64_C(1000000) /* between the questions of a search */
+#define TEST_ROUNDS 25		 /* of an answer each; a drive needs time to start */
 #define SILENT_NS INT64_C(10000000) /* without an answer the device fails */
 #define LATE_CYCLES 2		    /* without an answer there is no force */
 #define FORCE_LATENCY_NS 300000	    /* of a frame, and of the drive's own loop */
@@ -33,8 +37,8 @@
 #define TURNS_MOST 1e6
 /* Directions 30 degrees apart: nearer ones push against each other with twice the force. */
 #define DUAL_MOST (2 + 1e-9)
-#define LOCK \
-	128 /* no node of CANopen: all answers go to id 0, so one program has a bus */
+/* No node of CANopen: all answers go to id 0, so one program has a bus. */
+#define LOCK 128
 #define INTERFACE 40
 
 struct motor {
@@ -51,15 +55,11 @@ struct moteus {
 	struct can_bus *bus;
 	struct motor motor[MOTORS];
 	int n;
-	double rate_hz;
 	int64_t answer_ns; /* from a measurement to its arrival, as it was at the start */
 	int64_t pushed_ns; /* time of the last push */
 	uint64_t cycles, sampled; /* of pushes */
-	uint64_t lost;
-	bool running;	/* all motors were in mode 10 since the last stop */
-	uint32_t flags; /* why there is no torque any more */
-	int failed;	/* negative errno */
-	char cause[300];
+	bool running;		  /* all motors were in mode 10 since the last stop */
+	uint32_t flags;		  /* why there is no torque any more */
 };
 
 static int64_t now_ns(const struct moteus *m)
@@ -75,14 +75,14 @@ static INCISE_PRINTF(4, 5) void end_torques(struct moteus *m, int code, unsigned
 {
 	va_list args;
 
-	if (m->failed || (m->flags && !code))
+	if (m->haptic.error || (m->flags && !code))
 		return;
-	m->failed = code;
+	m->haptic.error = code;
 	m->flags |= flag | INCISE_HAPTIC_NOT_READY;
 	m->running = false;
-	if (!*m->cause) {
+	if (!*m->haptic.cause) {
 		va_start(args, format);
-		vsnprintf(m->cause, sizeof(m->cause), format, args);
+		vsnprintf(m->haptic.cause, sizeof(m->haptic.cause), format, args);
 		va_end(args);
 	}
 	send_all(m, moteus_pack_stop);
@@ -255,8 +255,8 @@ static int read_moteus(struct incise_haptic *haptic, struct incise_haptic_sample
 		end_torques(m, -EIO, 0,
 			    "motor %d does not answer; check its supply and the cable",
 			    silent->id);
-	if (m->failed)
-		return m->failed;
+	if (haptic->error)
+		return haptic->error;
 	for (int i = 0; i < m->n; i++)
 		if (!m->motor[i].answers)
 			return 0;
@@ -264,7 +264,7 @@ static int read_moteus(struct incise_haptic *haptic, struct incise_haptic_sample
 		return 0;
 	m->running |= !m->flags && are_all(m, MOTEUS_POSITION);
 	make_sample(m, samples);
-	m->lost += m->cycles - m->sampled - 1;
+	haptic->lost += m->cycles - m->sampled - 1;
 	m->sampled = m->cycles;
 	return 1;
 }
@@ -312,38 +312,35 @@ static int push_moteus(struct incise_haptic *haptic, const double force_N[3],
 	/* Again, as a stop may have found no place in the queue; it asks for an answer, too. */
 	if (m->flags) {
 		send_all(m, moteus_pack_stop);
-		return m->failed;
+		return haptic->error;
 	}
 	if (m->cycles == 1 || pause_ns > WATCHDOG_NS / 2)
 		restart_motors(m);
-	if (m->running && !find_silent(m, (int64_t)(LATE_CYCLES * 1e9 / m->rate_hz)))
+	if (m->running &&
+	    !find_silent(m, (int64_t)(LATE_CYCLES * 1e9 / m->haptic.info.rate_hz)))
 		send_force(m, force_N);
 	else
 		send_all(m, pack_no_torque);
-	return m->failed;
+	return haptic->error;
 }
 
 /* --- open ---------------------------------------------------------------------------- */
 
-static int take_words(struct moteus *m, const char *text, char *interface,
+static int take_words(struct moteus *m, const char *text, char interface[INTERFACE],
 		      const char *where, struct incise_error *err)
 {
-	size_t length = strcspn(text, ":");
-	bool ok = length && length < INTERFACE && text[length];
+	int id[MOTORS], end = 0;
+	bool ok;
 
-	snprintf(interface, INTERFACE, "%.*s", (int)length, text);
-	text += length;
-	while (ok && *text) {
-		char *end;
-		long id = strtol(text + 1, &end, 10);
-
-		ok = end > text + 1 && id >= 1 && id <= MOTEUS_ID_MAX && m->n < MOTORS &&
-		     (!*end || *end == ',');
-		for (int i = 0; i < m->n; i++)
-			ok &= m->motor[i].id != id;
-		if (ok)
-			m->motor[m->n++].id = (int)id;
-		text = end;
+	m->n = sscanf(text, "%39[^:]:%3d%n,%3d%n,%3d%n", interface, &id[0], &end, &id[1],
+		      &end, &id[2], &end) -
+	       1;
+	ok = m->n >= 1 && !text[end];
+	for (int i = 0; ok && i < m->n; i++) {
+		ok = id[i] >= 1 && id[i] <= MOTEUS_ID_MAX;
+		for (int k = 0; k < i; k++)
+			ok &= id[k] != id[i];
+		m->motor[i].id = id[i];
 	}
 	return ok ? 0
 		  : incise_error_set(
@@ -391,13 +388,13 @@ static int ask_all(struct moteus *m, void (*pack)(struct canfd_frame *frame, int
 	int64_t until_ns = now_ns(m) + ANSWER_NS;
 
 	send_all(m, pack);
-	while (!m->failed && now_ns(m) < until_ns) {
+	while (!m->haptic.error && now_ns(m) < until_ns) {
 		m->bus->ops->wait(m->bus, until_ns);
 		drain_bus(m);
 	}
 	if (m->flags)
-		return incise_error_set(err, m->failed ? -m->failed : EPROTO, "%s: %s",
-					where, m->cause);
+		return incise_error_set(err, m->haptic.error ? -m->haptic.error : EPROTO,
+					"%s: %s", where, m->haptic.cause);
 	for (int i = 0; i < m->n; i++)
 		if (m->motor[i].answers != 1)
 			return incise_error_set(
@@ -434,10 +431,9 @@ static int test_watchdogs(struct moteus *m, const char *where, struct incise_err
 
 /* --- the device ---------------------------------------------------------------------- */
 
-static void get_moteus_info(const struct incise_haptic *haptic,
-			    struct incise_haptic_info *info)
+static void fill_info(struct moteus *m)
 {
-	const struct moteus *m = (const struct moteus *)haptic;
+	struct incise_haptic_info *info = &m->haptic.info;
 
 	snprintf(info->name, sizeof(info->name), "%d moteus on %s", m->n, m->bus->name);
 	info->peak_N = INFINITY;
@@ -445,9 +441,8 @@ static void get_moteus_info(const struct incise_haptic *haptic,
 		info->peak_N = fmin(info->peak_N, m->motor[i].most_N_m * 1e3 * 2 * M_PI /
 							  m->motor[i].mm_turn /
 							  v3_length(m->motor[i].dual));
-	info->rate_hz = m->rate_hz;
 	/* A read takes the answers to the push of the cycle before. */
-	info->latency_ns = (int64_t)(1e9 / m->rate_hz);
+	info->latency_ns = (int64_t)(1e9 / info->rate_hz);
 	info->force_latency_ns = FORCE_LATENCY_NS;
 	info->deadman_s = WATCHDOG_MS * 1e-3;
 	info->features = INCISE_HAPTIC_PAGE_VELOCITY;
@@ -455,16 +450,6 @@ static void get_moteus_info(const struct incise_haptic *haptic,
 		 "without commands for %d ms its motors follow servo.timeout_mode: 12, "
 		 "the default, damps; 0 lets go",
 		 WATCHDOG_MS);
-}
-
-static uint64_t count_lost_samples(const struct incise_haptic *haptic)
-{
-	return ((const struct moteus *)haptic)->lost;
-}
-
-static int tell_moteus_cause(struct incise_haptic *haptic, char *text, size_t size)
-{
-	return snprintf(text, size, "%s", ((struct moteus *)haptic)->cause);
 }
 
 static void close_moteus(struct incise_haptic *haptic)
@@ -481,10 +466,7 @@ static void close_moteus(struct incise_haptic *haptic)
 static const struct incise_haptic_ops moteus_ops = {
 	.read = read_moteus,
 	.push = push_moteus,
-	.info = get_moteus_info,
-	.lost = count_lost_samples,
 	.close = close_moteus,
-	.cause = tell_moteus_cause,
 };
 
 void *moteus_open_on(const struct can_transport *transport,
@@ -495,15 +477,14 @@ void *moteus_open_on(const struct can_transport *transport,
 	char interface[INTERFACE];
 	const struct can_bus_request bus = {
 		.where = where, .device = interface, .node = LOCK, .fd = true};
-	struct moteus *m = calloc(1, sizeof(*m));
+	struct moteus *m = incise_device_new(sizeof(*m), where, err);
 	int rc;
 
-	if (!m) {
-		errno = -incise_error_set(err, ENOMEM, "%s: %s", where, strerror(ENOMEM));
+	if (!m)
 		return NULL;
-	}
 	m->haptic.ops = &moteus_ops;
-	m->rate_hz = request->haptic->rate_hz > 0 ? request->haptic->rate_hz : RATE_HZ;
+	m->haptic.info.rate_hz =
+		request->haptic->rate_hz > 0 ? request->haptic->rate_hz : RATE_HZ;
 	rc = take_words(m, request->arguments, interface, where, err);
 	if (!rc)
 		rc = take_lines(m, request->haptic, where, err);
@@ -512,10 +493,8 @@ void *moteus_open_on(const struct can_transport *transport,
 	if (!rc)
 		rc = test_watchdogs(m, where, err);
 	if (!rc)
-		return m;
-	close_moteus(&m->haptic);
-	errno = -rc;
-	return NULL;
+		fill_info(m);
+	return incise_haptic_opened(&m->haptic, rc);
 }
 
 static void *open_moteus(const struct incise_backend_request *request,
@@ -524,11 +503,87 @@ static void *open_moteus(const struct incise_backend_request *request,
 	return moteus_open_on(&can_transport_socketcan, request, err);
 }
 
-const struct incise_backend incise_haptic_moteus = {
-	.abi = INCISE_BACKEND_ABI,
-	.kind = "haptic",
-	.name = "moteus",
-	.open = open_moteus,
-};
+/* --- search -------------------------------------------------------------------------- */
 
-INCISE_MODULE(incise_haptic_moteus);
+static void receive_answers(struct can_bus *bus, struct motor *drives, int64_t ns)
+{
+	int64_t until_ns = bus->ops->now(bus) + ns, t_ns;
+	struct moteus_reply reply;
+	struct canfd_frame frame;
+	int id;
+
+	while (bus->ops->now(bus) < until_ns && !bus->ops->wait(bus, until_ns))
+		while (bus->ops->receive_fd(bus, &frame, &t_ns) > 0)
+			if ((id = moteus_parse(&frame, &reply))) {
+				drives[id].answers++;
+				drives[id].last = reply;
+			}
+}
+
+static int report_drive(const char *interface, int id, const struct motor *drive,
+			incise_scan_found *found, void *context)
+{
+	const struct moteus_reply *last = &drive->last;
+	struct incise_scan_device device = {.usable = drive->answers == 1 &&
+						      last->refused < 0};
+
+	snprintf(device.device, sizeof(device.device), "moteus:%s:%d", interface, id);
+	if (device.usable)
+		snprintf(device.what, sizeof(device.what),
+			 "moteus drive, mode %d, %s, %g V, %g C", last->mode,
+			 moteus_fault_text(last->fault), last->voltage_V,
+			 last->temperature_C);
+	else
+		snprintf(device.what, sizeof(device.what), "moteus drive: %s",
+			 drive->answers > 1 ? "another one has this id; give each its own"
+					    : "refuses a query; update its firmware");
+	return found(context, &device);
+}
+
+int moteus_scan_on(const struct can_transport *transport, const char *interface,
+		   incise_scan_found *found, void *context, struct incise_error *err)
+{
+	const struct can_bus_request request = {
+		.where = "moteus", .device = interface, .node = LOCK, .fd = true};
+	struct motor drives[MOTEUS_ID_MAX + 1] = {0};
+	struct canfd_frame frame;
+	struct can_bus *bus;
+	int rc = transport->open(&bus, &request, err), sent = 0;
+
+	if (rc)
+		return rc;
+	for (int id = 1; id <= MOTEUS_ID_MAX && !sent; id++) {
+		moteus_pack_query(&frame, id);
+		sent = bus->ops->send_fd(bus, &frame);
+		receive_answers(bus, drives, id < MOTEUS_ID_MAX ? SCAN_NS : ANSWER_NS);
+	}
+	bus->ops->close(bus);
+	for (int id = 1; id <= MOTEUS_ID_MAX && !rc; id++)
+		if (drives[id].answers)
+			rc = report_drive(interface, id, &drives[id], found, context);
+	return rc;
+}
+
+/* Without arguments each interface that takes CAN FD, and that no other program has. */
+static int scan_moteus(const char *arguments, incise_scan_found *found, void *context,
+		       struct incise_error *err)
+{
+	struct if_nameindex *all = if_nameindex();
+	char interface[INTERFACE];
+	int rc = 0;
+
+	if (*arguments) {
+		snprintf(interface, sizeof(interface), "%.*s",
+			 (int)strcspn(arguments, ":"), arguments);
+		rc = moteus_scan_on(&can_transport_socketcan, interface, found, context,
+				    err);
+	}
+	for (int i = 0; !*arguments && all && all[i].if_index && rc <= 0; i++)
+		rc = moteus_scan_on(&can_transport_socketcan, all[i].if_name, found,
+				    context, NULL);
+	if_freenameindex(all);
+	return *arguments || rc > 0 ? rc : 0;
+}
+
+INCISE_BACKEND(incise_haptic_moteus, "haptic", "moteus", .open = open_moteus,
+	       .scan = scan_moteus);

@@ -10,8 +10,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include "../../base/monotonic.h"
+#include "../../base/vector.h"
 #include "vrpn_device.h"
 
 #define SECOND_NS INT64_C(1000000000)
@@ -19,7 +19,11 @@
 #define VERSION "vrpn: ver. 07."
 #define COOKIE 24
 #define HEADER 24
-#define FIELD 64		     /* bytes of the payload of a force field */
+#define FIELD 64 /* bytes of the payload of a force field */
+#define RADIUS_M 2
+#define CLOSE_MS 200
+#define RETRY_NS (SECOND_NS / 4)
+#define GONE_NS (10 * SECOND_NS)
 #define FIRST_NS (5 * SECOND_NS)     /* for enough poses to know the rate */
 #define LEARN_NS (SECOND_NS * 2 / 5) /* a window of poses */
 #define POSES_LEAST 5
@@ -51,14 +55,6 @@ static const struct {
 	[VRPN_FORCE_FIELD] = {"vrpn_ForceDevice Force_Field", 0},
 };
 
-static int64_t get_utc_ns(void)
-{
-	struct timespec now;
-
-	clock_gettime(CLOCK_REALTIME, &now);
-	return now.tv_sec * SECOND_NS + now.tv_nsec;
-}
-
 static uint32_t get_word(const uint8_t *from)
 {
 	uint32_t word;
@@ -81,13 +77,85 @@ static size_t pad(size_t n)
 	return (n + 7) / 8 * 8;
 }
 
-static int fail(struct vrpn_device *device, int code, const char *what)
+/* --- what is sent -------------------------------------------------------------------- */
+
+static uint8_t *put_word(uint8_t *to, uint32_t word)
 {
-	device->gone =
-		incise_error_set(&device->cause, code,
-				 "%s %s; see its server's messages, and start both again",
-				 device->name, what);
-	return device->gone;
+	word = htobe32(word);
+	memcpy(to, &word, sizeof(word));
+	return to + sizeof(word);
+}
+
+static size_t pack_header(uint8_t *to, size_t n, int32_t sender, int32_t type)
+{
+	int64_t utc_ns = incise_read_clock_ns(CLOCK_REALTIME);
+
+	memset(to, 0, HEADER + pad(n));
+	to = put_word(to, (uint32_t)(HEADER + n));
+	to = put_word(to, (uint32_t)(utc_ns / SECOND_NS));
+	to = put_word(to, (uint32_t)(utc_ns % SECOND_NS / 1000));
+	to = put_word(to, (uint32_t)sender);
+	put_word(to, (uint32_t)type);
+	return HEADER + pad(n);
+}
+
+/* The name behind a number 0 of this side. */
+static size_t pack_name(uint8_t *to, int32_t kind, const char *name)
+{
+	size_t n = strlen(name) + 1;
+	size_t size = pack_header(to, 4 + n, 0, kind);
+
+	put_word(to + HEADER, (uint32_t)n);
+	memcpy(to + HEADER + 4, name, n);
+	return size;
+}
+
+static bool send_bytes(const struct vrpn_device *device, const uint8_t *bytes, size_t n)
+{
+	return send(device->link.fd, bytes, n, MSG_NOSIGNAL) == (ssize_t)n;
+}
+
+/* Behind its own description: a server repeats names that it gets. */
+static void send_names(struct vrpn_device *device)
+{
+	uint8_t bytes[2 * (HEADER + VRPN_NAME + 4)];
+	size_t n = pack_name(bytes, DESCRIBES_SENDER, device->device);
+
+	n += pack_name(bytes + n, DESCRIBES_TYPE, types[VRPN_FORCE_FIELD].name);
+	device->named = send_bytes(device, bytes, n);
+}
+
+static uint8_t *put_single(uint8_t *to, double value)
+{
+	float single = (float)value;
+	uint32_t bits;
+
+	memcpy(&bits, &single, sizeof(bits));
+	return put_word(to, bits);
+}
+
+/* Origin, force, Jacobian, radius. */
+static bool send_field(const struct vrpn_device *device, const double force_N[3],
+		       double radius_m)
+{
+	uint8_t bytes[HEADER + FIELD], *to = bytes + HEADER;
+
+	pack_header(bytes, FIELD, 0, 0);
+	for (int i = 0; i < 3; i++)
+		to = put_single(to, device->origin_m[i]);
+	for (int i = 0; i < 3; i++)
+		to = put_single(to, force_N[i]);
+	put_single(bytes + HEADER + FIELD - 4, radius_m);
+	return send_bytes(device, bytes, sizeof(bytes));
+}
+
+/* --- its ends ------------------------------------------------------------------------ */
+
+static void forget_numbers(struct vrpn_device *device)
+{
+	device->sender = -1;
+	for (int i = 0; i < VRPN_TYPES; i++)
+		device->types[i] = -1;
 }
 
 void vrpn_device_init(struct vrpn_device *device, uint32_t sensors, int64_t silent_ns)
@@ -95,9 +163,76 @@ void vrpn_device_init(struct vrpn_device *device, uint32_t sensors, int64_t sile
 	device->link.fd = device->link.stop = -1;
 	device->sensors = sensors;
 	device->silent_ns = silent_ns;
-	device->sender = -1;
-	for (int i = 0; i < VRPN_TYPES; i++)
-		device->types[i] = -1;
+	forget_numbers(device);
+}
+
+static void end_force(struct vrpn_device *device)
+{
+	if (!device->named)
+		return;
+	send_field(device, (const double[3]){0}, 0);
+	shutdown(device->link.fd, SHUT_WR);
+	device->named = false;
+	device->leaving = true;
+}
+
+/*
+ * Poses that wait on a connection as it is closed reset it, and a reset may overtake the force. False: the
+ * server has closed, too.
+ */
+static bool drop_poses(const struct vrpn_device *device)
+{
+	uint8_t bytes[4096];
+
+	return recv(device->link.fd, bytes, sizeof(bytes), 0);
+}
+
+static int fail(struct vrpn_device *device, int code, const char *what)
+{
+	return incise_haptic_end(&device->haptic, -code,
+				 "%s %s; see its server's messages, and start both again",
+				 device->haptic.info.name, what);
+}
+
+/* A sample, since a loop stops its force by that. */
+static void put_break(struct vrpn_device *device)
+{
+	struct incise_haptic_sample *sample = &device->last.sample;
+
+	device->last.sound = device->waits = true;
+	sample->seq++;
+	sample->t_ns =
+		sample->t_ns < device->arrival_ns ? device->arrival_ns : sample->t_ns + 1;
+	for (int i = 0; i < 3; i++) {
+		sample->position_mm[i] = 1000 * device->origin_m[i];
+		sample->velocity_mm_s[i] = NAN;
+	}
+	memcpy(sample->quaternion, (const double[4]){1}, sizeof(sample->quaternion));
+}
+
+/* An opened device is connected again, by vrpn_device_receive(). */
+static int break_link(struct vrpn_device *device, int code, const char *what)
+{
+	bool new = !device->broken_ns;
+
+	if (!device->learnt)
+		return fail(device, code, what);
+	if (new)
+		device->broken_ns = device->arrival_ns;
+	end_force(device);
+	device->at = device->n = 0;
+	device->greeted = device->met = device->waits = false;
+	device->held = device->leaving = true;
+	device->clock = (struct incise_sender_clock){0};
+	device->retry_ns = device->arrival_ns + RETRY_NS;
+	forget_numbers(device);
+	incise_pace_broken(&device->pace);
+	if (new && device->forces)
+		put_break(device);
+	snprintf(device->haptic.cause, sizeof(device->haptic.cause),
+		 "%s %s; it is connected again for 10 s, see its server's messages",
+		 device->haptic.info.name, what);
+	return 0;
 }
 
 /* --- what comes ---------------------------------------------------------------------- */
@@ -131,7 +266,8 @@ static bool take_description(struct vrpn_device *device, int32_t kind, int32_t n
 
 static int64_t find_time(struct vrpn_device *device, int64_t utc_ns)
 {
-	int64_t t_ns = utc_ns - (get_utc_ns() - incise_monotonic_ns());
+	int64_t t_ns =
+		utc_ns - (incise_read_clock_ns(CLOCK_REALTIME) - incise_monotonic_ns());
 
 	if (!utc_ns)
 		return device->arrival_ns;
@@ -180,10 +316,11 @@ static void take_pose(struct vrpn_device *device, const uint8_t *payload, int64_
 	pose.sound = place_pose(&pose.sample, payload);
 	if (pose.sound) {
 		device->sound_ns = device->arrival_ns;
+		device->broken_ns = 0;
 		for (int i = 0; i < 3; i++)
 			device->origin_m[i] = pose.sample.position_mm[i] / 1000;
 	}
-	device->lost += !pose.sound;
+	device->haptic.lost += !pose.sound;
 	device->last = pose;
 	device->waits = true;
 }
@@ -195,7 +332,7 @@ static void take_velocity(struct vrpn_device *device, const uint8_t *payload,
 
 	if (get_word(payload) != (uint32_t)last->sensor || utc_ns != last->utc_ns)
 		return;
-	device->measures_velocity = true;
+	device->haptic.info.features |= INCISE_HAPTIC_PAGE_VELOCITY;
 	for (int i = 0; i < 3; i++)
 		last->sample.velocity_mm_s[i] = 1000 * get_double(payload + 8 + 8 * i);
 }
@@ -204,8 +341,8 @@ static void take_button(struct vrpn_device *device, size_t button, uint32_t stat
 {
 	if (button >= BUTTONS)
 		return;
-	if (device->buttons <= (int)button)
-		device->buttons = (int)button + 1;
+	if (device->haptic.info.buttons <= (int)button)
+		device->haptic.info.buttons = (int)button + 1;
 	device->pressed &= ~(UINT32_C(1) << button);
 	device->pressed |= (uint32_t)(state != 0) << button;
 }
@@ -259,12 +396,13 @@ static int find_type(const struct vrpn_device *device)
 	return type;
 }
 
-int vrpn_device_pose(struct vrpn_device *device, struct vrpn_pose *pose)
+/* Take messages up to the next pose. 0, or the device's error. */
+static int take_messages(struct vrpn_device *device)
 {
 	int type = device->greeted ? 0 : take_cookie(device);
 
 	if (type < 0)
-		return fail(device, EPROTO, "does not speak VRPN 07");
+		return break_link(device, EPROTO, "does not speak VRPN 07");
 	if (!device->greeted)
 		return 0;
 	while ((type = find_type(device)) >= -1) {
@@ -285,104 +423,93 @@ int vrpn_device_pose(struct vrpn_device *device, struct vrpn_pose *pose)
 					   header + HEADER, n))
 			return fail(device, EPROTO, "got another number");
 	}
-	if (type == -EPROTO)
-		return fail(device, EPROTO, "sent a message that VRPN 07 does not have");
-	if (!device->waits)
-		return 0;
+	return type == -EPROTO ? break_link(device, EPROTO,
+					    "sent a message that VRPN 07 does not have")
+			       : 0;
+}
+
+int vrpn_device_pose(struct vrpn_device *device, struct vrpn_pose *pose)
+{
+	int rc = device->haptic.error;
+
+	/* The sample of a broken link comes before those of a new one. */
+	if (!rc && !(device->waits && device->broken_ns))
+		rc = take_messages(device);
+	if (rc || !device->waits)
+		return rc;
+	if (device->forces && !device->named && device->types[VRPN_FORCE_FIELD] >= 0)
+		send_names(device);
 	*pose = device->last;
 	pose->sample.buttons = device->pressed;
-	pose->sample.flags = device->force_error ? INCISE_HAPTIC_PROTECTED : 0;
+	pose->sample.flags =
+		(device->force_error ? INCISE_HAPTIC_PROTECTED : 0) |
+		(device->forces && !device->named ? INCISE_HAPTIC_NOT_READY : 0);
 	device->waits = false;
 	return 1;
 }
 
-int vrpn_device_receive(struct vrpn_device *device)
+int vrpn_device_force(struct vrpn_device *device, const double force_N[3])
 {
-	size_t room = sizeof(device->bytes) - (device->n -= device->at);
-	ssize_t n = 0;
+	static const double none[3];
 
-	memmove(device->bytes, device->bytes + device->at, device->n);
-	device->at = 0;
-	if (device->gone)
-		return device->gone;
-	if (room)
-		n = recv(device->link.fd, device->bytes + device->n, room, 0);
-	if (room && (!n || (n < 0 && errno != EAGAIN && errno != EINTR)))
-		return fail(device, ENODEV, "closed the connection");
-	device->n += n > 0 ? (size_t)n : 0;
-	device->arrival_ns = incise_monotonic_ns();
-	if (device->arrival_ns - device->sound_ns > device->silent_ns)
-		return fail(device, EIO, "sends no poses");
+	device->held = device->held && v3_length(force_N) > 0;
+	if (device->named && !send_field(device, device->held ? none : force_N, RADIUS_M))
+		return break_link(device, EIO, "takes nothing any more");
 	return 0;
 }
 
-int vrpn_device_cause(const struct vrpn_device *device, char *text, size_t size)
+/* --- the connection ------------------------------------------------------------------ */
+
+static void try_again(struct vrpn_device *device)
 {
-	return snprintf(text, size, "%s", device->gone ? device->cause.text : "");
+	if (device->leaving)
+		drop_poses(device);
+	if (device->arrival_ns < device->retry_ns)
+		return;
+	server_link_close(&device->link);
+	device->leaving = false;
+	device->retry_ns = device->sound_ns = device->arrival_ns;
+	device->retry_ns += RETRY_NS;
+	server_link_start(&device->link);
 }
 
-/* --- what is sent -------------------------------------------------------------------- */
-
-static uint8_t *put_word(uint8_t *to, uint32_t word)
+/* Bytes that are there, and our cookie as soon as there is a connection. */
+static int receive_bytes(struct vrpn_device *device)
 {
-	word = htobe32(word);
-	memcpy(to, &word, sizeof(word));
-	return to + sizeof(word);
+	static const uint8_t cookie[COOKIE] = VERSION "38  0";
+	size_t room = sizeof(device->bytes) - device->n;
+	ssize_t n;
+
+	if (!device->met && server_link_wait(&device->link, device->link.fd, POLLOUT, 0))
+		device->met = send_bytes(device, cookie, COOKIE);
+	if (!room)
+		return 0;
+	n = recv(device->link.fd, device->bytes + device->n, room, 0);
+	if (n > 0)
+		device->n += (size_t)n;
+	else if (!n || (errno != EAGAIN && errno != EINTR))
+		return break_link(device, ENODEV, "closed the connection");
+	else if (device->arrival_ns - device->sound_ns > device->silent_ns)
+		return break_link(device, EIO, "sends no poses");
+	return 0;
 }
 
-static size_t pack_header(uint8_t *to, size_t n, int32_t sender, int32_t type)
+int vrpn_device_receive(struct vrpn_device *device)
 {
-	int64_t utc_ns = get_utc_ns();
-
-	memset(to, 0, HEADER + pad(n));
-	to = put_word(to, (uint32_t)(HEADER + n));
-	to = put_word(to, (uint32_t)(utc_ns / SECOND_NS));
-	to = put_word(to, (uint32_t)(utc_ns % SECOND_NS / 1000));
-	to = put_word(to, (uint32_t)sender);
-	put_word(to, (uint32_t)type);
-	return HEADER + pad(n);
-}
-
-/* The name behind a number 0 of this side. */
-static size_t pack_name(uint8_t *to, int32_t kind, const char *name)
-{
-	size_t n = strlen(name) + 1;
-	size_t size = pack_header(to, 4 + n, 0, kind);
-
-	put_word(to + HEADER, (uint32_t)n);
-	memcpy(to + HEADER + 4, name, n);
-	return size;
-}
-
-static int send_bytes(struct vrpn_device *device, const uint8_t *bytes, size_t n)
-{
-	if (send(device->link.fd, bytes, n, MSG_NOSIGNAL) != (ssize_t)n && !device->gone)
-		fail(device, EIO, "takes nothing any more");
-	return device->gone;
-}
-
-static uint8_t *put_single(uint8_t *to, double value)
-{
-	float single = (float)value;
-	uint32_t bits;
-
-	memcpy(&bits, &single, sizeof(bits));
-	return put_word(to, bits);
-}
-
-/* Origin, force, Jacobian, radius. */
-int vrpn_device_force(struct vrpn_device *device, const double force_N[3],
-		      double radius_m)
-{
-	uint8_t bytes[HEADER + FIELD], *to = bytes + HEADER;
-
-	pack_header(bytes, FIELD, 0, 0);
-	for (int i = 0; i < 3; i++)
-		to = put_single(to, device->origin_m[i]);
-	for (int i = 0; i < 3; i++)
-		to = put_single(to, force_N[i]);
-	put_single(bytes + HEADER + FIELD - 4, radius_m);
-	return send_bytes(device, bytes, sizeof(bytes));
+	device->n -= device->at;
+	memmove(device->bytes, device->bytes + device->at, device->n);
+	device->at = 0;
+	device->arrival_ns = incise_monotonic_ns();
+	if (device->haptic.error)
+		return device->haptic.error;
+	if (device->broken_ns && device->sender < 0 &&
+	    device->arrival_ns - device->broken_ns > GONE_NS)
+		return fail(device, ENODEV,
+			    "broke its connection, and was not back after 10 s");
+	if (device->link.fd >= 0 && !device->leaving)
+		return receive_bytes(device);
+	try_again(device);
+	return 0;
 }
 
 /* --- opening ------------------------------------------------------------------------- */
@@ -401,8 +528,8 @@ static int parse_device(struct vrpn_device *device, const char *arguments,
 			"vrpn:Phantom0@localhost; correct it",
 			where, arguments);
 	snprintf(device->device, sizeof(device->device), "%.*s", n, arguments);
-	snprintf(device->name, sizeof(device->name), "VRPN %.24s at %.27s",
-		 device->device, device->link.host);
+	snprintf(device->haptic.info.name, sizeof(device->haptic.info.name),
+		 "VRPN %.24s at %.27s", device->device, device->link.host);
 	return 0;
 }
 
@@ -439,8 +566,8 @@ static void learn_pose(struct vrpn_device *device, const struct vrpn_pose *pose,
 	if (learnt->in_window < POSES_LEAST || at_ns - learnt->first_ns < LEARN_NS)
 		return;
 	hz = (learnt->in_window - 1) * 1e9 / (double)(at_ns - learnt->first_ns);
-	learnt->steady = fabs(hz - device->rate_hz) < hz / 10;
-	device->rate_hz = hz;
+	learnt->steady = fabs(hz - device->haptic.info.rate_hz) < hz / 10;
+	device->haptic.info.rate_hz = hz;
 	learnt->first_ns = at_ns;
 	learnt->in_window = 1;
 }
@@ -460,64 +587,44 @@ static void learn_device(struct vrpn_device *device)
 		while (vrpn_device_pose(device, &pose) == 1)
 			learn_pose(device, &pose, &learnt);
 	}
-	if (!(device->rate_hz >= RATE_LEAST)) {
+	if (!(device->haptic.info.rate_hz >= RATE_LEAST)) {
 		fail(device, EIO, "sends no poses");
 		return;
 	}
-	device->latency_ns = learnt.age_ns / learnt.n;
+	device->haptic.info.latency_ns = learnt.age_ns / learnt.n;
 	/* The next one is the first. */
 	device->last.sample.seq = UINT64_MAX;
-	device->lost = 0;
+	device->haptic.lost = 0;
+	device->learnt = true;
 }
 
-static int explain_absence(const struct vrpn_device *device, bool forces,
-			   const char *where, struct incise_error *err)
+static int explain_absence(const struct vrpn_device *device, const char *where,
+			   struct incise_error *err)
 {
+	const char *name = device->haptic.info.name;
+
 	if (device->greeted && device->sender < 0)
 		return incise_error_set(
 			err, ENODEV,
 			"%s: %s: its server has no device of that name; correct the name",
-			where, device->name);
-	if (device->gone)
-		return incise_error_set(err, -device->gone, "%s: %s", where,
-					device->cause.text);
-	if (forces && device->types[VRPN_FORCE_FIELD] < 0)
+			where, name);
+	if (device->haptic.error)
+		return incise_error_set(err, -device->haptic.error, "%s: %s", where,
+					device->haptic.cause);
+	if (device->forces && device->types[VRPN_FORCE_FIELD] < 0)
 		return incise_error_set(err, ENODEV,
 					"%s: %s takes no force; use it as `tracker`",
-					where, device->name);
+					where, name);
 	return 0;
-}
-
-/* Ahead of this, what the server describes is its own; it repeats names that it gets. */
-static void send_names(struct vrpn_device *device)
-{
-	uint8_t bytes[2 * (HEADER + VRPN_NAME + 4)];
-	size_t n = pack_name(bytes, DESCRIBES_SENDER, device->device);
-
-	n += pack_name(bytes + n, DESCRIBES_TYPE, types[VRPN_FORCE_FIELD].name);
-	send_bytes(device, bytes, n);
-}
-
-static int open_vrpn(struct vrpn_device *device,
-		     const struct incise_backend_request *request, bool forces,
-		     struct incise_error *err)
-{
-	static const uint8_t cookie[COOKIE] = VERSION "38  0";
-	int rc = parse_device(device, request->arguments, request->where, err);
-
-	rc = rc ? rc : server_link_find(&device->link, "VRPN", request->where, err);
-	if (rc)
-		return rc;
-	device->own_machine = is_own_machine(&device->link);
-	send_bytes(device, cookie, COOKIE);
-	learn_device(device);
-	if (forces && !device->gone && device->types[VRPN_FORCE_FIELD] >= 0)
-		send_names(device);
-	return explain_absence(device, forces, request->where, err);
 }
 
 void vrpn_device_free(struct vrpn_device *device)
 {
+	const struct server_link *link = &device->link;
+
+	end_force(device);
+	for (int i = 0; i < CLOSE_MS && device->leaving && drop_poses(device); i++)
+		server_link_wait(link, link->fd, POLLIN, 1);
 	server_link_close(&device->link);
 	free(device);
 }
@@ -526,16 +633,22 @@ struct vrpn_device *vrpn_device_new(const struct incise_backend_request *request
 				    uint32_t sensors, int64_t silent_ns, bool forces,
 				    struct incise_error *err)
 {
-	struct vrpn_device *device = calloc(1, sizeof(*device));
+	const char *where = request->where;
+	struct vrpn_device *device = incise_device_new(sizeof(*device), where, err);
 	int rc;
 
-	if (!device) {
-		incise_error_set(err, ENOMEM, "%s: out of memory; end other programs",
-				 request->where);
+	if (!device)
 		return NULL;
-	}
 	vrpn_device_init(device, sensors, silent_ns);
-	rc = open_vrpn(device, request, forces, err);
+	device->forces = forces;
+	rc = parse_device(device, request->arguments, where, err);
+	if (!rc)
+		rc = server_link_find(&device->link, "VRPN", where, err);
+	if (!rc) {
+		device->own_machine = is_own_machine(&device->link);
+		learn_device(device);
+		rc = explain_absence(device, where, err);
+	}
 	if (!rc)
 		return device;
 	vrpn_device_free(device);

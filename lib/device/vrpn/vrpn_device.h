@@ -17,11 +17,18 @@
  * Time: on this machine the server's timestamps are of CLOCK_REALTIME, and exact; sender_clock.h maps
  * those of another machine, without the least delay of the network, which nobody here can know. A
  * timestamp after its arrival, or a second before, is of another clock, wherever the server seems to be.
+ *
+ * A connection that breaks is made again:
+ *
+ *     poses ── it breaks ──▶ one sample, not ready ── each 250 ms, for 10 s ──▶ poses
+ *     force      0                   0                       0                0, until a push of 0
  */
 #ifndef INCISE_VRPN_DEVICE_H
 #define INCISE_VRPN_DEVICE_H
 
 #include <incise/backend.h>
+#include "../../rig/backends.h"
+#include "../../rig/haptic_backend.h"
 #include "../../rig/pace.h"
 #include "../../rig/sender_clock.h"
 #include "../../rig/server_link.h"
@@ -49,15 +56,18 @@ struct vrpn_pose {
 };
 
 struct vrpn_device {
+	/* A tracker uses error, cause, lost, and of info the name and the rate, too. */
 	union {
 		struct incise_haptic haptic;
 		struct incise_tracker tracker;
-	} face; /* first */
+	}; /* first */
 	struct server_link link;
-	char device[VRPN_NAME], name[64]; /* as the server has it; for people */
+	char device[VRPN_NAME]; /* as the server has it */
 	uint8_t bytes[2 * VRPN_MOST];
 	size_t at, n; /* bytes that are used, and that are there */
-	bool greeted; /* the cookie is through */
+	bool greeted; /* the server's cookie is through */
+	bool met;     /* ours is, too */
+	bool named;   /* the server has the names behind the numbers of forces */
 	/* Numbers of the server; -1: not described. */
 	int32_t sender, types[VRPN_TYPES];
 	struct vrpn_pose last; /* waits for its velocity */
@@ -65,19 +75,17 @@ struct vrpn_device {
 	bool own_machine;
 	struct incise_sender_clock clock;
 	int64_t arrival_ns, sound_ns; /* of what came last, and of the last sound pose */
-	int64_t silent_ns;	      /* after so long without one it has failed */
+	int64_t silent_ns;	      /* after so long without one it is broken */
 	uint32_t sensors;	      /* that are used, as bits */
 	double origin_m[3];	      /* the last sound position */
-	uint64_t lost;		      /* poses that are not sound */
 	uint32_t pressed;
-	int buttons;	 /* number */
 	int force_error; /* of the device, by its server; 0: none */
-	/* Found out as it is opened: poses a second, of all of these, and mean age at arrival. */
-	double rate_hz;
-	int64_t latency_ns;
-	bool measures_velocity;
-	int gone; /* negative errno, for good: then cause is set */
-	struct incise_error cause;
+	bool forces;	 /* it is to take them … */
+	bool held;	 /* … after a push of none */
+	bool leaving; /* it has sent its last force, and drops poses until it is closed */
+	bool learnt;  /* rate and age are known: a link that breaks is made again */
+	int64_t broken_ns; /* without a sound pose since; 0: not broken */
+	int64_t retry_ns;  /* of the next connection */
 	/* A tracker has these. */
 	struct incise_tracker_setup setup;
 	struct tracker_repeat repeat[VRPN_SENSORS];
@@ -95,18 +103,17 @@ void vrpn_device_init(struct vrpn_device *device, uint32_t sensors, int64_t sile
 struct vrpn_device *vrpn_device_new(const struct incise_backend_request *request,
 				    uint32_t sensors, int64_t silent_ns, bool forces,
 				    struct incise_error *err);
+
+/* No force, after a failure, too; then close it. */
 void vrpn_device_free(struct vrpn_device *device);
 
-/* Receive what is there, without waiting. 0 or device->gone. */
+/* Receive what is there, without waiting, or connect again. 0 or the device's error. */
 int vrpn_device_receive(struct vrpn_device *device);
 
-/* The next pose from what was received. 1; 0: there is none; or device->gone. */
+/* The next pose from what was received. 1; 0: there is none; or the device's error. */
 int vrpn_device_pose(struct vrpn_device *device, struct vrpn_pose *pose);
 
-/* The same force within @radius_m of the last sound pose; after a failure, too. 0 or device->gone. */
-int vrpn_device_force(struct vrpn_device *device, const double force_N[3],
-		      double radius_m);
-
-int vrpn_device_cause(const struct vrpn_device *device, char *text, size_t size);
+/* The same force within some metres of the last sound pose. 0 or the device's error. */
+int vrpn_device_force(struct vrpn_device *device, const double force_N[3]);
 
 #endif

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
  * A tracker of a VRPN server, "vrpn:NAME@HOST[:PORT]": sensor n - 1 is station n.
- * incise_tracker_read() receives without waiting: one or two system calls, no lock.
+ * incise_tracker_read() receives without waiting: one or two system calls, no lock; while it is connected
+ * again, some more each 250 ms.
  */
 #include <stdio.h>
 #include <string.h>
 #include "../../base/vector.h"
-#include "../../rig/backends.h"
 #include "vrpn_device.h"
 
 #define SLIP 2 /* periods */
@@ -64,7 +64,7 @@ static int tracker_read(struct incise_tracker *tracker,
 	vrpn_device_receive(device);
 	while (got < n && vrpn_device_pose(device, &pose) == 1)
 		take_pose(device, &pose, &samples[got++]);
-	return got ? got : device->gone;
+	return got ? got : device->haptic.error;
 }
 
 static void tracker_info(const struct incise_tracker *tracker,
@@ -73,7 +73,7 @@ static void tracker_info(const struct incise_tracker *tracker,
 	const struct vrpn_device *device = device_of(tracker);
 
 	*info = (struct incise_tracker_info){
-		.rate_hz = device->rate_hz,
+		.rate_hz = device->haptic.info.rate_hz,
 		.stations = device->setup.n_stations,
 		.scalpel_station = device->setup.stations[0],
 		.tube_station = device->setup.tube_station,
@@ -81,7 +81,7 @@ static void tracker_info(const struct incise_tracker *tracker,
 		.network = true,
 		.lost_unsure = device->pace.unsure,
 	};
-	snprintf(info->name, sizeof(info->name), "%s", device->name);
+	snprintf(info->name, sizeof(info->name), "%s", device->haptic.info.name);
 }
 
 static uint64_t tracker_lost(const struct incise_tracker *tracker)
@@ -96,7 +96,7 @@ static void tracker_close(struct incise_tracker *tracker)
 
 static int tracker_cause(struct incise_tracker *tracker, char *text, size_t size)
 {
-	return vrpn_device_cause(device_of(tracker), text, size);
+	return snprintf(text, size, "%s", device_of(tracker)->haptic.cause);
 }
 
 static const struct incise_tracker_ops ops = {
@@ -123,17 +123,10 @@ static void *tracker_open(const struct incise_backend_request *request,
 	device = vrpn_device_new(request, sensors, INT64_MAX, false, err);
 	if (!device)
 		return NULL;
-	device->face.tracker.ops = &ops;
+	device->tracker.ops = &ops;
 	device->setup = *setup;
-	incise_pace_init(&device->pace, device->rate_hz, INCISE_PACE_OFF, 1);
+	incise_pace_init(&device->pace, device->haptic.info.rate_hz, INCISE_PACE_OFF, 1);
 	return device;
 }
 
-const struct incise_backend incise_tracker_vrpn = {
-	.abi = INCISE_BACKEND_ABI,
-	.kind = "tracker",
-	.name = "vrpn",
-	.open = tracker_open,
-};
-
-INCISE_MODULE(incise_tracker_vrpn);
+INCISE_BACKEND(incise_tracker_vrpn, "tracker", "vrpn", .open = tracker_open);

@@ -80,12 +80,12 @@ struct incise_haptic_ops {
 	 * info.rate_hz.
 	 */
 	int (*wait)(struct incise_haptic *haptic, int64_t most_ns);
-	/** Without the settings of the rig, which go before it. */
-	void (*info)(const struct incise_haptic *haptic, struct incise_haptic_info *info);
-	uint64_t (*lost)(const struct incise_haptic *haptic);
 	/** No force, then close. */
 	void (*close)(struct incise_haptic *haptic);
-	/** Cause of an error, or of a flag of the last sample; may be NULL. */
+	/* NULL: the members of struct incise_haptic say it. */
+	void (*info)(const struct incise_haptic *haptic, struct incise_haptic_info *info);
+	uint64_t (*lost)(const struct incise_haptic *haptic);
+	/** Cause of an error, or of a flag of the last sample. */
 	int (*cause)(struct incise_haptic *haptic, char *text, size_t size);
 	/** As incise_haptic_cuts(), of a device with an owner; else NULL. */
 	unsigned int (*cuts)(const struct incise_haptic *haptic,
@@ -95,9 +95,12 @@ struct incise_haptic_ops {
 /** A haptic device: the first member of its backend's struct. */
 struct incise_haptic {
 	const struct incise_haptic_ops *ops;
-	/* The library sets these after open(). */
-	struct incise_haptic_info info; /**< with the settings of the rig */
-	void *module;
+	/** open() fills it; then the library puts the settings of the rig in their places. */
+	struct incise_haptic_info info;
+	uint64_t lost; /**< samples */
+	int error; /**< negative errno, for good: read() and push() are not called any more */
+	char cause[400]; /**< of the error, or of a flag of the last sample; or "" */
+	void *module;	 /**< set by the library */
 };
 
 /** Functions of a camera; see incise/camera.h. */
@@ -343,7 +346,7 @@ struct incise_actuator {
 };
 
 /** Version of the structs and values that backends use. */
-#define INCISE_BACKEND_ABI 12
+#define INCISE_BACKEND_ABI 13
 
 /** Settings of rig.conf for a backend. */
 struct incise_backend_request {

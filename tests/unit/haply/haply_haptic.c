@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * lib/device/haply/haply_haptic.c against tests/haply/emulator.py, a service of its own, in real time: each
- * test waits for what it needs to see.
+ * test waits for what it needs to see. Late answers are of simulated time.
  */
 #include <errno.h>
 #include <locale.h>
@@ -28,7 +28,24 @@ static FILE *to, *from;
 static pid_t emulator;
 static int port;
 static struct incise_haptic *haptic;
+static struct incise_clock *clock_of_test;
 static double force_N[3];
+
+static int start_clock(void **state)
+{
+	(void)state;
+	clock_of_test = incise_clock_new_real();
+	return 0;
+}
+
+static int end_clock(void **state)
+{
+	(void)state;
+	incise_clock_free(clock_of_test);
+	return 0;
+}
+
+GROUP(start_clock, end_clock);
 
 static void start_emulator(const char *options)
 {
@@ -75,8 +92,8 @@ static void end_emulator(void)
 static void *try_open(const char *id, const char *options, struct incise_error *err)
 {
 	static const struct incise_haptic_setup setup = {.rate_hz = 1000};
-	struct incise_backend_request request = {.where = "a.conf:1: haptic",
-						 .haptic = &setup};
+	struct incise_backend_request request = {
+		.where = "a.conf:1: haptic", .haptic = &setup, .clock = clock_of_test};
 	char arguments[100];
 
 	if (options)
@@ -90,8 +107,6 @@ static void open_device(const char *options)
 {
 	haptic = try_open("", options, &err);
 	succeeds(haptic);
-	/* As incise_haptic_open() does. */
-	haptic->ops->info(haptic, &haptic->info);
 	haptic->info.peak_N = 5;
 	memset(force_N, 0, sizeof(force_N));
 }
@@ -103,25 +118,30 @@ static void close_device(void)
 }
 
 /* A step of an owner; whether there is a sample. */
-static bool step(struct incise_haptic_sample *sample)
+static bool step_for(struct incise_haptic_sample *sample, int64_t most_ns)
 {
 	int rc;
 
-	haptic->ops->wait(haptic, 50 * MS);
-	rc = haptic->ops->read(haptic, sample, 1);
-	haptic->ops->push(haptic, force_N, (double[3]){0});
+	haptic->ops->wait(haptic, most_ns);
+	rc = incise_haptic_read(haptic, sample, 1);
+	incise_haptic_push(haptic, force_N, NULL);
 	assert_true(rc == 0 || rc == 1);
 	return rc;
+}
+
+static bool step(struct incise_haptic_sample *sample)
+{
+	return step_for(sample, 50 * MS);
 }
 
 /* Until a sample has these of the flags. */
 static struct incise_haptic_sample wait_flags(uint32_t flags)
 {
-	int64_t until_ns = incise_monotonic_ns() + LONG_NS;
+	int64_t until_ns = incise_clock_now(clock_of_test) + LONG_NS;
 	struct incise_haptic_sample sample = {0};
 
 	do {
-		assert_true(incise_monotonic_ns() < until_ns);
+		assert_true(incise_clock_now(clock_of_test) < until_ns);
 		/* A time of this test. */
 		assert_true(!step(&sample) || sample.t_ns > until_ns - 2 * LONG_NS);
 	} while (sample.flags != flags || !sample.t_ns);
@@ -154,7 +174,7 @@ static void wait_force(const double expected_N[3], double tolerance)
 
 static bool has_cause(const char *part, char text[400])
 {
-	haptic->ops->cause(haptic, text, 400);
+	incise_haptic_cause(haptic, text, 400);
 	return strstr(text, part);
 }
 
@@ -311,7 +331,7 @@ TEST(what_is_no_good_frame_is_not_ready)
 		sample = wait_cause(INCISE_HAPTIC_NOT_READY, cases[i].cause);
 		assert_true(sample.position_mm[1] == 1e3 * -0.12);
 	}
-	assert_true(haptic->ops->lost(haptic) >= 1);
+	assert_true(incise_haptic_lost(haptic) >= 1);
 	close_device();
 }
 
@@ -325,7 +345,7 @@ TEST(a_frame_that_is_too_long_is_not_understood)
 	say(command);
 	do
 		wait_flags(INCISE_HAPTIC_NOT_READY);
-	while (!haptic->ops->lost(haptic));
+	while (!incise_haptic_lost(haptic));
 	wait_flags(0);
 	close_device();
 }
@@ -394,23 +414,77 @@ TEST(states_of_the_device_are_flags_with_a_reason)
 	close_device();
 }
 
-TEST(a_late_frame_is_not_ready_and_ends_the_force)
+/* In simulated time a wait for an answer takes none, and the emulator answers when it is told to. */
+static struct incise_haptic_sample answer_late(int64_t late_ns)
 {
-	static const double none_N[3];
 	struct incise_haptic_sample sample;
 
+	say("hold");
+	incise_clock_wait_until(clock_of_test, incise_clock_now(clock_of_test) + MS);
+	haptic->ops->wait(haptic, 0);
+	incise_clock_wait_until(clock_of_test, incise_clock_now(clock_of_test) + late_ns);
+	assert_false(step_for(&sample, 0));
+	say("release");
+	while (!step(&sample))
+		;
+	return sample;
+}
+
+/* The force, along x, of the message that follows, and @n more in time. */
+static double follow_force(int n)
+{
+	struct incise_haptic_sample sample;
+	json_t *report;
+	double got_N;
+
+	for (; n >= 0; n--)
+		while (!step(&sample))
+			;
+	report = json_loads(say("report"), JSON_DECODE_INT_AS_REAL, NULL);
+	got_N = json_real_value(json_array_get(json_object_get(report, "force"), 0));
+	json_decref(report);
+	return got_N;
+}
+
+TEST(a_late_answer_fades_the_force_behind_two_missed_ticks)
+{
+	static const struct {
+		int64_t late_ns;
+		double force_N;
+	} cases[] = {{2 * MS, 1},
+		     {3 * MS, 1},
+		     {3250 * MS / 1000, 0.75},
+		     {3500 * MS / 1000, 0.5},
+		     {4 * MS, 0},
+		     {99 * MS, 0}};
+	struct incise_clock *real = clock_of_test;
+	int64_t sent_ns;
+
+	clock_of_test = incise_clock_new_simulated(1000000 * MS);
 	open_device("");
-	wait_flags(0);
 	force_N[0] = 1;
-	wait_force(force_N, 0);
-	say("late 20 1000000");
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		/* In the latency of 1 ms, and two ticks, and a ramp of 100 ms. */
+		assert_true(follow_force(103) == 1);
+		sent_ns = incise_clock_now(clock_of_test) + MS;
+		assert_int_equal(answer_late(cases[i].late_ns).t_ns, sent_ns);
+		assert_float_equal(follow_force(0), cases[i].force_N, 1e-12);
+		assert_float_equal(follow_force(10), fmin(1, cases[i].force_N + 0.1),
+				   1e-12);
+	}
+	/* The device has gone idle. */
+	say("hold");
+	incise_clock_wait_until(clock_of_test, incise_clock_now(clock_of_test) + MS);
+	haptic->ops->wait(haptic, 0);
+	incise_clock_wait_until(clock_of_test,
+				incise_clock_now(clock_of_test) + 101 * MS);
 	wait_cause(INCISE_HAPTIC_NOT_READY, "late");
-	wait_force(none_N, 0);
-	say("late 0 0");
-	sample = wait_flags(0);
-	assert_true(sample.t_ns <= incise_monotonic_ns());
-	wait_force(force_N, 0);
+	say("release");
+	wait_flags(0);
+	assert_float_equal(follow_force(0), 0, 1e-12);
 	close_device();
+	incise_clock_free(clock_of_test);
+	clock_of_test = real;
 }
 
 TEST(a_force_that_nobody_pushes_again_ends)
@@ -425,7 +499,7 @@ TEST(a_force_that_nobody_pushes_again_ends)
 	while (!strstr(say("report"), "\"force\": [0.0, 0.0, 0.0]")) {
 		assert_true(incise_monotonic_ns() < until_ns);
 		haptic->ops->wait(haptic, 50 * MS);
-		haptic->ops->read(haptic, &sample, 1);
+		incise_haptic_read(haptic, &sample, 1);
 	}
 	close_device();
 }
@@ -522,13 +596,13 @@ TEST(a_service_that_ends_is_gone_until_it_is_opened_again)
 	do {
 		assert_true(incise_monotonic_ns() < until_ns);
 		haptic->ops->wait(haptic, 50 * MS);
-		rc = haptic->ops->read(haptic, &sample, 1);
+		rc = incise_haptic_read(haptic, &sample, 1);
 	} while (rc >= 0);
 	assert_int_equal(rc, -ENODEV);
 	/* It would answer again. */
 	haptic->ops->wait(haptic, MS);
-	assert_int_equal(haptic->ops->read(haptic, &sample, 1), -ENODEV);
-	assert_int_equal(haptic->ops->push(haptic, force_N, force_N), -ENODEV);
+	assert_int_equal(incise_haptic_read(haptic, &sample, 1), -ENODEV);
+	assert_int_equal(incise_haptic_push(haptic, force_N, NULL), -ENODEV);
 	assert_true(has_cause("closed the connection", text));
 	haptic->ops->close(haptic);
 	open_device(NULL);

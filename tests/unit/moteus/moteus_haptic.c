@@ -78,11 +78,11 @@ static void start_one(void)
 static int tick(const double force_N[3], struct incise_haptic_sample *sample)
 {
 	static const double none[3];
-	int rc = device->ops->read(device, sample, 1);
+	int rc = incise_haptic_read(device, sample, 1);
 
 	if (rc < 0)
 		return rc;
-	if (device->ops->push(device, force_N, none) < 0)
+	if (incise_haptic_push(device, force_N, none) < 0)
 		return -1;
 	drives_advance(&drives, DRIVES_MS);
 	return rc;
@@ -103,7 +103,7 @@ static void assert_cause(const char *expected)
 {
 	char text[300];
 
-	assert_true(device->ops->cause(device, text, sizeof(text)) > 0);
+	assert_true(incise_haptic_cause(device, text, sizeof(text)) > 0);
 	if (!strstr(text, expected))
 		fail_msg("\"%s\" is not in \"%s\"", expected, text);
 }
@@ -166,7 +166,7 @@ TEST(properties, start, end)
 	struct incise_haptic_info info = {0};
 
 	succeeds(open_device("can0:1,2,3"));
-	device->ops->info(device, &info);
+	incise_haptic_info(device, &info);
 	/* |dual| of x, y, z': 1, √2, √2; 20 π N each */
 	assert_float_equal(info.peak_N, 20 * M_PI / sqrt(2), 1e-9);
 	assert_true(info.deadman_s == WATCHDOG_MS * 1e-3 && info.rate_hz == 1000);
@@ -203,7 +203,7 @@ TEST(positions_of_three_lines, start, end)
 	/* between question and answer of a tick ago */
 	assert_int_equal(drives.now_ns - sample.t_ns,
 			 2 * DRIVES_MS - drives.drive[0].latency_ns / 2);
-	assert_int_equal(device->ops->lost(device), 0);
+	assert_int_equal(incise_haptic_lost(device), 0);
 }
 
 TEST(torques_are_the_force, start, end)
@@ -254,6 +254,41 @@ TEST(one_motor, start, end)
 	assert_true(sample.position_mm[0] == -15 && sample.position_mm[1] == 0);
 	tick(force_N, &sample);
 	assert_true(drives.drive[0].torque == (float)(2 * 10 / (2 * M_PI) * 1e-3));
+}
+
+static int keep_found(void *context, const struct incise_scan_device *drive)
+{
+	snprintf((char *)context + strlen(context), 600, "%s %d %s\n", drive->device,
+		 drive->usable, drive->what);
+	return 0;
+}
+
+TEST(a_search_asks_each_id_once, start, end)
+{
+	int64_t before_ns = drives.now_ns;
+	char list[3000] = "";
+
+	drives.n = 4;
+	drives.drive[0].id = 127;
+	drives.drive[1].id = 5;
+	drives.drive[1].refused = 0x1f;
+	drives.drive[2].id = drives.drive[3].id = 9;
+	drives.drive[2].latency_ns = drives.drive[3].latency_ns = 15 * DRIVES_MS;
+	drives.drive[3].voltage = 48;
+	assert_int_equal(moteus_scan_on(&transport, "can0", keep_found, list, &err), 0);
+	assert_string_equal(
+		list, "moteus:can0:5 0 moteus drive: refuses a query; update its "
+		      "firmware\n"
+		      "moteus:can0:9 0 moteus drive: another one has this id; give "
+		      "each its own\n"
+		      "moteus:can0:127 1 moteus drive, mode 0, no fault, 24 V, 31 C\n");
+	assert_true(drives.closed && drives.now_ns - before_ns < 200 * DRIVES_MS);
+	/* Nobody acknowledges a frame. */
+	drives.full = true;
+	*list = 0;
+	assert_int_equal(moteus_scan_on(&transport, "can0", keep_found, list, &err), 0);
+	assert_string_equal(list, "");
+	assert_no_torque();
 }
 
 TEST(refused_at_the_start, start, end)
@@ -444,7 +479,8 @@ TEST(a_silent_motor_ends_all, start, end)
 	assert_cause("motor 2 does not answer");
 	for (int i = 0; i < 3; i++)
 		assert_int_equal(drives.drive[i].mode, MOTEUS_STOPPED);
-	assert_int_equal(device->ops->push(device, (double[3]){0}, (double[3]){0}), -EIO);
+	assert_int_equal(incise_haptic_push(device, (double[3]){0}, (double[3]){0}),
+			 -EIO);
 }
 
 /* A lost answer, and answers later than a tick, are no end. */
@@ -462,7 +498,7 @@ TEST(answers_that_are_lost_or_late, start, end)
 	assert_int_equal(tick((double[3]){1}, &sample), 0);
 	assert_int_equal(tick((double[3]){1}, &sample), 1);
 	assert_int_equal(sample.seq, seq + 3);
-	assert_int_equal(device->ops->lost(device), 1);
+	assert_int_equal(incise_haptic_lost(device), 1);
 	drives.drive[0].latency_ns = 3 * DRIVES_MS / 2;
 	for (int i = 0; i < 50; i++)
 		assert_true(tick((double[3]){1}, &sample) >= 0);
@@ -502,7 +538,7 @@ TEST(a_full_queue_is_silence, start, end)
 	drives.full = false;
 }
 
-/* Whatever comes, poses are numbers, and torques within the largest. */
+/* Poses are numbers and torques within the largest, whatever the drives answer. */
 TEST(mutated_answers, start, NULL)
 {
 	int n = cases_of(100000, 0);

@@ -227,7 +227,7 @@ TEST(a_haptic_device_is_tracker_and_stepper)
 				   plan.haptic.turn[2] * plan.haptic.turn[2],
 			   1, 1e-12);
 	incise_rig_plan_free(&plan);
-	/* Who needs neither leaves it alone. */
+	/* A part of the rig that needs neither leaves it alone. */
 	succeeds(!incise_rig_plan_read(&plan, file.path, INCISE_RIG_FORCE, &err));
 	assert_null(plan.haptic_device);
 	incise_rig_plan_free(&plan);

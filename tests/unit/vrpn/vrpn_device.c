@@ -8,9 +8,11 @@
 #include <endian.h>
 #include <fcntl.h>
 #include <float.h>
+#include <limits.h>
+#include <poll.h>
 #include <pthread.h>
-#include <semaphore.h>
 #include <sys/socket.h>
+#include "../message.h"
 #include "../unit.h"
 #include "../../../lib/base/monotonic.h"
 #include "../../../lib/base/vector.h"
@@ -84,7 +86,7 @@ static int replay(size_t part, struct vrpn_pose *poses, int capacity)
 		while (n < capacity && vrpn_device_pose(&device, &poses[n]) == 1)
 			n++;
 	}
-	assert_int_equal(device.gone, 0);
+	assert_int_equal(device.haptic.error, 0);
 	return n;
 }
 
@@ -128,7 +130,7 @@ TEST(each_pose_is_right_to_the_last_bit, connect_pair, close_pair)
 		for (int k = 0; k < 3; k++)
 			assert_true(fabs(poses[i].sample.position_mm[k] -
 					 (50 * sin((11 + i) / 12.0 + k) + k)) < 1e-9);
-	assert_int_equal(device.buttons, 2);
+	assert_int_equal(device.haptic.info.buttons, 2);
 }
 
 TEST(parts_of_any_size_give_the_same, connect_pair, close_pair)
@@ -232,7 +234,7 @@ TEST(names_may_come_late_and_twice, connect_pair, close_pair)
 	describe(-1, 7, "Tool");
 	assert_int_equal(vrpn_device_pose(&device, &pose), -EPROTO);
 	assert_int_equal(vrpn_device_receive(&device), -EPROTO);
-	assert_non_null(strstr(device.cause.text, "another number"));
+	assert_non_null(strstr(device.haptic.cause, "another number"));
 }
 
 TEST(poses_that_are_none_are_not_sound, connect_pair, close_pair)
@@ -257,7 +259,7 @@ TEST(poses_that_are_none_are_not_sound, connect_pair, close_pair)
 	device.silent_ns = 1;
 	assert_int_equal(vrpn_device_receive(&device), -EIO);
 	device.silent_ns = INT64_MAX;
-	device.gone = 0;
+	device.haptic.error = 0;
 	send_pose(1, 2, long_one);
 	assert_int_equal(count_poses(&pose), 1);
 	assert_true(pose.sound && pose.sample.quaternion[0] == 1);
@@ -284,14 +286,11 @@ TEST(what_is_no_vrpn_ends_it_with_a_cause, connect_pair, close_pair)
 	struct vrpn_pose pose;
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		char text[200];
-
 		close_pair(NULL);
 		connect_pair(NULL);
 		assert_int_equal(put(cases[i].bytes, cases[i].n), 0);
 		assert_int_equal(vrpn_device_pose(&device, &pose), -EPROTO);
-		assert_true(vrpn_device_cause(&device, text, sizeof(text)) > 0);
-		assert_non_null(strstr(text, "VRPN 07"));
+		assert_non_null(strstr(device.haptic.cause, "VRPN 07"));
 	}
 }
 
@@ -315,80 +314,94 @@ TEST(times_of_this_machine_are_exact, connect_pair, close_pair)
 
 /* --- the backends -------------------------------------------------------------------- */
 
+/* The recorded server: a thread of its own while the device is opened, then the test itself. */
 struct peer {
-	int listener;
-	sem_t go;
-	bool nonsense; /* in place of the last frame */
+	int listener, fd;
+	pthread_t thread;
 	char arguments[64];
 	uint8_t got[SERVER_MAX];
 	size_t n;
 };
 
-static void serve_bytes(int fd, const uint8_t *bytes, size_t n)
+static void serve_bytes(const struct peer *peer, const uint8_t *bytes, size_t n)
 {
-	assert_int_equal(send(fd, bytes, n, MSG_NOSIGNAL), n);
+	assert_int_equal(send(peer->fd, bytes, n, MSG_NOSIGNAL), n);
 }
 
-/* The recorded server, whose last frame comes when the test says so; it closes at the client's end, or
-   after a third field. */
-static void *run_peer(void *argument)
+static void *accept_client(void *argument)
 {
 	struct peer *peer = argument;
-	int fd = accept(peer->listener, NULL, NULL);
-	ssize_t n;
 
-	serve_bytes(fd, server, LAST_FRAME);
-	sem_wait(&peer->go);
-	if (peer->nonsense)
-		serve_bytes(fd, (const uint8_t[24]){0}, 24);
-	else
-		serve_bytes(fd, server + LAST_FRAME, server_n - LAST_FRAME);
-	while (peer->n <= NAMES + 2 * FIELD &&
-	       (n = recv(fd, peer->got + peer->n, sizeof(peer->got) - peer->n, 0)) > 0)
-		peer->n += (size_t)n;
-	close(fd);
+	peer->fd = accept(peer->listener, NULL, NULL);
+	serve_bytes(peer, server, LAST_FRAME);
 	return NULL;
 }
 
-static void start_peer(struct peer *peer, pthread_t *thread, const char *name)
+static void start_peer(struct peer *peer)
 {
 	struct sockaddr_in address = {.sin_family = AF_INET,
 				      .sin_addr = {htonl(INADDR_LOOPBACK)}};
 	socklen_t size = sizeof(address);
 
 	memset(peer, 0, sizeof(*peer));
-	sem_init(&peer->go, 0, 0);
 	peer->listener = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
 	assert_int_equal(bind(peer->listener, (void *)&address, size), 0);
 	assert_int_equal(listen(peer->listener, 1), 0);
 	getsockname(peer->listener, (void *)&address, &size);
-	snprintf(peer->arguments, sizeof(peer->arguments), "%s@127.0.0.1:%d", name,
+	snprintf(peer->arguments, sizeof(peer->arguments), "Tool@127.0.0.1:%d",
 		 ntohs(address.sin_port));
-	assert_int_equal(pthread_create(thread, NULL, run_peer, peer), 0);
+	assert_int_equal(pthread_create(&peer->thread, NULL, accept_client, peer), 0);
 }
 
-static struct incise_haptic *open_haptic(struct peer *peer, pthread_t *thread,
-					 bool nonsense)
+static void serve_last_frame(const struct peer *peer)
+{
+	serve_bytes(peer, server + LAST_FRAME, server_n - LAST_FRAME);
+}
+
+static void receive_exactly(struct peer *peer, size_t n)
+{
+	assert_int_equal(recv(peer->fd, peer->got, n, MSG_WAITALL), n);
+	peer->n = n;
+}
+
+/* All that came until the device has closed, which @close does. */
+static void close_haptic(struct incise_haptic *haptic, struct peer *peer)
+{
+	ssize_t n;
+
+	/* It does not wait for a server that ends. */
+	shutdown(peer->fd, SHUT_WR);
+	haptic->ops->close(haptic);
+	while ((n = recv(peer->fd, peer->got + peer->n, sizeof(peer->got) - peer->n, 0)) >
+	       0)
+		peer->n += (size_t)n;
+	close(peer->fd);
+	close(peer->listener);
+}
+
+static struct incise_haptic *open_haptic(struct peer *peer)
 {
 	struct incise_backend_request request = {.where = "rig.conf:1: haptic"};
 	struct incise_haptic *haptic;
 
-	start_peer(peer, thread, "Tool");
+	start_peer(peer);
 	request.arguments = peer->arguments;
 	haptic = incise_haptic_vrpn.open(&request, &err);
 	succeeds(haptic);
-	peer->nonsense = nonsense;
-	sem_post(&peer->go);
+	pthread_join(peer->thread, NULL);
+	/* However slow this machine is. */
+	((struct vrpn_device *)haptic)->silent_ns = INT64_MAX;
 	return haptic;
 }
 
 static struct incise_haptic_sample read_sample(struct incise_haptic *haptic)
 {
+	const struct server_link *link = &((struct vrpn_device *)haptic)->link;
 	struct incise_haptic_sample sample;
-	int n = 0;
+	int n;
 
-	while (!(n = haptic->ops->read(haptic, &sample, 1)))
-		assert_int_equal(haptic->ops->wait(haptic, 1000000000), 0);
+	while (!(n = incise_haptic_read(haptic, &sample, 1)))
+		server_link_wait(link, link->fd, POLLIN, INT_MAX);
 	assert_int_equal(n, 1);
 	return sample;
 }
@@ -412,26 +425,39 @@ TEST(a_force_goes_out_as_vrpn_accepted_it)
 	struct incise_haptic *haptic;
 	double force_N[3] = {0};
 	struct peer peer;
-	pthread_t thread;
 
-	haptic = open_haptic(&peer, &thread, false);
-	haptic->ops->info(haptic, &info);
-	assert_true(info.rate_hz > 11.9 && info.rate_hz < 12.1 &&
-		    info.features & INCISE_HAPTIC_PAGE_VELOCITY);
+	haptic = open_haptic(&peer);
+	incise_haptic_info(haptic, &info);
+	assert_true(info.rate_hz > 11.9 && info.rate_hz < 12.1 && info.features & INCISE_HAPTIC_PAGE_VELOCITY);
 	assert_int_equal(info.buttons, 2);
 	assert_true(info.deadman_s == 0 && strstr(info.note, "keeps the last force"));
+	serve_last_frame(&peer);
 	sample = read_sample(haptic);
 	assert_int_equal(sample.seq, 0);
 	force_N[2] = -0.1 * sample.position_mm[2];
 	haptic->info.peak_N = 5;
-	assert_int_equal(haptic->ops->push(haptic, force_N, (double[3]){0}), 0);
-	haptic->ops->close(haptic);
-	pthread_join(thread, NULL);
-	close(peer.listener);
+	assert_int_equal(incise_haptic_push(haptic, force_N, NULL), 0);
+	close_haptic(haptic, &peer);
 	assert_int_equal(peer.n, NAMES + 2 * FIELD);
 	assert_memory_equal(peer.got, client, 24);
 	check_sent(peer.got + 24, client + 24, NAMES - 24);
 	check_sent(peer.got + NAMES, client + NAMES + (FIELDS - 1) * FIELD, 2 * FIELD);
+}
+
+/* The force of field @i, and its radius. */
+static void get_field(const struct peer *peer, size_t i, double values[4])
+{
+	static const size_t at[4] = {12, 16, 20, FIELD - 24 - 4};
+
+	for (int k = 0; k < 4; k++) {
+		uint32_t word;
+		float single;
+
+		memcpy(&word, peer->got + NAMES + i * FIELD + 24 + at[k], sizeof(word));
+		word = be32toh(word);
+		memcpy(&single, &word, sizeof(single));
+		values[k] = (double)single;
+	}
 }
 
 TEST(no_force_above_the_peak_or_without_a_known_one)
@@ -446,77 +472,131 @@ TEST(no_force_above_the_peak_or_without_a_known_one)
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		struct incise_haptic *haptic;
-		double sent_N[3];
+		double sent_N[4];
 		struct peer peer;
-		pthread_t thread;
 
-		haptic = open_haptic(&peer, &thread, false);
+		haptic = open_haptic(&peer);
 		haptic->info.peak_N = cases[i].peak_N;
-		assert_int_equal(
-			haptic->ops->push(haptic, cases[i].force_N, (double[3]){0}), 0);
-		haptic->ops->close(haptic);
-		pthread_join(thread, NULL);
-		close(peer.listener);
-		for (int k = 0; k < 3; k++) {
-			uint32_t word;
-			float single;
-
-			memcpy(&word, peer.got + NAMES + 24 + 12 + 4 * k, sizeof(word));
-			word = be32toh(word);
-			memcpy(&single, &word, sizeof(single));
-			sent_N[k] = (double)single;
-		}
+		assert_int_equal(incise_haptic_push(haptic, cases[i].force_N, NULL), 0);
+		close_haptic(haptic, &peer);
+		get_field(&peer, 0, sent_N);
 		assert_true(v3_length(sent_N) >= cases[i].least_N &&
 			    v3_length(sent_N) <= cases[i].most_N);
 	}
 }
 
+static const double some_N[3] = {1, 2, 3}, none_N[3];
+
+static void assert_field(const struct peer *peer, size_t i, const double force_N[3],
+			 double radius_m)
+{
+	double values[4];
+
+	get_field(peer, i, values);
+	check_numbers(values, force_N, 3);
+	assert_true(values[3] == radius_m);
+}
+
+static void assert_broken(struct incise_haptic *haptic, const char *part)
+{
+	struct incise_haptic_sample sample = read_sample(haptic);
+	char text[400];
+
+	assert_int_equal(sample.flags, INCISE_HAPTIC_NOT_READY);
+	assert_true(sample.position_mm[0] == 0x1.5c99ed42fff1ep+5);
+	assert_true(incise_haptic_cause(haptic, text, sizeof(text)) > 0);
+	assert_non_null(strstr(text, "VRPN Tool at 127.0.0.1"));
+	assert_non_null(strstr(text, part));
+	message_record(text);
+	/* One sample. */
+	assert_int_equal(incise_haptic_read(haptic, &sample, 1), 0);
+	assert_int_equal(incise_haptic_push(haptic, some_N, NULL), 0);
+}
+
+static struct incise_haptic *open_with_force(struct peer *peer)
+{
+	struct incise_haptic *haptic = open_haptic(peer);
+
+	haptic->info.peak_N = 5;
+	serve_last_frame(peer);
+	assert_int_equal(read_sample(haptic).flags, 0);
+	assert_int_equal(incise_haptic_push(haptic, some_N, NULL), 0);
+	return haptic;
+}
+
+/* The order of a connection that is made again, whenever its time is. */
+TEST(a_connection_that_breaks_is_made_again_without_force)
+{
+	struct incise_haptic_sample sample;
+	struct incise_haptic *haptic;
+	uint64_t seq;
+	struct peer peer;
+
+	haptic = open_with_force(&peer);
+	receive_exactly(&peer, NAMES + FIELD);
+	assert_field(&peer, 0, some_N, 2);
+	close(peer.fd);
+	assert_broken(haptic, "closed the connection");
+	/* It connects; then its cookie goes out. */
+	((struct vrpn_device *)haptic)->retry_ns = 0;
+	((struct vrpn_device *)haptic)->broken_ns = INT64_MAX;
+	assert_int_equal(incise_haptic_read(haptic, &sample, 1), 0);
+	accept_client(&peer);
+	sample = read_sample(haptic);
+	assert_int_equal(sample.flags, 0);
+	for (seq = sample.seq; sample.seq < seq + 10; sample = read_sample(haptic))
+		assert_int_equal(sample.flags, 0);
+	assert_int_equal(seq, 2);
+	incise_haptic_push(haptic, some_N, NULL);
+	incise_haptic_push(haptic, none_N, NULL);
+	incise_haptic_push(haptic, some_N, NULL);
+	peer.n = 0;
+	close_haptic(haptic, &peer);
+	assert_int_equal(peer.n, NAMES + 4 * FIELD);
+	assert_memory_equal(peer.got, client, 24);
+	check_sent(peer.got + 24, client + 24, NAMES - 24);
+	assert_field(&peer, 0, none_N, 2);
+	assert_field(&peer, 1, none_N, 2);
+	assert_field(&peer, 2, some_N, 2);
+	assert_field(&peer, 3, none_N, 0);
+}
+
 TEST(a_server_that_is_gone_leaves_a_cause)
 {
-	static const double none[3];
 	struct incise_haptic_sample sample;
 	struct incise_haptic *haptic;
 	struct peer peer;
-	pthread_t thread;
-	char text[200];
-	int n;
+	char text[400];
 
-	haptic = open_haptic(&peer, &thread, false);
-	assert_int_equal(haptic->ops->cause(haptic, text, sizeof(text)), 0);
-	for (int i = 0; i < 3; i++)
-		haptic->ops->push(haptic, none, none);
-	pthread_join(thread, NULL);
-	while ((n = haptic->ops->read(haptic, &sample, 1)) >= 0)
-		haptic->ops->wait(haptic, 1000000000);
-	assert_true(n == -ENODEV || n == -EIO);
-	assert_true(haptic->ops->cause(haptic, text, sizeof(text)) > 0);
-	assert_non_null(strstr(text, "VRPN Tool at 127.0.0.1"));
-	assert_int_equal(haptic->ops->push(haptic, none, none), n);
-	haptic->ops->close(haptic);
+	haptic = open_with_force(&peer);
+	close(peer.fd);
 	close(peer.listener);
+	assert_broken(haptic, "closed the connection");
+	((struct vrpn_device *)haptic)->broken_ns -= 10000000000;
+	assert_int_equal(incise_haptic_read(haptic, &sample, 1), -ENODEV);
+	assert_true(incise_haptic_cause(haptic, text, sizeof(text)) > 0);
+	assert_non_null(strstr(text, "was not back after 10 s"));
+	message_record(text);
+	assert_int_equal(incise_haptic_push(haptic, none_N, NULL), -ENODEV);
+	haptic->ops->close(haptic);
 }
 
 TEST(a_failure_ends_in_no_force)
 {
-	static const double some[3] = {1, 2, 3}, none[3];
-	struct incise_haptic_sample sample;
 	struct incise_haptic *haptic;
 	struct peer peer;
-	pthread_t thread;
-	int n;
 
-	haptic = open_haptic(&peer, &thread, true);
-	while (!(n = haptic->ops->read(haptic, &sample, 1)))
-		haptic->ops->wait(haptic, 1000000000);
-	assert_int_equal(n, -EPROTO);
-	assert_int_equal(haptic->ops->push(haptic, some, none), -EPROTO);
-	haptic->ops->close(haptic);
-	pthread_join(thread, NULL);
-	close(peer.listener);
-	assert_int_equal(peer.n, NAMES + FIELD);
-	/* Behind the origin: force, Jacobian and radius. */
-	for (size_t i = 24 + 12; i < FIELD; i++)
-		assert_int_equal(peer.got[NAMES + i], 0);
+	for (int i = 0; i < 2; i++) {
+		haptic = open_with_force(&peer);
+		if (i)
+			serve_bytes(&peer, (const uint8_t[24]){0}, 24);
+		else
+			((struct vrpn_device *)haptic)->silent_ns = 0;
+		assert_broken(haptic, i ? "VRPN 07 does not have" : "sends no poses");
+		close_haptic(haptic, &peer);
+		assert_int_equal(peer.n, NAMES + 2 * FIELD);
+		assert_field(&peer, 1, none_N, 0);
+	}
 }
 
 TEST(sensors_are_stations_of_a_tracker)
@@ -530,32 +610,46 @@ TEST(sensors_are_stations_of_a_tracker)
 	struct incise_tracker_sample samples[64];
 	struct incise_tracker_info info;
 	struct incise_tracker *tracker;
+	struct vrpn_device *of;
 	struct peer peer;
-	pthread_t thread;
 	int n;
 
-	start_peer(&peer, &thread, "Tool");
+	start_peer(&peer);
 	request.arguments = peer.arguments;
 	tracker = incise_tracker_vrpn.open(&request, &err);
 	succeeds(tracker);
+	pthread_join(peer.thread, NULL);
 	tracker->ops->info(tracker, &info);
 	assert_int_equal(info.stations, 2);
 	assert_true(info.rate_hz > 23 && info.rate_hz < 26 && info.network);
-	sem_post(&peer.go);
+	serve_last_frame(&peer);
+	of = (struct vrpn_device *)tracker;
+	do
+		server_link_wait(&of->link, of->link.fd, POLLIN, INT_MAX);
 	/* That of sensor 1 is not in the recording's last frame. */
-	while (!(n = tracker->ops->read(tracker, samples, 64)))
-		usleep(1000);
+	while (!(n = tracker->ops->read(tracker, samples, 64)));
 	assert_int_equal(n, 1);
 	assert_true(samples[0].station == 1 && samples[0].status == ' ');
 	/* 10 mm along its z, which the turn about z leaves. */
 	assert_true(fabs(samples[0].position_mm[0] - 0x1.5c99ed42fff1ep+5) < 1e-12);
 	assert_true(fabs(samples[0].position_mm[2] - (-0x1.336ef38694816p+5 + 10)) <
 		    1e-12);
-	tracker->ops->close(tracker);
-	pthread_join(thread, NULL);
-	close(peer.listener);
+	close(peer.fd);
+	server_link_wait(&of->link, of->link.fd, POLLIN, INT_MAX);
+	assert_int_equal(tracker->ops->read(tracker, samples, 64), 0);
+	of->retry_ns = 0;
+	of->broken_ns = INT64_MAX;
+	assert_int_equal(tracker->ops->read(tracker, samples, 64), 0);
+	accept_client(&peer);
+	while (!(n = tracker->ops->read(tracker, samples, 64)))
+		server_link_wait(&of->link, of->link.fd, POLLIN, INT_MAX);
+	assert_true(n > 0 && samples[0].status == ' ' && samples[0].seq > 0);
 	/* It sends a cookie alone. */
-	assert_int_equal(peer.n, 24);
+	receive_exactly(&peer, 24);
+	tracker->ops->close(tracker);
+	assert_true(recv(peer.fd, peer.got, sizeof(peer.got), 0) <= 0);
+	close(peer.fd);
+	close(peer.listener);
 }
 
 TEST(wrong_devices_are_one_line)

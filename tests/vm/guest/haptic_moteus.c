@@ -53,7 +53,7 @@ int main(int argc, char **argv)
 		double force[3] = {0};
 		int64_t now_ns = incise_monotonic_ns();
 
-		rc = device->ops->read(device, &sample, 1);
+		rc = incise_haptic_read(device, &sample, 1);
 		if (rc == 1) {
 			samples++;
 			ready += !sample.flags;
@@ -62,14 +62,14 @@ int main(int argc, char **argv)
 		}
 		force[i * setup.n_motors / ticks] = i & 64 ? force_N : -force_N;
 		if (rc >= 0)
-			rc = device->ops->push(device, force, none);
+			rc = incise_haptic_push(device, force, none);
 		next_ns += period_ns;
 		incise_monotonic_sleep_until(next_ns);
 	}
-	device->ops->cause(device, cause, sizeof(cause));
+	incise_haptic_cause(device, cause, sizeof(cause));
 	printf("{\"samples\": %d, \"ready\": %d, \"lost\": %d, \"flags\": %u, "
 	       "\"age_ms\": %.3f, \"error\": %d, \"position\": %.9g, \"cause\": \"%s\"}\n",
-	       samples, ready, (int)device->ops->lost(device), sample.flags,
+	       samples, ready, (int)incise_haptic_lost(device), sample.flags,
 	       (double)oldest_ns * 1e-6, rc, sample.position_mm[0], cause);
 	device->ops->close(device);
 	return rc < 0;

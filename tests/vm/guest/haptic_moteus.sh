@@ -35,13 +35,28 @@ has()
 		;;
 	esac
 }
-# In the background, until the motor has turned; $pid. ended: waits for it.
+# becomes COMMAND…: reads a state until COMMAND holds; in vain it prints the reason.
+becomes()
+{
+	for _ in $(seq 1000); do
+		"$@" >/dev/null && return
+	done
+	"$@"
+}
+pushes()
+{
+	drive_tell state 1
+	[ "$(drive_value mode)" = 10 ] && [ "$(drive_value torque)" != 0.0 ] || {
+		echo "the motor has no torque: $drive_line"
+		return 1
+	}
+}
+# In the background, until the motor has torque; $pid. ended: waits for it.
 begin()
 {
 	"$INCISE_BUILD/tests/vm/haptic_moteus" "$1" 100 100000 "$2" >line 2>&1 7>&- &
 	pid=$!
-	until drive_tell state 1 && [ "$(drive_value mode)" = 10 ]; do sleep 0.1; done
-	sleep 0.3
+	becomes pushes
 }
 ended()
 {
@@ -69,6 +84,8 @@ check "no motor" has "no answer of motor 1"
 
 drive_start --can vcan0 --ids 1,2
 check "the drives are there" [ "$drive" = moteus:vcan0:1,2 ] || exit 0
+out=$("$INCISE_BUILD/bin/incise" info devices 2>&1 7>&-)
+check "a search finds both" has "moteus:vcan0:2"
 device vcan0:1,2 300 0.5
 check "each cycle has a sample" is samples ">= 298"
 check "none is lost" is lost "== 0"
@@ -85,13 +102,11 @@ drive_tell watchdog 2 1
 
 begin vcan0:1,2 0.2
 drive_tell fault 2 38
-sleep 0.1
-check "a fault of one ends the torque of the other" free
+check "a fault of one ends the torque of the other" becomes free
 kill "$pid"
 begin vcan0:1,2 0.2
 drive_tell silent 2
-sleep 0.1
-check "so does silence" free
+check "so does silence" becomes free
 ended
 check "which is an error with its reason" has "motor 2 does not answer"
 drive_end
@@ -100,16 +115,12 @@ drive_start --can vcan0 --ids 1
 begin vcan0:1 0.2
 kill -9 "$pid"
 wait "$pid" 2>/dev/null
-sleep 0.1
-check "kill -9: the drive stops by itself" free
+check "kill -9: the drive stops by itself" becomes free
 begin vcan0:1 0.2
 kill -STOP "$pid"
-sleep 0.1
-check "kill -STOP: so it does" free
+check "kill -STOP: so it does" becomes free
 kill -CONT "$pid"
-sleep 0.3
-drive_tell state 1
-check "and starts again with the program" [ "$(drive_value mode)" = 10 ]
+check "and starts again with the program" becomes pushes
 kill "$pid"
 wait "$pid" 2>/dev/null
 
@@ -129,8 +140,7 @@ echo "# $out"
 # 0.002 N m by 10 mm a turn are 1.26 N; cogging of 4.7 N/mm, steeper than the spring, counts for less.
 check "its friction is measured" is coulomb_N "> 1 && $(of coulomb_N) < 1.4"
 check "and its cogging" is cogging_N "> 0.05 && $(of cogging_N) < 0.7"
-sleep 2
-check "the owner has stopped the motor" free
+check "the owner has stopped the motor" becomes free
 
 begin vcan0:1 0.2
 ip link set vcan0 down
