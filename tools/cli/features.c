@@ -86,6 +86,7 @@ static const struct {
 	{"frames", "frames", ""},
 	{"film", "video", ""},
 	{"export", "export", &INCISE_FORMATS(FORMAT_NAME, NO_FORMAT)[2]},
+	{"outlet", "outlets", ""},
 	{"ranks", "parallel", ""},
 };
 
