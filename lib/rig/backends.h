@@ -8,6 +8,9 @@
 #ifndef INCISE_BACKENDS_H
 #define INCISE_BACKENDS_H
 
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
 #include <incise/backend.h>
 
 /*
@@ -21,6 +24,19 @@
 #define INCISE_MODULE(backend)                                       \
 	INCISE_API extern const struct incise_backend incise_backend \
 		__attribute__((weak, alias(#backend)))
+
+/* Zeroed memory whose first part has cache lines of its own; NULL with errno, and @where in the message. */
+static inline void *incise_backend_alloc(size_t size, const char *where,
+					 struct incise_error *err)
+{
+	size_t whole = (size + 63) / 64 * 64;
+	void *memory = aligned_alloc(64, whole);
+
+	if (!memory)
+		return INCISE_ERROR_NULL(err, ENOMEM,
+					 "%s: out of memory; end other programs", where);
+	return memset(memory, 0, whole);
+}
 
 /* A backend and the module that it came from. */
 struct incise_loaded {

@@ -636,13 +636,11 @@ static int start_comedi_force(struct comedi_force *f, struct incise_error *err)
 static void *force_open(const struct incise_backend_request *request,
 			struct incise_error *err)
 {
-	struct comedi_force *f = aligned_alloc(_Alignof(struct comedi_force), sizeof(*f));
+	struct comedi_force *f = incise_backend_alloc(sizeof(*f), request->where, err);
 	int rc;
 
 	if (!f)
-		return INCISE_ERROR_NULL(err, ENOMEM, "%s: out of memory",
-					 request->where);
-	memset(f, 0, sizeof(*f));
+		return NULL;
 	f->feed.force.ops = &force_ops;
 	f->feed.stop = -1;
 	f->card.where = request->where;

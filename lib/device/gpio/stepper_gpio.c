@@ -365,13 +365,11 @@ static void *gpio_open(const struct incise_backend_request *request,
 		.close = gpio_close,
 		.now = gpio_now,
 	};
-	struct gpio_stepper *g = aligned_alloc(64, sizeof(*g));
+	struct gpio_stepper *g = incise_backend_alloc(sizeof(*g), request->where, err);
 	int rc;
 
 	if (!g)
-		return INCISE_ERROR_NULL(err, ENOMEM, "%s: %s", request->where,
-					 strerror(ENOMEM));
-	memset(g, 0, sizeof(*g));
+		return NULL;
 	g->motor.ops = &ops;
 	g->motor.in_process = true;
 	g->motor.actuator = *request->actuator;

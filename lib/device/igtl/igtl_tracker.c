@@ -331,17 +331,11 @@ static int begin_igtl_tracker(struct igtl_tracker *t,
 static void *tracker_open(const struct incise_backend_request *request,
 			  struct incise_error *err)
 {
-	/* The indices of the ring have their own cache lines. */
-	struct igtl_tracker *t =
-		aligned_alloc(_Alignof(struct igtl_tracker), sizeof(struct igtl_tracker));
+	struct igtl_tracker *t = incise_backend_alloc(sizeof(*t), request->where, err);
 	int rc;
 
-	if (!t) {
-		incise_error_set(err, ENOMEM, "%s: out of memory; end other programs",
-				 request->where);
+	if (!t)
 		return NULL;
-	}
-	memset(t, 0, sizeof(*t));
 	t->feed.tracker.ops = &ops;
 	t->feed.ring = &t->poses.ring;
 	t->link.fd = t->link.stop = -1;

@@ -571,12 +571,11 @@ static int set_up_stepper_kernel(struct kernel_stepper *k,
 static void *kernel_open(const struct incise_backend_request *asked,
 			 struct incise_error *err)
 {
-	struct kernel_stepper *k = calloc(1, sizeof(*k));
+	struct kernel_stepper *k = incise_backend_alloc(sizeof(*k), asked->where, err);
 	int rc;
 
 	if (!k)
-		return INCISE_ERROR_NULL(err, ENOMEM, "%s: %s", asked->where,
-					 strerror(ENOMEM));
+		return NULL;
 	k->fd = -1;
 	k->page = (size_t)sysconf(_SC_PAGESIZE);
 	k->motor.ops = &kernel_ops;

@@ -456,16 +456,12 @@ static int open_stream(struct lsl_force *f, const struct incise_backend_request 
 static void *force_open(const struct incise_backend_request *request,
 			struct incise_error *err)
 {
-	struct lsl_force *f =
-		aligned_alloc(_Alignof(struct lsl_force), sizeof(struct lsl_force));
+	struct lsl_force *f = incise_backend_alloc(sizeof(*f), request->where, err);
 	sigset_t all, before;
 	int rc;
 
 	if (!f)
-		return INCISE_ERROR_NULL(err, ENOMEM,
-					 "%s: out of memory; end other programs",
-					 request->where);
-	memset(f, 0, sizeof(*f));
+		return NULL;
 	f->feed.force.ops = &force_ops;
 	f->feed.stop = -1;
 	f->clock = request->clock;

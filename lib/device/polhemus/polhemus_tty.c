@@ -163,12 +163,11 @@ static int parse_polhemus_tty(struct polhemus_tty *tty, const char *arguments)
 struct polhemus_line *polhemus_tty_open(const char *arguments, const char *where,
 					struct incise_error *err)
 {
-	struct polhemus_tty *tty = calloc(1, sizeof(*tty));
+	struct polhemus_tty *tty = incise_backend_alloc(sizeof(*tty), where, err);
 	const char *tail;
 
 	if (!tty)
-		return INCISE_ERROR_NULL(err, ENOMEM,
-					 "%s: out of memory; end other programs", where);
+		return NULL;
 	tty->line.ops = &ops;
 	tty->line.family = -1;
 	if (parse_polhemus_tty(tty, arguments)) {

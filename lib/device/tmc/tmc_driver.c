@@ -10,6 +10,7 @@
 #include <string.h>
 #include <unistd.h>
 #include "../../base/monotonic.h"
+#include "../../rig/backends.h"
 #include "../../rig/thread.h"
 #include "tmc_driver.h"
 
@@ -432,12 +433,11 @@ void *tmc_driver_open(const struct incise_backend_request *request,
 		.counter = driver_counter,
 		.close = driver_close,
 	};
-	struct tmc_driver *d = calloc(1, sizeof(*d));
+	struct tmc_driver *d = incise_backend_alloc(sizeof(*d), request->where, err);
 	int rc;
 
 	if (!d)
-		return INCISE_ERROR_NULL(err, ENOMEM, "%s: %s", request->where,
-					 strerror(ENOMEM));
+		return NULL;
 	d->driver.ops = &ops;
 	d->model = model;
 	d->actuator = *request->actuator;

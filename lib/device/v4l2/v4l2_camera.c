@@ -239,13 +239,11 @@ static int set_up_v4l2_camera(struct v4l2_camera *c,
 static void *camera_open(const struct incise_backend_request *asked,
 			 struct incise_error *err)
 {
-	struct v4l2_camera *c = aligned_alloc(64, sizeof(*c));
+	struct v4l2_camera *c = incise_backend_alloc(sizeof(*c), asked->where, err);
 	int rc;
 
 	if (!c)
-		return INCISE_ERROR_NULL(err, ENOMEM, "%s: %s", asked->where,
-					 strerror(ENOMEM));
-	memset(c, 0, sizeof(*c));
+		return NULL;
 	c->camera.ops = &ops;
 	c->fd = -1;
 	snprintf(c->where, sizeof(c->where), "%s", asked->where);

@@ -16,6 +16,7 @@
 #include <string.h>
 #include <sys/mman.h>
 #include "../../../base/monotonic.h"
+#include "../../../rig/backends.h"
 #include "../../../rig/motor.h"
 #include "../../../rig/thread.h"
 #include "can_session.h"
@@ -561,13 +562,11 @@ void *can_stepper_open(const struct can_transport *transport,
 		.now = can_now,
 		.wait = can_wait,
 	};
-	struct can_stepper *c = aligned_alloc(64, sizeof(*c));
+	struct can_stepper *c = incise_backend_alloc(sizeof(*c), request->where, err);
 	int rc;
 
 	if (!c)
-		return INCISE_ERROR_NULL(err, ENOMEM, "%s: %s", request->where,
-					 strerror(ENOMEM));
-	memset(c, 0, sizeof(*c));
+		return NULL;
 	c->sleep_until = transport->sleep_until;
 	c->motor.ops = &ops;
 	c->motor.in_process = true;
