@@ -233,6 +233,7 @@ void stepper_motor_want(struct stepper_motor *motor, s64 target);
 void stepper_stop_off(struct stepper_motor *motor, s64 now);
 void stepper_stop_halt(struct stepper_motor *motor, s64 now);
 void stepper_stop_fault(struct stepper_motor *motor, u32 fault, s64 now);
+void stepper_stop_late(struct stepper_motor *motor, s64 now);
 void stepper_stop_disable(struct stepper_motor *motor, s64 now);
 
 /* stepper_plan.c, stepper_plan_load.c; without them there is never a plan */

@@ -126,7 +126,7 @@ static void stepper_motor_late(struct stepper_motor *motor, s64 late, u32 shorte
 	}
 	motor->late++;
 	if (++motor->late_row >= motor->config.late_max)
-		stepper_stop_fault(motor, INCISE_STEPPER_FAULT_LATE, now);
+		stepper_stop_late(motor, now);
 }
 
 static void stepper_motor_trail(struct stepper_motor *motor, s64 now, s64 due)
@@ -288,7 +288,7 @@ static void stepper_motor_lag(struct stepper_motor *motor, s64 now)
 	motor->window_ns = now;
 	motor->shifted_then_ns = motor->shifted_ns;
 	if (motor->lagging >= LAG_WINDOWS)
-		stepper_stop_fault(motor, INCISE_STEPPER_FAULT_LATE, now);
+		stepper_stop_late(motor, now);
 }
 
 static void stepper_motor_tick(struct stepper_motor *motor, s64 now, s64 due)

@@ -396,7 +396,7 @@ static void stepper_plan_load(struct stepper_plan *plan, bool in_time, s64 cost,
 	if (in_time && cost <= plan->view.numbers.tick_ns / 2)
 		plan->late_row = 0;
 	else if (++plan->late_row >= leader->config.late_max)
-		stepper_stop_fault(leader, INCISE_STEPPER_FAULT_LATE, now);
+		stepper_stop_late(leader, now);
 }
 
 static void stepper_plan_render(struct stepper_plan *plan, s64 due)

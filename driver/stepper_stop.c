@@ -16,6 +16,8 @@
  *
  * All under motor->lock, in any context.
  */
+#include <linux/moduleparam.h>
+
 #include "compat.h"
 #include "stepper.h"
 #include "trace.h"
@@ -31,6 +33,16 @@
 #define RETRACT                                                      \
 	(INCISE_STEPPER_FAULT_DEADMAN | INCISE_STEPPER_FAULT_OWNER | \
 	 INCISE_STEPPER_FAULT_PLAN)
+
+/*
+ * An emulated machine is late whenever its host is busy: tests that are not about time take the
+ * fault away.
+ */
+static bool late_faults = true;
+#ifdef CONFIG_INCISE_SIM
+module_param(late_faults, bool, 0444);
+MODULE_PARM_DESC(late_faults, "Stop a motor whose edges or ticks are late for too long");
+#endif
 
 /* Take power away. A pulse that is out is ended by the timer, at its time. */
 void stepper_stop_off(struct stepper_motor *motor, s64 now)
@@ -118,6 +130,13 @@ void stepper_stop_fault(struct stepper_motor *motor, u32 fault, s64 now)
 		stepper_stop_halt(motor, now);
 	else
 		stepper_stop_gently(motor, fault, now);
+}
+
+/* Edges, ticks or a time line that are late for too long. */
+void stepper_stop_late(struct stepper_motor *motor, s64 now)
+{
+	if (late_faults)
+		stepper_stop_fault(motor, INCISE_STEPPER_FAULT_LATE, now);
 }
 
 /* For DISABLE: to rest within the limits, then power off; no fault. */

@@ -447,11 +447,12 @@ static void reply_list(struct emulator *e, int station, char c, const double *v,
 
 static void fastrak_command(struct emulator *e)
 {
+	static const char of_a_station[] = "OHIleABGNr";
 	char c = e->command[0];
 	double v[EMULATOR_ITEMS + 1];
 	int n, i;
 
-	if (!c || !strchr("OHIlxvyeABNr", c)) {
+	if (!c || (!strchr("xvy", c) && !strchr(of_a_station, c))) {
 		error(e, -99);
 		return;
 	}
@@ -460,11 +461,11 @@ static void fastrak_command(struct emulator *e)
 		error(e, -2);
 		return;
 	}
-	if (strchr("OHIleABNr", c) && (n < 1 || !is_station(v[0]))) {
+	if (strchr(of_a_station, c) && (n < 1 || !is_station(v[0]))) {
 		error(e, n < 1 ? -1 : -3);
 		return;
 	}
-	i = n && strchr("OHIleABNr", c) ? (int)v[0] - 1 : 0;
+	i = n && strchr(of_a_station, c) ? (int)v[0] - 1 : 0;
 	if (is_stuck(e, c) && n > (strchr("xvy", c) ? 0 : 1))
 		return;
 	switch (c) {
@@ -496,6 +497,9 @@ static void fastrak_command(struct emulator *e)
 		break;
 	case 'B':
 		e->boresights++;
+		break;
+	case 'G':
+		reply_list(e, i + 1, c, e->boresight[i], 3, "%7.2f");
 		break;
 	case 'N':
 		reply_list(e, i + 1, c, e->tip[i], 3, "%7.3f");

@@ -68,9 +68,9 @@ struct emulator {
 	int items[EMULATOR_STATIONS][EMULATOR_ITEMS], n_items[EMULATOR_STATIONS];
 	double hemisphere[EMULATOR_STATIONS][3], increment[EMULATOR_STATIONS];
 	double filters[2][4];
-	/* Origin, a point of +x and one of +y; angles of the transmitter; tip of a stylus. */
+	/* Origin, a point of +x and one of +y; angles of the transmitter and at a boresight; tip of a stylus. */
 	double alignment[EMULATOR_STATIONS][9], mounting[EMULATOR_STATIONS][3];
-	double tip[EMULATOR_STATIONS][3];
+	double boresight[EMULATOR_STATIONS][3], tip[EMULATOR_STATIONS][3];
 	int boresights; /* that B has set */
 	int sync, rate;
 	int eeprom_writes, errors;

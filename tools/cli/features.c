@@ -25,7 +25,6 @@ static void try(struct feature *feature, const char *path)
 {
 	void *handle = dlopen(path, RTLD_LAZY | RTLD_LOCAL);
 	struct incise_error err = {0};
-	const char *gpiod;
 
 	feature->usable = handle;
 	if (!handle) {
@@ -34,12 +33,6 @@ static void try(struct feature *feature, const char *path)
 			 err.text + strcspn(err.text, ":") + 2 * !!strchr(err.text, ':'));
 		return;
 	}
-	/* By the names of libgpiod 2 and 1. */
-	gpiod = text_of_features(handle, "gpiod_api_version");
-	gpiod = gpiod ? gpiod : text_of_features(handle, "gpiod_version_string");
-	if (gpiod && !strcmp(feature->name, "gpio"))
-		snprintf(feature->detail, sizeof(feature->detail), "libgpiod %.20s",
-			 gpiod);
 	dlclose(handle);
 }
 
@@ -84,6 +77,7 @@ static const struct {
 } kinds[] = {
 	{"tracker", "trackers", ""},
 	{"force", "force", ""},
+	{"haptic", "haptic", ""},
 	{"camera", "cameras", ""},
 	{"stepper", "steppers", ""},
 	{"driver", "chips", ""},
@@ -92,6 +86,7 @@ static const struct {
 	{"frames", "frames", ""},
 	{"film", "video", ""},
 	{"export", "export", &INCISE_FORMATS(FORMAT_NAME, NO_FORMAT)[2]},
+	{"outlet", "outlets", ""},
 	{"ranks", "parallel", ""},
 };
 

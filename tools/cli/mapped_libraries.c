@@ -24,7 +24,6 @@ static const struct {
 	{"libusb", "libusb"},
 	{"libiio", "libiio"},
 	{"libcomedi", "comedilib"},
-	{"libgpiod", "libgpiod"},
 };
 #define HEAVY (sizeof(heavy) / sizeof(*heavy))
 

@@ -16,6 +16,7 @@
 #include <string.h>
 #include <sys/ioctl.h>
 #include <sys/mman.h>
+#include <incise/haptic_page.h>
 #include <uapi/incise_stepper.h>
 #include <unistd.h>
 #include "../cli/cli.h"
@@ -57,21 +58,6 @@ struct controller {
 
 /* --- reading ------------------------------------------------------------------------- */
 
-/* A consistent copy of a slot that the kernel may be writing. */
-static int read_slot(const volatile struct incise_stepper_motor_status *slot,
-		     struct incise_stepper_motor_status *status)
-{
-	for (int i = 0; i < TRIES; i++) {
-		uint32_t before = __atomic_load_n(&slot->seq, __ATOMIC_ACQUIRE);
-
-		memcpy(status, (const void *)slot, sizeof(*status));
-		__atomic_thread_fence(__ATOMIC_ACQUIRE);
-		if (!(before & 1) && before == slot->seq)
-			return 0;
-	}
-	return -EAGAIN;
-}
-
 static void read_status(struct controller *controller, int fd)
 {
 	size_t size = (size_t)sysconf(_SC_PAGESIZE);
@@ -82,11 +68,14 @@ static void read_status(struct controller *controller, int fd)
 	if (page == MAP_FAILED)
 		cli_fail("%s: mapping its status: %s", controller->path, strerror(errno));
 	for (uint32_t i = 0; i < controller->info.n_motors; i++)
-		if (read_slot(&slots[i], &controller->motor[i].status))
-			cli_fail(
-				"%s: the status of motor %u changed each time it was read; "
-				"try again",
-				controller->path, i);
+		for (int n = 0; !incise_haptic_page_get(
+			     &slots[i], &controller->motor[i].status, sizeof(slots[i]));
+		     n++)
+			if (n == TRIES)
+				cli_fail(
+					"%s: the status of motor %u changed each time it was "
+					"read; try again",
+					controller->path, i);
 	munmap(page, size);
 }
 

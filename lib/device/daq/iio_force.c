@@ -22,9 +22,10 @@
 /* --- channel --- */
 
 #define BLOCKS_PER_S 200
-#define BLOCKS 100   /* in the buffer of the kernel: half a second */
-#define QUIET_MS 100 /* between two checks whether it is still there */
-#define DEAD_NS 3e9  /* without a sample, and ten periods */
+#define BLOCKS 100    /* in the buffer of the kernel: half a second */
+#define QUIET_MS 100  /* between two checks whether it is still there */
+#define CHECK_MS 1000 /* between two checks of the scale */
+#define DEAD_NS 3e9   /* without a sample, and ten periods */
 #define PERIODS_DEAD 10
 
 struct iio_force {
@@ -41,7 +42,7 @@ static void *watch_scale(void *argument)
 {
 	struct iio_force *f = argument;
 
-	while (!f->changed && daq_feed_wait(&f->feed, -1, 1000) != DAQ_STOP)
+	while (!f->changed && daq_feed_wait(&f->feed, -1, CHECK_MS) != DAQ_STOP)
 		f->changed = iio_source_changed(&f->source);
 	return NULL;
 }

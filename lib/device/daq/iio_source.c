@@ -13,7 +13,6 @@
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
-#include "../../base/monotonic.h"
 #include "iio_source.h"
 
 /* --- format --- */
@@ -227,8 +226,7 @@ static int set_rate(struct iio_source *s, const struct iio_device *trigger,
 
 /* --- set-up --- */
 
-#define CODE_BITS_MAX 31      /* of incise_force_sample.code */
-#define CHECK_NS 1000000000LL /* between two checks of the scale */
+#define CODE_BITS_MAX 31 /* of incise_force_sample.code */
 
 bool iio_source_can_sample(const struct iio_channel *channel)
 {
@@ -595,14 +593,10 @@ int iio_source_open(struct iio_source *s, const char *name, struct incise_error 
 	return rc ? rc : set_volts(s, err);
 }
 
-bool iio_source_changed(struct iio_source *s)
+bool iio_source_changed(const struct iio_source *s)
 {
-	int64_t now_ns = incise_monotonic_ns();
 	double full_scale_V, offset_V;
 
-	if (now_ns - s->checked_ns < CHECK_NS)
-		return false;
-	s->checked_ns = now_ns;
 	return s->has_scale &&
 	       iio_source_volts(s->voltage, &s->format, &full_scale_V, &offset_V) &&
 	       (full_scale_V != s->full_scale_V || offset_V != s->offset_V);

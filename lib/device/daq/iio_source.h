@@ -38,8 +38,7 @@ struct iio_source {
 	struct iio_channel *voltage, *timestamp;
 	struct iio_format format, timestamp_format;
 	double rate_hz, full_scale_V, offset_V;
-	bool has_scale;	    /* of the driver */
-	int64_t checked_ns; /* when it was last read */
+	bool has_scale; /* of the driver */
 	const char
 		*trigger_folder; /* where our own trigger is made: IIO_SOURCE_TRIGGERS */
 	bool trigger_refused;	 /* for lack of permission */
@@ -73,11 +72,8 @@ int iio_source_start(struct iio_source *source, const char *folder, unsigned int
 /* The device may be gone. */
 void iio_source_stop(struct iio_source *source);
 
-/*
- * Whether the scale is another one than at the set-up, so that codes have another meaning; it is read
- * once a second.
- */
-bool iio_source_changed(struct iio_source *source);
+/* Whether the scale is another one than at the set-up, so that codes have another meaning. Reads it. */
+bool iio_source_changed(const struct iio_source *source);
 
 /* Number of scans read, or -errno: -EAGAIN (no scan), -ENODEV. */
 int iio_source_read(struct iio_source *source);

@@ -122,7 +122,8 @@ static int ask_settings(struct polhemus_dialogue *d,
 			const struct incise_tracker_setup *setup,
 			struct polhemus_identity *identity)
 {
-	const char *commands = identity->layout.family == POLHEMUS_FASTRAK ? "ArN" : "AN";
+	const char *commands =
+		identity->layout.family == POLHEMUS_FASTRAK ? "ArGN" : "AN";
 	int rc = 0;
 
 	for (int i = 0; i < setup->n_stations; i++)

@@ -6,7 +6,7 @@
  * increment (it would hold records back), a stylus button that is only reported (else it
  * stops the stream) and the sync mode. Not changed are alignment, boresight, mounting
  * frame and tip offset of a stylus, which a user may have set on purpose: those that can be
- * read are noted. (B of a FASTRAK does not read the boresight, it sets it.) Nothing is
+ * read are noted. (B of a FASTRAK sets the boresight; G reads its angles alone.) Nothing is
  * written to the EEPROM: power off and on restores the old settings.
  */
 #ifndef INCISE_POLHEMUS_SETUP_H

@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <time.h>
 #include "../../base/monotonic.h"
+#include "../../rig/backends.h"
 #include "../../rig/thread.h"
 #include "../../rig/tracker_feed.h"
 #include "polhemus_setup.h"
@@ -236,15 +237,12 @@ struct incise_tracker *polhemus_tracker_open(struct polhemus_line *line,
 					     const struct polhemus_times *times,
 					     const char *where, struct incise_error *err)
 {
-	/* The indices of the ring have their own cache lines. */
-	struct polhemus_tracker *t = aligned_alloc(_Alignof(struct polhemus_tracker),
-						   sizeof(struct polhemus_tracker));
+	struct polhemus_tracker *t = incise_device_new(sizeof(*t), where, err);
 	int rc;
 
 	if (!t) {
 		line->ops->close(line);
-		return INCISE_ERROR_NULL(err, ENOMEM,
-					 "%s: out of memory; end other programs", where);
+		return NULL;
 	}
 	*t = (struct polhemus_tracker){
 		.feed = {.tracker.ops = &ops, .ring = &t->stream.ring},

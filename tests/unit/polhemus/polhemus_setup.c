@@ -104,16 +104,17 @@ TEST(settings_that_alter_poses, NULL, end)
 {
 	static const struct {
 		enum emulator_kind kind;
-		double origin, along_x, roll, tip; /* of station 2 */
+		double origin, along_x, roll, tip, elevation; /* of station 2 */
 		const char *note;
 	} cases[] = {
-		{EMULATOR_FASTRAK, 0, 200, 0, 0, ""},
-		{EMULATOR_FASTRAK, 0, 1, 0, 0, ""},
-		{EMULATOR_FASTRAK, 0, -200, 0, 0, "poses: A2 0 0 0 -200 0 0 0 200 0"},
-		{EMULATOR_FASTRAK, -100.25, 200, 0, 0, "A2 -100.25 0 0 200 "},
-		{EMULATOR_FASTRAK, 0, 200, -180, 1.25, "poses: r2 0 0 -180; N2 1.25 0 0"},
-		{EMULATOR_LIBERTY, 0, 200, 180, 0, ""},
-		{EMULATOR_LIBERTY, 3, 200, 0, -1.5,
+		{EMULATOR_FASTRAK, 0, 200, 0, 0, 0, ""},
+		{EMULATOR_FASTRAK, 0, 1, 0, 0, 0, ""},
+		{EMULATOR_FASTRAK, 0, -200, 0, 0, 0, "poses: A2 0 0 0 -200 0 0 0 200 0"},
+		{EMULATOR_FASTRAK, -100.25, 200, 0, 0, 0, "A2 -100.25 0 0 200 "},
+		{EMULATOR_FASTRAK, 0, 200, -180, 1.25, -15,
+		 "poses: r2 0 0 -180; G2 0 -15 0; N2 1.25 0 0"},
+		{EMULATOR_LIBERTY, 0, 200, 180, 0, 0, ""},
+		{EMULATOR_LIBERTY, 3, 200, 0, -1.5, 0,
 		 "A2 3 0 0 200 0 0 0 200 0; N2 -1.5 0 0"},
 	};
 
@@ -124,6 +125,7 @@ TEST(settings_that_alter_poses, NULL, end)
 		e.alignment[1][3] = cases[i].along_x;
 		e.mounting[1][2] = cases[i].roll;
 		e.tip[1][0] = cases[i].tip;
+		e.boresight[1][1] = cases[i].elevation;
 		e.tip[2][0] = 7; /* of a station that is not used */
 		if (set_up(&two))
 			fail_msg("case %zu: %s", i, err.text);

@@ -3,16 +3,11 @@
 # The library's steppers on the simulated chip: over the kernel module, and over GPIO from
 # user space. Both run the table that the virtual rig passes too.
 . tests/vm/tap
-with_modules "stepper backends" incise_stepper
-stepper=$module
-with_modules "stepper backends" incise_sim
 in_virtual_time "stepper backends"
 export INCISE_MODULE_PATH="$INCISE_BUILD/lib/incise"
 
 config=/sys/kernel/config/incise-stepper
-modprobe -a industrialio kfifo_buf industrialio-triggered-buffer configfs libcrc32c crc32c_generic 2>/dev/null
-check "the simulated chip loads" insmod "$module" || exit 0
-check "the module loads" insmod "$stepper" || exit 0
+with_stepper "stepper backends"
 
 actuator="
 	spring_N_mm = 2.0; travel_mm = 5.0; lead_mm = 4.0; velocity_mm_s = 4.0;
@@ -38,10 +33,6 @@ actuator = {$actuator
 	lines = { step = 0; dir = 1; enable = 2; limit_min = 3; limit_max = 4; home = 5;
 		alarm = 6; estop = 7; }; };
 END
-if [ -e "$INCISE_BUILD/lib/incise/stepper_gpio.so" ]; then
-	"$INCISE_BUILD/tests/vm/stepper_backends" gpio /tmp/gpio.conf $1
-else
-	echo "ok gpio # skip libgpiod is not installed"
-fi
+"$INCISE_BUILD/tests/vm/stepper_backends" gpio /tmp/gpio.conf $1
 rmdir $config/bench/motor0 $config/bench
 check "the modules go" rmmod incise_stepper incise_sim

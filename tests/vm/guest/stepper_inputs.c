@@ -208,8 +208,20 @@ static void interrupts_are_missing(void)
 	simulator_write("faults", "none");
 }
 
-#define DEBOUNCE_NS (5 * TICK_NS)
+#define DEBOUNCE_NS (100 * TICK_NS) /* the longest */
 #define BURSTS 100
+
+/* Returns whether the whole of it was shorter than debounce_ns: a host may pause with the limit pressed. */
+static bool bounces(void)
+{
+	int64_t begin_ns = bench_now_ns();
+
+	for (int i = 0; i < 20; i++) {
+		simulator_write("inputs", "%u 1", bench_line(0, BENCH_MAX));
+		simulator_write("inputs", "%u 0", bench_line(0, BENCH_MAX));
+	}
+	return bench_now_ns() - begin_ns < DEBOUNCE_NS;
+}
 
 /* A contact that bounces is no limit, one that stays is; the e-stop waits for nothing. */
 static void limit_bounces(void)
@@ -218,16 +230,14 @@ static void limit_bounces(void)
 	bool moves;
 
 	config.debounce_ns = DEBOUNCE_NS;
-	if (!check(!bench_configure(&bench, &config, 0) &&
-			   !bench_command(&bench, INCISE_STEPPER_ENABLE, 1),
-		   "a motor with debounce_ns has power"))
+	if (!check(!bench_configure(&bench, &config, 0), "a motor has debounce_ns"))
 		return;
-	bench_until(&bench, 0, 1U << INCISE_STEPPER_STATE_MOVING,
-		    INCISE_STEPPER_MODE_POSITION, 100000, LONG);
-	for (int i = 0; i < 20; i++) {
-		simulator_write("inputs", "%u 1", bench_line(0, BENCH_MAX));
-		simulator_write("inputs", "%u 0", bench_line(0, BENCH_MAX));
-	}
+	do {
+		bench_command(&bench, INCISE_STEPPER_CLEAR, 1);
+		bench_command(&bench, INCISE_STEPPER_ENABLE, 1);
+		bench_until(&bench, 0, 1U << INCISE_STEPPER_STATE_MOVING,
+			    INCISE_STEPPER_MODE_POSITION, 100000, LONG);
+	} while (!bounces());
 	moves = bench_until(&bench, 0, 1U << INCISE_STEPPER_STATE_MOVING,
 			    INCISE_STEPPER_MODE_POSITION, 100000, LONG);
 	check(moves && !bench_look(&bench, 0).faults, "a limit that bounces is no fault");

@@ -3,14 +3,9 @@
 # incise_stepper.ko on the simulated chip: bound by configfs, moved, stopped by each of its
 # own means, unbound while open. The large test of edges is another one.
 . tests/vm/tap
-with_modules "the stepper module" incise_stepper
-stepper=$module
-with_modules "the stepper module" incise_sim
 
 config=/sys/kernel/config/incise-stepper
-modprobe -a industrialio kfifo_buf industrialio-triggered-buffer configfs libcrc32c crc32c_generic 2>/dev/null
-check "the simulated chip loads" insmod "$module" || exit 0
-check "the module loads" insmod "$stepper" || exit 0
+with_stepper "the stepper module"
 
 wire()
 {
