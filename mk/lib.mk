@@ -73,6 +73,7 @@ $(hidden): $(call objects,incise) $(crypto_objects)
 #
 #   modules := tracker_usb tracker_tty   each has all sources of the folder, but
 #   only_MODULE := polhemus_usb          those that only another one has
+#   not_MODULE := gpio_v1                or that it does not want
 #   also_MODULE := can/bus/socketcan     and those of lib/device that begin so
 #   pc_MODULE := libusb-1.0              it needs packages of pkg-config, or
 #   headers_MODULE := jpeglib.h          headers, which the compiler finds with flags_MODULE, and
@@ -95,7 +96,7 @@ $(foreach file,$(wildcard lib/*/module.mk lib/*/*/module.mk),$(eval include $(fi
 
 # The keys of rig.conf that an add-on brings, %_settings.c, are libincise's.
 define add_on
-objects_$1 := $$(patsubst %,$(O)/obj/%.o,$$(filter-out %_settings $$(addprefix $$(folder_$1),\
+objects_$1 := $$(patsubst %,$(O)/obj/%.o,$$(filter-out %_settings $$(addprefix $$(folder_$1),$$(not_$1) \
 	$$(foreach other,$$(beside_$1),$$(only_$$(other)))),\
 	$$(basename $$(wildcard $$(addprefix $$(folder_$1),*.c *.cc */*.c */*.cc) $$(also_$1:%=lib/device/%*.c)))))
 $$(objects_$1): pc_cflags += $$(flags_$1) \

@@ -66,6 +66,7 @@ setup() {
 		name=$(basename "$module" .so)
 		grep -qE "^  [a-z]+ +.*\<${name#*_}\>" <<<"$output" || complain "$name is missing"
 	done
+	[ ! -e "$INCISE_BUILD/lib/incise/stepper_gpio.so" ] || [[ "$output" == *"gpio (libgpiod "[12].* ]]
 	# another folder: nothing but what is built in, and a module that is none
 	mkdir modules
 	: >modules/tracker_empty.so

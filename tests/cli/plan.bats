@@ -51,7 +51,7 @@ setup() {
 	[ "$(key r.json devices)" = '[]' ]
 	[ "$(key r.json untouched_devices)" = '["tracker","stepper","force","camera"]' ]
 	[ "$(key r.json unmapped_libraries)" = \
-		'["SQLite","LAPACK","libavformat","HDF5","OpenCV","OpenGL","SDL2","cairo","libusb","libiio","comedilib"]' ]
+		'["SQLite","LAPACK","libavformat","HDF5","OpenCV","OpenGL","SDL2","cairo","libusb","libiio","comedilib","libgpiod"]' ]
 	# it looked at a real list
 	[[ "$(key r.json libraries)" == *libincise.so* ]]
 }

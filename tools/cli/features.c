@@ -25,6 +25,7 @@ static void try(struct feature *feature, const char *path)
 {
 	void *handle = dlopen(path, RTLD_LAZY | RTLD_LOCAL);
 	struct incise_error err = {0};
+	const char *gpiod;
 
 	feature->usable = handle;
 	if (!handle) {
@@ -33,6 +34,12 @@ static void try(struct feature *feature, const char *path)
 			 err.text + strcspn(err.text, ":") + 2 * !!strchr(err.text, ':'));
 		return;
 	}
+	/* By the names of libgpiod 2 and 1. */
+	gpiod = text_of_features(handle, "gpiod_api_version");
+	gpiod = gpiod ? gpiod : text_of_features(handle, "gpiod_version_string");
+	if (gpiod && !strcmp(feature->name, "gpio"))
+		snprintf(feature->detail, sizeof(feature->detail), "libgpiod %.20s",
+			 gpiod);
 	dlclose(handle);
 }
 
@@ -77,7 +84,6 @@ static const struct {
 } kinds[] = {
 	{"tracker", "trackers", ""},
 	{"force", "force", ""},
-	{"haptic", "haptic", ""},
 	{"camera", "cameras", ""},
 	{"stepper", "steppers", ""},
 	{"driver", "chips", ""},

@@ -11,9 +11,10 @@
 
 /* A module. */
 struct feature {
-	char kind[16];	  /* "tracker" … as in its file's name, KIND_NAME.so */
-	char name[32];	  /* "usb" */
-	char detail[200]; /* why it cannot be loaded, or "" */
+	char kind[16]; /* "tracker" … as in its file's name, KIND_NAME.so */
+	char name[32]; /* "usb" */
+	char detail
+		[200]; /* "libgpiod 2.2.1", or why it cannot be loaded; "": nothing to say */
 	bool usable;
 };
 

@@ -24,6 +24,7 @@ static const struct {
 	{"libusb", "libusb"},
 	{"libiio", "libiio"},
 	{"libcomedi", "comedilib"},
+	{"libgpiod", "libgpiod"},
 };
 #define HEAVY (sizeof(heavy) / sizeof(*heavy))
 

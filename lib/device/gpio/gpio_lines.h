@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * The lines of one GPIO chip, as levels.
+ * The lines of one GPIO chip, as levels, over libgpiod: gpio_v1.c for 1.x, gpio_v2.c for 2.x,
+ * which have nothing in common.
  */
 #ifndef INCISE_GPIO_LINES_H
 #define INCISE_GPIO_LINES_H

@@ -3,7 +3,7 @@
  * A stepper on GPIO lines, for machines that cannot load the module: "gpio:CHIP", with the
  * lines in actuator.lines of rig.conf. A thread makes the steps, real-time if permitted.
  *
- *   incise_stepper_…() ─▶ pages, mailbox ─▶ thread: pulser ─▶ lines
+ *   incise_stepper_…() ─▶ pages, mailbox ─▶ thread: pulser ─▶ libgpiod
  *
  * The thread sleeps until shortly before an edge is due, and polls the clock for the rest: that
  * absorbs late wake-ups.

@@ -50,6 +50,8 @@ TEST(test_a_missing_library_is_named_with_its_package)
 		{"libmnl.so.0", "libmnl0"},
 		{"libiio.so.0", "libiio0"},
 		{"libcomedi.so.0", "libcomedi0"},
+		{"libgpiod.so.2", "libgpiod2"},
+		{"libgpiod.so.3", "libgpiod3"},
 		{"libusb-1.0.so.0", "libusb-1.0-0"},
 		{"libavformat.so.59", "libavformat59"},
 		{"libopencv_core.so.406", "libopencv-core406"},

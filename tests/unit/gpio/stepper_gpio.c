@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * lib/device/gpio/stepper_gpio.c with its thread, on lines that a test makes in the place
- * of a chip's: polarity, what is said when it cannot begin, and that it ends as it
+ * of libgpiod's: polarity, what is said when it cannot begin, and that it ends as it
  * should. No time is judged here: pulses of 1 ms let any machine keep up. Times are those
  * of the pulser's tests and of tests/vm.
  */
