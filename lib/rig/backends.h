@@ -8,9 +8,6 @@
 #ifndef INCISE_BACKENDS_H
 #define INCISE_BACKENDS_H
 
-#include <errno.h>
-#include <stdlib.h>
-#include <string.h>
 #include <incise/backend.h>
 
 /*
