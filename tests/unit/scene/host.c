@@ -438,7 +438,7 @@ TEST(test_a_slow_host_bears_less)
 		"surface = { kind = \"plane\"; }; tissue = { reaction_N_mm = 3.0; };";
 	double before = INFINITY, first = 0;
 
-	for (int ticks = 1; ticks <= 40; ticks *= 2) {
+	for (int ticks = 1; ticks <= 40; ticks *= cases_are_all() ? 2 : 6) {
 		struct incise_host_options options = {.host_period_s = ticks * 1e-3};
 		struct incise_host_info info;
 		struct incise_scene *own;
@@ -499,7 +499,7 @@ TEST(test_a_kick_at_one_step_is_none_at_the_next)
 	write_groove(folder.heights);
 	scene = fed_scene(&folder, groove, &err);
 	succeeds(scene);
-	for (int i = 0; i < 2; i++) {
+	for (int i = cases_are_all() ? 0 : 1; i < 2; i++) {
 		struct incise_host_hold hold = {.ticks = longest[i].ticks};
 		struct incise_plan *plan =
 			incise_plan_new_held(scene, &poses, &hold, &err);

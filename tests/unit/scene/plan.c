@@ -545,7 +545,7 @@ TEST(test_fed_haptic)
 	assert_int_equal(s.late_ticks, 2);
 	assert_false(s.own_delay);
 	incise_plan_free(plan);
-	usual.scene->tissue.gain = 20;
+	usual.scene->tissue.gain = 1e4;
 	assert_null(incise_plan_new_fed(usual.scene, &poses, &err));
 	assert_non_null(strstr(err.text, "on a device of 0.3 kg and 0.02 N s/mm"));
 	device.force_latency_ns = 20000000;
