@@ -38,16 +38,28 @@ static void make_hessenberg(double *a, int n)
 			swap(&AT(i, pivot), &AT(i, m));
 		for (int i = m + 1; i < n && AT(m, m - 1) != 0; i++) {
 			double part = AT(i, m - 1) / AT(m, m - 1);
+			double *to = &AT(i, 0), *of = &AT(m, 0);
 
 			if (part == 0)
 				continue;
 			for (int j = m - 1; j < n; j++)
-				AT(i, j) -= part * AT(m, j);
-			for (int k = 0; k < n; k++)
-				AT(k, m) += part * AT(k, i);
+				to[j] -= part * of[j];
+			for (double *row = a; row < a + n * n; row += n)
+				row[m] += part * row[i];
 			AT(i, m - 1) = 0;
 		}
 	}
+}
+
+/* Reflect three numbers that are so far @apart, or the first two. */
+static void reflect_three(double *x, int apart, int size, const double w[3], double scale)
+{
+	double none = 0, *y = x + apart, *z = size > 2 ? y + apart : &none;
+	double sum = scale * (w[0] * *x + w[1] * *y + w[2] * *z);
+
+	*x -= sum * w[0];
+	*y -= sum * w[1];
+	*z -= sum * w[2];
 }
 
 /* Reflect rows, then columns, from @k on, of the block, so that (p, q, r) becomes (s, 0, 0). */
@@ -64,22 +76,10 @@ static void reflect(double *a, int n, int lo, int hi, int k, const double v[3])
 		w[i] = v[i] / length;
 	w[0] += w[0] < 0 ? -1 : 1;
 	scale = 1 / fabs(w[0]);
-	for (int j = from; j <= hi; j++) {
-		double sum = 0;
-
-		for (int i = 0; i < size; i++)
-			sum += w[i] * AT(k + i, j);
-		for (int i = 0; i < size; i++)
-			AT(k + i, j) -= scale * sum * w[i];
-	}
-	for (int j = lo; j <= hi && j <= k + 3; j++) {
-		double sum = 0;
-
-		for (int i = 0; i < size; i++)
-			sum += w[i] * AT(j, k + i);
-		for (int i = 0; i < size; i++)
-			AT(j, k + i) -= scale * sum * w[i];
-	}
+	for (int j = from; j <= hi; j++)
+		reflect_three(&AT(k, j), n, size, w, scale);
+	for (int j = lo; j <= hi && j <= k + 3; j++)
+		reflect_three(&AT(j, k), 1, size, w, scale);
 }
 
 /*

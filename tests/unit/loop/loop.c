@@ -467,8 +467,7 @@ static void let_insert(void)
 	fclose(out);
 	incise_plan_free(f.plan);
 	incise_scene_free(f.scene);
-	f.scene = incise_scene_load(f.scene_path, NULL, NULL);
-	assert_non_null(f.scene);
+	f.scene = felt_scene(f.scene_path);
 	f.plan = incise_plan_new(f.scene, f.rig, NULL);
 	assert_non_null(f.plan);
 }

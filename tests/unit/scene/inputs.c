@@ -204,7 +204,8 @@ static void integers_hold_their_bound(void **state)
 		write_model(cases[i].inputs, cases[i].n, 0.02);
 		for (int k = 0; k < 2; k++) {
 			snprintf(text, sizeof(text),
-				 "model = \"m.fis\"; arithmetic = \"%s\"; %s",
+				 "model = \"m.fis\"; arithmetic = \"%s\"; tissue = { "
+				 "unloading_N_mm = 0.15; }; %s",
 				 k ? "fixed" : "double", surfaces[i % 2]);
 			plan[k] = fed_plan(&folder, &tracker, &scene[k], text);
 		}

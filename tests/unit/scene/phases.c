@@ -133,15 +133,25 @@ TEST(withdrawal_drags)
 	assert_true(seen.leap_N < 5e-3 && both.leap_N < 5e-3);
 }
 
+static struct incise_plan *checked_plan(struct incise_scene **scene, const char *text)
+{
+	struct incise_plan *plan;
+
+	*scene = fed_scene(&folder, text, &err);
+	succeeds(*scene);
+	plan = incise_plan_new_fed(*scene, &tracker, &err);
+	succeeds(plan);
+	return plan;
+}
+
 TEST(stability_counts_each_model)
 {
 	struct incise_plan_stability s;
 	struct incise_plan_model model;
 	struct incise_scene *scene;
 	struct incise_plan *plan =
-		fed_plan(&folder, &tracker, &scene,
-			 DOUBLE
-			 "model = { cut = \"cut.fis\"; puncture = \"skin.fis\"; };");
+		checked_plan(&scene, DOUBLE
+			     "model = { cut = \"cut.fis\"; puncture = \"skin.fis\"; };");
 
 	incise_plan_stability(plan, &s);
 	assert_true(s.slope_N_mm > 0.99 * SKIN_N_MM && s.slope_N_mm < 1.02 * SKIN_N_MM);
@@ -155,9 +165,8 @@ TEST(stability_counts_each_model)
 	incise_plan_free(plan);
 	incise_scene_free(scene);
 	/* The other way round the force rises by 0.1 mm × 0.1 N/mm … over 0.5 mm, besides its slope. */
-	plan = fed_plan(
-		&folder, &tracker, &scene,
-		DOUBLE
+	plan = checked_plan(
+		&scene, DOUBLE
 		"model = { cut = \"skin.fis\"; puncture = \"cut.fis\"; }; tissue = "
 		"{ gain = 0.5; };");
 	incise_plan_stability(plan, &s);

@@ -60,6 +60,8 @@ static void enter(const char *text, const char *arithmetic,
 	room.scene = fed_scene(&room.folder, text, &err);
 	succeeds(room.scene);
 	assert_int_equal(incise_scene_set_arithmetic(room.scene, arithmetic, NULL), 0);
+	/* No force moves these tools. */
+	room.scene->unchecked = true;
 	room.plan = incise_plan_new_fed(room.scene, tracker, &err);
 	succeeds(room.plan);
 }
