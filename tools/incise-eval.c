@@ -67,10 +67,10 @@ struct evaluator {
 };
 
 /* Parts of the standard deviation, in the order in which they are printed, and that of the mean. */
-#define PARTS 4
-static const char *const part_names[PARTS] = {"data", "model", "calibration", "mean"};
+#define SD_PARTS 4
+static const char *const part_names[SD_PARTS] = {"data", "model", "calibration", "mean"};
 
-static void find_parts(const struct evaluator *e, const double *x, double parts[PARTS])
+static void find_parts(const struct evaluator *e, const double *x, double parts[SD_PARTS])
 {
 	struct incise_uncertainty_parts all;
 
@@ -87,7 +87,7 @@ static void add_eval_row(struct evaluator *e, const double *x, double y, bool ou
 	const char *unit = strrchr(e->output, '_');
 	json_t *row = json_object();
 	char key[INCISE_MODEL_NAME_MAX + 20];
-	double parts[PARTS];
+	double parts[SD_PARTS];
 
 	snprintf(key, sizeof(key), "sd%s", unit ? unit : "");
 	for (int i = 0; i < e->n_inputs; i++)
@@ -99,7 +99,7 @@ static void add_eval_row(struct evaluator *e, const double *x, double y, bool ou
 			json_number(incise_uncertainty_sd(e->uncertainty, e->model, x)));
 	if (e->parts)
 		find_parts(e, x, parts);
-	for (int i = 0; e->parts && i < PARTS; i++) {
+	for (int i = 0; e->parts && i < SD_PARTS; i++) {
 		snprintf(key, sizeof(key), "sd_%s%s", part_names[i], unit ? unit : "");
 		json_set_number(row, key, parts[i]);
 	}
@@ -111,7 +111,7 @@ static void add_eval_row(struct evaluator *e, const double *x, double y, bool ou
 static void evaluate(struct evaluator *e, const double *x, size_t outside, bool inputs)
 {
 	unsigned int flags = 0;
-	double y, parts[PARTS];
+	double y, parts[SD_PARTS];
 
 	y = e->model ? incise_model_eval(e->model, x, &flags) : 0;
 	if (e->fixed)
@@ -130,7 +130,7 @@ static void evaluate(struct evaluator *e, const double *x, size_t outside, bool 
 		printf(" %.10g", incise_uncertainty_sd(e->uncertainty, e->model, x));
 	if (e->parts)
 		find_parts(e, x, parts);
-	for (int i = 0; e->parts && i < PARTS; i++)
+	for (int i = 0; e->parts && i < SD_PARTS; i++)
 		printf(" %.10g", parts[i]);
 	putchar('\n');
 }

@@ -67,7 +67,7 @@ train() {
 	holds "($(key r.json rest.force_N) - $(cut -d' ' -f1 want))^2 < 1e-12"
 	holds "($(key r.json rest.sd_N) - $(cut -d' ' -f2 want))^2 < 1e-12"
 	holds "($(key r.json rest.sd_calibration_N) - $(cut -d' ' -f5 want))^2 < 1e-12"
-	incise plan m.scene | grep -q "the model where that one rests: .* N at .* mm and .* mm/s, u = .* N (data"
+	incise plan m.scene | grep -q "the model where that one rests: .* N at .* mm and .* mm/s, u = .* N of a new cut (data"
 	incise haptic m.scene --rig sim:clock=simulated --duration 1s --state m.state >/dev/null 2>&1
 	incise status ./m.state --json >s.json
 	incise eval m.fis --uncertainty total <<<"$(key s.json 'loops[0].depth_mm') $(key s.json 'loops[0].velocity_mm_s')" >want 2>/dev/null
@@ -138,7 +138,7 @@ train() {
 	for model in rec csv; do
 		echo '5 20' | incise eval $model.fis --uncertainty parts >$model.out 2>/dev/null
 	done
-	paste -d' ' rec.out csv.out | awk '{ for (i = 1; i <= 5; i++) { d = $i - $(i + 5)
+	paste -d' ' rec.out csv.out | awk '{ for (i = 1; i <= 6; i++) { d = $i - $(i + 6)
 		if (d > 1e-3 || d < -1e-3) { print; exit 1 } } }'
 	grep -qx "common [1-9].*" rec.fis.sd
 	# A calibration after the fact that is twice as uncertain is seen as such.
