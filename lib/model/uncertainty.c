@@ -445,52 +445,51 @@ static int numbers_of(struct incise_lines *in, const char *key, double *to, int 
 	return rc;
 }
 
-/* The n numbers of a line of calibrations. */
-static int read_calibration(struct incise_lines *in, double *to, int n)
+/* A row of the triangle, or of the calibrations: a line of n numbers. */
+static int read_row(struct incise_lines *in, double *to, int n)
 {
 	int rc = next_uncertainty_line(in);
 	char *at = in->text;
 
-	if (rc < 0)
-		return rc;
 	if (!rc)
 		return fail(in, EINVAL,
-			    "the file ends within its calibrations: it is truncated; "
-			    "train again");
-	rc = numbers(in, &at, to, n);
-	if (rc)
-		return rc;
-	return *at ? fail(in, EINVAL, "a calibration has more than %d numbers", n) : 0;
+			    "the file ends before its last row: it is truncated; train "
+			    "again");
+	rc = rc < 0 ? rc : numbers(in, &at, to, n);
+	if (!rc && *at)
+		return fail(in, EINVAL, "a row has more than %d numbers", n);
+	return rc;
 }
 
-static int read_row(struct incise_lines *in, double *to, int n, int row)
+static int read_noise(struct incise_lines *in, struct incise_uncertainty *u)
 {
-	int rc = next_uncertainty_line(in);
-	char *at = in->text;
+	struct incise_uncertainty_shape shape = {0};
+	int rc = numbers_of(in, "noise", &u->noise, 1);
 
-	if (rc < 0)
-		return rc;
+	if (!rc && u->noise < 0)
+		return fail(in, EINVAL, "noise: expected a number that is not negative");
 	if (!rc)
-		return fail(in, EINVAL,
-			    "the file ends after %d of %d rows: it is truncated; train "
-			    "again",
-			    row, n);
-	rc = numbers(in, &at, to, n - row);
-	if (rc)
-		return rc;
-	if (*at)
-		return fail(in, EINVAL, "row %d has more than %d numbers", row + 1,
-			    n - row);
-	if (*to == 0)
-		return fail(in, EINVAL, "row %d begins with 0: the factor is singular",
-			    row + 1);
-	return 0;
+		rc = numbers_of(in, "shared", &shape.shared, 1);
+	if (!rc)
+		rc = numbers_of(in, "offset", &shape.offset, 1);
+	for (int i = 0; i < u->n_inputs && !rc; i++) {
+		double slope[3];
+
+		rc = numbers_of(in, "slope", slope, 3);
+		shape.slope[i] = slope[0];
+		shape.low[i] = slope[1];
+		shape.high[i] = slope[2];
+	}
+	if (!rc && incise_uncertainty_set_shape(u, &shape, NULL))
+		return fail(
+			in, EINVAL,
+			"expected shared of at least 0 and slopes over rising ranges");
+	return rc;
 }
 
 static int read_uncertainty_file(struct incise_lines *in, struct incise_uncertainty *u)
 {
 	double *to = u->factor;
-	struct incise_uncertainty_shape shape = {0};
 	char *text, *end;
 	uint64_t sum;
 	long value, n_common, n_rig;
@@ -518,25 +517,7 @@ static int read_uncertainty_file(struct incise_lines *in, struct incise_uncertai
 		return rc;
 	if (value != u->n)
 		return fail(in, EINVAL, "unknowns: %ld, the model has %d", value, u->n);
-	rc = numbers_of(in, "noise", &u->noise, 1);
-	if (!rc && u->noise < 0)
-		return fail(in, EINVAL, "noise: expected a number that is not negative");
-	if (!rc)
-		rc = numbers_of(in, "shared", &shape.shared, 1);
-	if (!rc)
-		rc = numbers_of(in, "offset", &shape.offset, 1);
-	for (int i = 0; i < u->n_inputs && !rc; i++) {
-		double slope[3];
-
-		rc = numbers_of(in, "slope", slope, 3);
-		shape.slope[i] = slope[0];
-		shape.low[i] = slope[1];
-		shape.high[i] = slope[2];
-	}
-	if (!rc && incise_uncertainty_set_shape(u, &shape, NULL))
-		return fail(
-			in, EINVAL,
-			"expected shared of at least 0 and slopes over rising ranges");
+	rc = read_noise(in, u);
 	if (!rc)
 		rc = integer_of(in, "common", &n_common);
 	if (!rc)
@@ -550,11 +531,15 @@ static int read_uncertainty_file(struct incise_lines *in, struct incise_uncertai
 			    INCISE_UNCERTAINTY_SOURCES);
 	if (make_calibrations(u, (int)n_common, (int)n_rig))
 		return fail(in, ENOMEM, "no memory to read it");
-	for (int row = 0; row < u->n && !rc; to += u->n - row, row++)
-		rc = read_row(in, to, u->n, row);
+	for (int row = 0; row < u->n && !rc; to += u->n - row, row++) {
+		rc = read_row(in, to, u->n - row);
+		if (!rc && *to == 0)
+			return fail(in, EINVAL,
+				    "row %d begins with 0: the factor is singular",
+				    row + 1);
+	}
 	for (int i = 0; i < calibrations(u) && !rc; i++)
-		rc = read_calibration(in, u->calibration + (size_t)i * (size_t)u->n,
-				      u->n);
+		rc = read_row(in, u->calibration + (size_t)i * (size_t)u->n, u->n);
 	if (rc)
 		return rc;
 	rc = next_uncertainty_line(in);
@@ -592,6 +577,14 @@ struct incise_uncertainty *incise_uncertainty_load(const char *path,
 	return u;
 }
 
+/* Returns what comes behind the row. */
+static const double *write_row(FILE *out, const double *row, int n)
+{
+	for (int k = 0; k < n; k++)
+		fprintf(out, "%.17g%c", row[k], k + 1 < n ? ' ' : '\n');
+	return row + n;
+}
+
 int incise_uncertainty_save(const struct incise_uncertainty *uncertainty,
 			    const char *path, struct incise_error *err)
 {
@@ -615,14 +608,10 @@ int incise_uncertainty_save(const struct incise_uncertainty *uncertainty,
 			shape->high[i]);
 	fprintf(out, "common %d\nrig %d\n", uncertainty->n_common, uncertainty->n_rig);
 	for (int i = 0; i < uncertainty->n; i++)
-		for (int k = i; k < uncertainty->n; k++)
-			fprintf(out, "%.17g%c", *from++,
-				k + 1 < uncertainty->n ? ' ' : '\n');
+		from = write_row(out, from, uncertainty->n - i);
 	from = uncertainty->calibration;
 	for (int i = 0; i < calibrations(uncertainty); i++)
-		for (int k = 0; k < uncertainty->n; k++)
-			fprintf(out, "%.17g%c", *from++,
-				k + 1 < uncertainty->n ? ' ' : '\n');
+		from = write_row(out, from, uncertainty->n);
 	incise_c_locale_end(locale);
 	return incise_outfile_commit(file, err);
 }
