@@ -134,8 +134,8 @@ mcap-reader: ## other readers for the tests of MCAP, $(O)/tests/mcap/check and r
 	@tests/venv tests/mcap $(O)/tests/mcap 'tests read MCAP with our own reader alone' check:--package ros2
 
 # Readers of Arrow streams in place, and MuJoCo, for the tests of incise for Python.
-python-peers: ## pyarrow, polars, DuckDB, pandas 3, xarray, scikit-learn, MuJoCo and mypy for the tests of python/
-	@tests/venv tests/python $(O)/tests/python 'tests with pyarrow, polars, DuckDB, pandas 3, xarray, scikit-learn, MuJoCo and mypy are skipped'
+python-peers: ## pyarrow, polars, DuckDB, pandas 3, xarray, scikit-learn, LightGBM, MuJoCo and mypy for the tests of python/
+	@tests/venv tests/python $(O)/tests/python 'tests with pyarrow, polars, DuckDB, pandas 3, xarray, scikit-learn, LightGBM, MuJoCo and mypy are skipped'
 
 # Programs of others that send and receive streams over a network.
 receiver := $(wildcard /usr/share/doc/openigtlink-examples/examples/Receiver/ReceiveClient.cxx)
@@ -307,11 +307,12 @@ $(O)/tests/calibrate_depth: tests/bench/calibrate_depth.c $(O)/lib/libincise-tes
 check-depth: $(O)/tests/calibrate_depth ## whether stated intervals of depth hold the truth on 200 virtual rigs
 	INCISE_MODULE_PATH=$(O)/lib/incise $(O)/tests/calibrate_depth
 
-DATA ?=
+DATA ?= ../shared/data
 SPLITS ?= 4
-check-few-cuts: all python-peers ## errors on unseen cuts next to scikit-learn's; DATA='a.csv b.csv' SPLITS=8
-	@[ ! -e $(O)/tests/python/ready ] || INCISE_BUILD=$(abspath $(O)) SPLITS=$(SPLITS) \
-		$(O)/tests/python/venv/bin/python -B tests/bench/few_cuts.py $(DATA)
+SEED ?= 0
+bench-learning: all python-peers ## errors and intervals on unseen cuts next to scikit-learn's and LightGBM's; DATA=FOLDER SPLITS=4 SEED=0
+	@[ ! -e $(O)/tests/python/ready ] || INCISE_BUILD=$(abspath $(O)) DATA=$(DATA) SPLITS=$(SPLITS) SEED=$(SEED) \
+		$(O)/tests/python/venv/bin/python -B tests/bench/learning.py
 
 TRACKER_SECONDS ?= 600
 check-tracker: $(O)/tests/tracker_line ## a FASTRAK at a serial line for ten minutes, clean and with harm on the way
@@ -337,4 +338,4 @@ check-exhaustive: $(O)/tests/exhaustive ## every pair of 16-bit inputs of the sh
 	$(O)/tests/exhaustive scenes/liver.fis
 	$(O)/tests/exhaustive scenes/liver.fis force
 
-.PHONY: check-corpus check-few-cuts check-exhaustive check-tracker check-depth check-day
+.PHONY: bench-learning check-corpus check-exhaustive check-tracker check-depth check-day

@@ -66,10 +66,11 @@ struct evaluator {
 	bool parts;	       /* of the uncertainty */
 };
 
-/* Parts of the standard deviation, in the order in which they are printed. */
-static const char *const part_names[] = {"data", "model", "calibration"};
+/* Parts of the standard deviation, in the order in which they are printed, and that of the mean. */
+#define SD_PARTS 4
+static const char *const part_names[SD_PARTS] = {"data", "model", "calibration", "mean"};
 
-static void find_parts(const struct evaluator *e, const double *x, double parts[3])
+static void find_parts(const struct evaluator *e, const double *x, double parts[SD_PARTS])
 {
 	struct incise_uncertainty_parts all;
 
@@ -78,6 +79,7 @@ static void find_parts(const struct evaluator *e, const double *x, double parts[
 	parts[1] = all.model;
 	/* The rigs that trained, and the rig that measures. */
 	parts[2] = hypot(all.calibration, all.rig);
+	parts[3] = all.mean;
 }
 
 static void add_eval_row(struct evaluator *e, const double *x, double y, bool outside)
@@ -85,7 +87,7 @@ static void add_eval_row(struct evaluator *e, const double *x, double y, bool ou
 	const char *unit = strrchr(e->output, '_');
 	json_t *row = json_object();
 	char key[INCISE_MODEL_NAME_MAX + 20];
-	double parts[3];
+	double parts[SD_PARTS];
 
 	snprintf(key, sizeof(key), "sd%s", unit ? unit : "");
 	for (int i = 0; i < e->n_inputs; i++)
@@ -97,7 +99,7 @@ static void add_eval_row(struct evaluator *e, const double *x, double y, bool ou
 			json_number(incise_uncertainty_sd(e->uncertainty, e->model, x)));
 	if (e->parts)
 		find_parts(e, x, parts);
-	for (int i = 0; e->parts && i < 3; i++) {
+	for (int i = 0; e->parts && i < SD_PARTS; i++) {
 		snprintf(key, sizeof(key), "sd_%s%s", part_names[i], unit ? unit : "");
 		json_set_number(row, key, parts[i]);
 	}
@@ -109,7 +111,7 @@ static void add_eval_row(struct evaluator *e, const double *x, double y, bool ou
 static void evaluate(struct evaluator *e, const double *x, size_t outside, bool inputs)
 {
 	unsigned int flags = 0;
-	double y, parts[3];
+	double y, parts[SD_PARTS];
 
 	y = e->model ? incise_model_eval(e->model, x, &flags) : 0;
 	if (e->fixed)
@@ -126,10 +128,10 @@ static void evaluate(struct evaluator *e, const double *x, size_t outside, bool 
 	printf("%.10g", y);
 	if (e->uncertainty)
 		printf(" %.10g", incise_uncertainty_sd(e->uncertainty, e->model, x));
-	if (e->parts) {
+	if (e->parts)
 		find_parts(e, x, parts);
-		printf(" %.10g %.10g %.10g", parts[0], parts[1], parts[2]);
-	}
+	for (int i = 0; e->parts && i < SD_PARTS; i++)
+		printf(" %.10g", parts[i]);
 	putchar('\n');
 }
 

@@ -673,6 +673,9 @@ static void report_train_json(const struct train_options *options,
 	set_in_unit(object, "crossval_rms_error", options, report->crossval_rmse);
 	set_in_unit(object, "noise", options, trained->noise);
 	json_set_number(object, "interval95_coverage", trained->coverage);
+	json_object_set_new(object, "interval95_thirds",
+			    json_numbers(trained->thirds, 3));
+	json_set_number(object, "interval95_least_group", trained->least);
 	json_object_set_new(object, "uncertainty",
 			    propagated_json(options, &trained->propagated));
 	json_object_set_new(object, "warnings", warned);
@@ -741,7 +744,11 @@ static void report_train_text(const struct train_options *options,
 	printf("  95 %% interval: noise %.4g %s", trained->noise,
 	       unit_of_train(options->target));
 	if (check)
-		printf(", holds %.1f %% of the %s", 100 * trained->coverage, unseen);
+		printf(", holds %.1f %% of the %s (%.0f, %.0f and %.0f %% of the thirds by "
+		       "%s, %.0f %% of the worst one)",
+		       100 * trained->coverage, unseen, 100 * trained->thirds[0],
+		       100 * trained->thirds[1], 100 * trained->thirds[2],
+		       incise_model_info(model)->input[0].name, 100 * trained->least);
 	printf("\n");
 	if (options->how.n_parts)
 		printf("  uncertainties: own parts %.3g %s; calibrations %.3g %s on the "

@@ -562,9 +562,8 @@ int incise_average_ratios(const struct incise_average *a,
 
 			make_row(basis, held->rows + i * (held->n_inputs + 1), row);
 			e = dot(row, consequents, a->n) - row[a->n];
-			*ratios++ = fabs(e) /
-				    sqrt(1 + incise_lsq_leverage(a->matrix, a->stride,
-								 a->n, row));
+			*ratios++ = e / sqrt(1 + incise_lsq_leverage(a->matrix, a->stride,
+								     a->n, row));
 		}
 	}
 	free(plain);

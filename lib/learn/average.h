@@ -36,7 +36,7 @@ double *incise_average_factor(const struct incise_average *average,
 			      struct incise_lsq *lsq, int *stride);
 
 /*
- * |error|/√(1 + leverage) of each of the n_held pairs, for the average of each fold and the
+ * error/√(1 + leverage) of each of the n_held pairs, for the average of each fold and the
  * factor of its setting with the largest weight. Returns 0, -EDOM, -ENOMEM.
  */
 int incise_average_ratios(const struct incise_average *average,

@@ -213,8 +213,7 @@ static int find_ratios(const struct incise_folds *folds, int f,
 
 		incise_basis_firing(basis, x, w);
 		incise_basis_row(basis, w, x, phi);
-		ratios[i] =
-			fabs(e) / sqrt(1 + incise_lsq_leverage(factor, stride, n, phi));
+		ratios[i] = e / sqrt(1 + incise_lsq_leverage(factor, stride, n, phi));
 	}
 out:
 	incise_lsq_free(lsq);

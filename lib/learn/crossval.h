@@ -46,7 +46,7 @@ int incise_crossval_ridges(const struct incise_basis *basis,
 /*
  * Held-out squared errors while premises are searched (varpro.h), by epoch:
  * error[e·n_units + unit] for epoch e+1. Where a fold's search ends early its last error
- * stands for the epochs left. Returns as above. ratios is NULL, or gets |error|/√(1 + φᵀ(ΦᵀΦ+λ)⁻¹φ) of each
+ * stands for the epochs left. Returns as above. ratios is NULL, or gets error/√(1 + φᵀ(ΦᵀΦ+λ)⁻¹φ) of each
  * of the n_held pairs after the last epoch: the error in units of the noise.
  */
 int incise_crossval_search(const struct incise_basis *basis,

@@ -6,16 +6,29 @@
 #ifndef INCISE_INTERVAL_H
 #define INCISE_INTERVAL_H
 
+#include <incise/uncertainty.h>
 #include "average.h"
 
+/* The noise of new pairs, and how it depends on the inputs. */
+struct incise_interval {
+	double noise;
+	struct incise_uncertainty_shape shape;
+};
+
 /*
- * Set *noise so that ±INCISE_INTERVAL95·noise·√(1 + leverage) holds 95 % of the held-out
- * pairs of the average, or if it is NULL of a search with the ridge, with Student's t for the number of units. Returns 0, -EDOM, -ECANCELED, -ENOMEM.
+ * Set *interval so that ±INCISE_INTERVAL95·noise(x)·√(1 + leverage) holds 95 % of the pairs of a
+ * new unit, out of the held-out pairs of the average, or if it is NULL of a search with the ridge.
+ * Returns 0, -EDOM, -ECANCELED, -ENOMEM.
  */
 int incise_interval_noise(const struct incise_basis *basis,
 			  const struct incise_folds *folds,
 			  const struct incise_ridge *ridge, int epochs,
-			  const struct incise_average *average, double *noise);
+			  const struct incise_average *average,
+			  struct incise_interval *interval);
+
+/* The same out of error/√(1 + leverage) of each held-out pair. */
+int incise_interval_fit(const struct incise_folds *folds, const double *ratios,
+			struct incise_interval *interval);
 
 /* The 97.5 % quantile of Student's t for 1 … degrees of freedom, to 0.1 %. */
 double incise_student(int freedom);

@@ -292,14 +292,14 @@ static int train_default(struct learner *l, struct incise_tuning *tuning)
 static int find_uncertainty(struct learner *l, const struct incise_tuning *tuning)
 {
 	struct incise_ridge ridge = tuning->ridge;
-	double noise;
+	struct incise_interval interval;
 	int stride, rc;
 	const double *factor;
 	double *own = NULL;
 
 	ridge.ridge = fmax(ridge.ridge, LEAST_RIDGE);
 	rc = incise_interval_noise(&tuning->basis, &l->folds, &ridge, tuning->epochs,
-				   tuning->average, &noise);
+				   tuning->average, &interval);
 	if (rc)
 		return rc;
 	factor = own = tuning->average
@@ -313,11 +313,19 @@ static int find_uncertainty(struct learner *l, const struct incise_tuning *tunin
 		free(own);
 		return -ECANCELED;
 	}
-	*l->options->uncertainty =
-		incise_uncertainty_new(l->model,
-				       noise * l->scaling.scale[l->basis.n_inputs],
-				       factor, stride, NULL);
+	*l->options->uncertainty = incise_uncertainty_new(
+		l->model, interval.noise * l->scaling.scale[l->basis.n_inputs], factor,
+		stride, NULL);
 	rc = *l->options->uncertainty ? 0 : errno == ENOMEM ? -ENOMEM : -EDOM;
+	for (int i = 0; i < l->basis.n_inputs; i++) {
+		double offset = l->scaling.offset[i], scale = l->scaling.scale[i];
+
+		interval.shape.low[i] = offset + scale * interval.shape.low[i];
+		interval.shape.high[i] = offset + scale * interval.shape.high[i];
+	}
+	if (!rc)
+		rc = incise_uncertainty_set_shape(*l->options->uncertainty,
+						  &interval.shape, NULL);
 	free(own);
 	return rc;
 }

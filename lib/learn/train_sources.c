@@ -15,6 +15,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <incise/version.h>
+#include "../base/ascending.h"
 #include "reader.h"
 #include "train.h"
 
@@ -598,25 +599,71 @@ static int finish_weighted(struct training *t)
 	return rc ? name_error(t, rc) : 0;
 }
 
-/* The share of the sample that is held out within its interval. */
-static void find_coverage(struct training *t)
+struct share {
+	double inside, n;
+};
+
+static bool is_inside(const struct incise_trained *trained, const double *row, int target)
 {
-	const struct incise_pairs *check =
-		&incise_corpus_side(t->trained->corpus, true)->sample.pairs;
-	struct incise_trained *trained = t->trained;
-	double n = incise_uncertainty_unknowns(trained->uncertainty);
-	size_t inside = 0;
+	double e = incise_model_eval(trained->model, row, NULL) - row[target];
 
-	for (size_t i = 0; i < check->n && !incise_watch_count(&t->watch, n * n); i++) {
-		const double *x = check->rows + i * (check->n_inputs + 1);
-		double e =
-			incise_model_eval(trained->model, x, NULL) - x[check->n_inputs];
-		double sd =
-			incise_uncertainty_sd(trained->uncertainty, trained->model, x);
+	return fabs(e) <= INCISE_INTERVAL95 * incise_uncertainty_sd(trained->uncertainty,
+								    trained->model, row);
+}
 
-		inside += fabs(e) <= INCISE_INTERVAL95 * sd;
+/* Count the pairs: in all, by thirds of the first input, by group (of which there is room). */
+static void count_inside(struct training *t, const struct incise_train_side *side,
+			 double *first, struct share *third, struct share *group)
+{
+	const struct incise_pairs *pairs = &side->pairs;
+	double n = incise_uncertainty_unknowns(t->trained->uncertainty);
+	int width = pairs->n_inputs + 1;
+
+	for (size_t i = 0; i < pairs->n; i++)
+		first[i] = pairs->rows[i * width];
+	qsort(first, pairs->n, sizeof(*first), ascending);
+	for (size_t i = 0; i < pairs->n && !incise_watch_count(&t->watch, n * n); i++) {
+		const double *x = pairs->rows + i * width;
+		bool inside = is_inside(t->trained, x, width - 1);
+		struct share *of[] = {&third[(*x >= first[pairs->n / 3]) +
+					     (*x >= first[pairs->n * 2 / 3])],
+				      &group[side->groups ? side->groups[i] : 0]};
+
+		for (int k = 0; k < 2; k++) {
+			of[k]->inside += inside;
+			of[k]->n++;
+		}
 	}
-	trained->coverage = check->n ? (double)inside / check->n : NAN;
+}
+
+/* The shares of the sample that is held out within its interval. Returns 0 or -ENOMEM. */
+static int find_coverage(struct training *t)
+{
+	const struct incise_train_side *side =
+		&incise_corpus_side(t->trained->corpus, true)->sample;
+	struct incise_trained *trained = t->trained;
+	size_t n = side->pairs.n, most = 0;
+	struct share third[3] = {{0}}, all = {0}, *group;
+	double *first = malloc((n + 1) * sizeof(*first));
+
+	for (size_t i = 0; i < n && side->groups; i++)
+		most = side->groups[i] > (int)most ? (size_t)side->groups[i] : most;
+	group = calloc(most + 1, sizeof(*group));
+	if (first && group && n)
+		count_inside(t, side, first, third, group);
+	for (int k = 0; k < 3; k++) {
+		trained->thirds[k] = third[k].inside / third[k].n;
+		all.inside += third[k].inside;
+		all.n += third[k].n;
+	}
+	trained->coverage = trained->least = all.inside / all.n;
+	for (size_t g = 0; g <= most && group; g++)
+		if (group[g].n > 0)
+			trained->least =
+				fmin(trained->least, group[g].inside / group[g].n);
+	free(group);
+	free(first);
+	return group && first ? 0 : -ENOMEM;
 }
 
 /* Notes of a model, also of a classic one, which has no factor; free(3), NULL: no memory. */
@@ -663,7 +710,8 @@ static int judge_model(struct training *t)
 		trained->check_outside = trained->check_pairs - info.rows;
 	}
 	trained->noise = incise_uncertainty_noise(trained->uncertainty);
-	find_coverage(t);
+	if (find_coverage(t))
+		return no_train_sources_memory(t);
 	if (t->watch.stopped)
 		return -ECANCELED;
 	if (incise_baselines(&fit->sample.pairs, fit->sample.groups,

@@ -16,14 +16,15 @@
 #include "../base/lines.h"
 #include "model.h"
 
-#define VERSION 2 /* with calibrations; without them 1 is written */
+#define VERSION 3
 
 #define UNKNOWNS_MAX (INCISE_MODEL_RULES_MAX * (INCISE_MODEL_INPUTS_MAX + 1))
 
 struct incise_uncertainty {
 	uint64_t checksum; /* of the model */
-	int n;
+	int n, n_inputs;
 	double noise;
+	struct incise_uncertainty_shape shape;
 	double *factor; /* upper triangle, row by row, packed */
 	/* Rows k of n: |k φ|² is a variance. Of the training's rigs; of another rig. */
 	int n_common, n_rig;
@@ -94,6 +95,7 @@ static struct incise_uncertainty *make(const struct incise_model *model)
 	if (!u)
 		return NULL;
 	u->n = (int)n;
+	u->n_inputs = model->info.n_inputs;
 	u->checksum = checksum(model);
 	u->factor = malloc(n * (n + 1) / 2 * sizeof(*u->factor));
 	if (!u->factor) {
@@ -213,9 +215,39 @@ int incise_uncertainty_solve(const struct incise_uncertainty *u, double *v)
 	return good ? 0 : -EDOM;
 }
 
+int incise_uncertainty_set_shape(struct incise_uncertainty *u,
+				 const struct incise_uncertainty_shape *shape,
+				 struct incise_error *err)
+{
+	bool good =
+		isfinite(shape->offset) && isfinite(shape->shared) && shape->shared >= 0;
+
+	for (int i = 0; i < u->n_inputs; i++)
+		good = good && isfinite(shape->slope[i]) && isfinite(shape->low[i]) &&
+		       isfinite(shape->high[i]) &&
+		       (shape->slope[i] == 0 || shape->high[i] > shape->low[i]);
+	if (!good)
+		return incise_error_set(
+			err, EINVAL,
+			"the noise does not depend on the inputs by finite "
+			"slopes over rising ranges");
+	u->shape = *shape;
+	return 0;
+}
+
 double incise_uncertainty_noise(const struct incise_uncertainty *uncertainty)
 {
 	return uncertainty->noise;
+}
+
+static double limit_input(const struct incise_model *model, int i, double x)
+{
+	const struct incise_variable *v = &model->info.input[i];
+
+	if (isnan(x))
+		return v->min + (v->max - v->min) / 2;
+	return model->clamp ? fmax(v->min, fmin(v->max, x))
+			    : fmax(-DBL_MAX, fmin(DBL_MAX, x));
 }
 
 void incise_uncertainty_row(const struct incise_model *model, const double *x,
@@ -223,17 +255,8 @@ void incise_uncertainty_row(const struct incise_model *model, const double *x,
 {
 	double in[INCISE_MODEL_INPUTS_MAX], w[INCISE_MODEL_RULES_MAX], *at = phi;
 
-	for (int i = 0; i < model->info.n_inputs; i++) {
-		const struct incise_variable *v = &model->info.input[i];
-
-		in[i] = x[i];
-		if (isnan(x[i]))
-			in[i] = v->min + (v->max - v->min) / 2;
-		else if (model->clamp)
-			in[i] = fmax(v->min, fmin(v->max, x[i]));
-		else
-			in[i] = fmax(-DBL_MAX, fmin(DBL_MAX, x[i]));
-	}
+	for (int i = 0; i < model->info.n_inputs; i++)
+		in[i] = limit_input(model, i, x[i]);
 	incise_model_firing(model, in, w);
 	for (int r = 0; r < model->info.n_rules; r++) {
 		*at++ = w[r];
@@ -288,25 +311,41 @@ static double leverage(const struct incise_uncertainty *uncertainty, double *phi
 	return sum;
 }
 
+static double noise_at(const struct incise_uncertainty *u,
+		       const struct incise_model *model, const double *x)
+{
+	const struct incise_uncertainty_shape *shape = &u->shape;
+	double sum = shape->offset;
+
+	for (int i = 0; i < u->n_inputs; i++) {
+		double low = shape->low[i], high = shape->high[i];
+		double in = fmax(low, fmin(high, limit_input(model, i, x[i])));
+
+		if (shape->slope[i] != 0)
+			sum += shape->slope[i] * ((in - low) / (high - low));
+	}
+	return bounded(u->noise * exp(sum));
+}
+
 void incise_uncertainty_parts(const struct incise_uncertainty *u,
 			      const struct incise_model *model, const double *x,
 			      struct incise_uncertainty_parts *parts)
 {
 	double phi[UNKNOWNS_MAX], common, rig, model_square;
+	double noise = noise_at(u, model, x);
 
 	incise_uncertainty_row(model, x, phi);
 	common = square(u, phi, 0, u->n_common);
 	rig = square(u, phi, u->n_common, u->n_rig);
 	model_square = leverage(u, phi);
 	*parts = (struct incise_uncertainty_parts){
-		.total = bounded(calibrations(u)
-					 ? sqrt(u->noise * u->noise * (1 + model_square) +
-						common + rig)
-					 : u->noise * sqrt(1 + model_square)),
-		.data = u->noise,
-		.model = bounded(u->noise * sqrt(model_square)),
+		.total = bounded(sqrt(noise * noise * (1 + model_square) + common + rig)),
+		.data = noise,
+		.model = bounded(noise * sqrt(model_square)),
 		.calibration = bounded(sqrt(common)),
 		.rig = bounded(sqrt(rig)),
+		.mean = bounded(
+			sqrt(noise * noise * (u->shape.shared + model_square) + common)),
 	};
 }
 
@@ -394,46 +433,58 @@ static int numbers(struct incise_lines *in, char **at, double *to, int n)
 	return rc;
 }
 
-/* The n numbers of a line of calibrations. */
-static int read_calibration(struct incise_lines *in, double *to, int n)
+/* The line "KEY NUMBERS…" of so many. */
+static int numbers_of(struct incise_lines *in, const char *key, double *to, int n)
 {
-	int rc = next_uncertainty_line(in);
-	char *at = in->text;
+	char *at = value_of(in, key);
+	int rc = at ? numbers(in, &at, to, n) : -errno;
 
-	if (rc < 0)
-		return rc;
-	if (!rc)
-		return fail(in, EINVAL,
-			    "the file ends within its calibrations: it is truncated; "
-			    "train again");
-	rc = numbers(in, &at, to, n);
-	if (rc)
-		return rc;
-	return *at ? fail(in, EINVAL, "a calibration has more than %d numbers", n) : 0;
+	if (!rc && *at)
+		return fail(in, EINVAL, "%s: expected no more than %s", key,
+			    n == 1 ? "one number" : "three numbers");
+	return rc;
 }
 
-static int read_row(struct incise_lines *in, double *to, int n, int row)
+/* A row of the triangle, or of the calibrations: a line of n numbers. */
+static int read_row(struct incise_lines *in, double *to, int n)
 {
 	int rc = next_uncertainty_line(in);
 	char *at = in->text;
 
-	if (rc < 0)
-		return rc;
 	if (!rc)
 		return fail(in, EINVAL,
-			    "the file ends after %d of %d rows: it is truncated; train "
-			    "again",
-			    row, n);
-	rc = numbers(in, &at, to, n - row);
-	if (rc)
-		return rc;
-	if (*at)
-		return fail(in, EINVAL, "row %d has more than %d numbers", row + 1,
-			    n - row);
-	if (*to == 0)
-		return fail(in, EINVAL, "row %d begins with 0: the factor is singular",
-			    row + 1);
-	return 0;
+			    "the file ends before its last row: it is truncated; train "
+			    "again");
+	rc = rc < 0 ? rc : numbers(in, &at, to, n);
+	if (!rc && *at)
+		return fail(in, EINVAL, "a row has more than %d numbers", n);
+	return rc;
+}
+
+static int read_noise(struct incise_lines *in, struct incise_uncertainty *u)
+{
+	struct incise_uncertainty_shape shape = {0};
+	int rc = numbers_of(in, "noise", &u->noise, 1);
+
+	if (!rc && u->noise < 0)
+		return fail(in, EINVAL, "noise: expected a number that is not negative");
+	if (!rc)
+		rc = numbers_of(in, "shared", &shape.shared, 1);
+	if (!rc)
+		rc = numbers_of(in, "offset", &shape.offset, 1);
+	for (int i = 0; i < u->n_inputs && !rc; i++) {
+		double slope[3];
+
+		rc = numbers_of(in, "slope", slope, 3);
+		shape.slope[i] = slope[0];
+		shape.low[i] = slope[1];
+		shape.high[i] = slope[2];
+	}
+	if (!rc && incise_uncertainty_set_shape(u, &shape, NULL))
+		return fail(
+			in, EINVAL,
+			"expected shared of at least 0 and slopes over rising ranges");
+	return rc;
 }
 
 static int read_uncertainty_file(struct incise_lines *in, struct incise_uncertainty *u)
@@ -441,15 +492,15 @@ static int read_uncertainty_file(struct incise_lines *in, struct incise_uncertai
 	double *to = u->factor;
 	char *text, *end;
 	uint64_t sum;
-	long value, version, n_common = 0, n_rig = 0;
+	long value, n_common, n_rig;
 	int rc = integer_of(in, "incise-sd", &value);
 
 	if (rc)
 		return rc;
-	if (value < 1 || value > VERSION)
-		return fail(in, EINVAL, "version %ld: this incise reads versions 1 to %d",
+	if (value != VERSION)
+		return fail(in, EINVAL,
+			    "version %ld: this incise reads version %d; train again",
 			    value, VERSION);
-	version = value;
 	text = value_of(in, "model");
 	if (!text)
 		return -errno;
@@ -466,18 +517,10 @@ static int read_uncertainty_file(struct incise_lines *in, struct incise_uncertai
 		return rc;
 	if (value != u->n)
 		return fail(in, EINVAL, "unknowns: %ld, the model has %d", value, u->n);
-	text = value_of(in, "noise");
-	if (!text)
-		return -errno;
-	rc = read_uncertainty_number(in, &text, &u->noise);
-	if (rc)
-		return rc;
-	if (*text || u->noise < 0)
-		return fail(in, EINVAL,
-			    "noise: expected one number that is not negative");
-	if (version > 1)
+	rc = read_noise(in, u);
+	if (!rc)
 		rc = integer_of(in, "common", &n_common);
-	if (!rc && version > 1)
+	if (!rc)
 		rc = integer_of(in, "rig", &n_rig);
 	if (rc)
 		return rc;
@@ -488,11 +531,15 @@ static int read_uncertainty_file(struct incise_lines *in, struct incise_uncertai
 			    INCISE_UNCERTAINTY_SOURCES);
 	if (make_calibrations(u, (int)n_common, (int)n_rig))
 		return fail(in, ENOMEM, "no memory to read it");
-	for (int row = 0; row < u->n && !rc; to += u->n - row, row++)
-		rc = read_row(in, to, u->n, row);
+	for (int row = 0; row < u->n && !rc; to += u->n - row, row++) {
+		rc = read_row(in, to, u->n - row);
+		if (!rc && *to == 0)
+			return fail(in, EINVAL,
+				    "row %d begins with 0: the factor is singular",
+				    row + 1);
+	}
 	for (int i = 0; i < calibrations(u) && !rc; i++)
-		rc = read_calibration(in, u->calibration + (size_t)i * (size_t)u->n,
-				      u->n);
+		rc = read_row(in, u->calibration + (size_t)i * (size_t)u->n, u->n);
 	if (rc)
 		return rc;
 	rc = next_uncertainty_line(in);
@@ -530,10 +577,19 @@ struct incise_uncertainty *incise_uncertainty_load(const char *path,
 	return u;
 }
 
+/* Returns what comes behind the row. */
+static const double *write_row(FILE *out, const double *row, int n)
+{
+	for (int k = 0; k < n; k++)
+		fprintf(out, "%.17g%c", row[k], k + 1 < n ? ' ' : '\n');
+	return row + n;
+}
+
 int incise_uncertainty_save(const struct incise_uncertainty *uncertainty,
 			    const char *path, struct incise_error *err)
 {
 	struct incise_outfile *file = incise_outfile_open(path, err);
+	const struct incise_uncertainty_shape *shape = &uncertainty->shape;
 	const double *from = uncertainty->factor;
 	struct incise_c_locale locale;
 	FILE *out;
@@ -542,21 +598,20 @@ int incise_uncertainty_save(const struct incise_uncertainty *uncertainty,
 		return -errno;
 	locale = incise_c_locale_begin();
 	out = incise_outfile_stream(file);
-	fprintf(out, "incise-sd %d\nmodel %016" PRIx64 "\nunknowns %d\nnoise %.17g\n",
-		calibrations(uncertainty) ? VERSION : 1, uncertainty->checksum,
-		uncertainty->n, uncertainty->noise);
-	if (calibrations(uncertainty))
-		fprintf(out, "common %d\nrig %d\n", uncertainty->n_common,
-			uncertainty->n_rig);
+	fprintf(out,
+		"incise-sd %d\nmodel %016" PRIx64 "\nunknowns %d\nnoise %.17g\n"
+		"shared %.17g\noffset %.17g\n",
+		VERSION, uncertainty->checksum, uncertainty->n, uncertainty->noise,
+		shape->shared, shape->offset);
+	for (int i = 0; i < uncertainty->n_inputs; i++)
+		fprintf(out, "slope %.17g %.17g %.17g\n", shape->slope[i], shape->low[i],
+			shape->high[i]);
+	fprintf(out, "common %d\nrig %d\n", uncertainty->n_common, uncertainty->n_rig);
 	for (int i = 0; i < uncertainty->n; i++)
-		for (int k = i; k < uncertainty->n; k++)
-			fprintf(out, "%.17g%c", *from++,
-				k + 1 < uncertainty->n ? ' ' : '\n');
+		from = write_row(out, from, uncertainty->n - i);
 	from = uncertainty->calibration;
 	for (int i = 0; i < calibrations(uncertainty); i++)
-		for (int k = 0; k < uncertainty->n; k++)
-			fprintf(out, "%.17g%c", *from++,
-				k + 1 < uncertainty->n ? ' ' : '\n');
+		from = write_row(out, from, uncertainty->n);
 	incise_c_locale_end(locale);
 	return incise_outfile_commit(file, err);
 }

@@ -68,7 +68,7 @@ SourceStruct, SourcesOptionsStruct, PropagationReportStruct, TrainedStruct = _li
         uint64_t pairs, check_pairs, left_out, repeated, check_outside;
         const char *group;
         void *initial, *factor, *corpus;
-        double noise, coverage;
+        double noise, coverage, thirds[3], least;
         struct incise_propagation_report propagated;
         bool shared;
     };

@@ -553,7 +553,7 @@ class Model:
 
     @property
     def noise(self) -> float:
-        """Standard deviation of new cuts where data are dense; NaN without a .sd file."""
+        """Noise of new cuts, its root mean square over the training; NaN without a .sd file."""
         if not self._uncertainty:
             return math.nan
         return function("incise_uncertainty_noise")(self._uncertainty)
@@ -575,7 +575,8 @@ class Model:
         """The output; with sd=True (output, standard deviation).
 
         With parts=True too (output, standard deviation, parts): in the last dimension of the parts
-        data, model, calibration and rig, whose squares add up to that of the standard deviation.
+        data, model, calibration and rig, whose squares add up to that of the standard deviation, and
+        mean, that of the mean of all cuts.
         """
         if parts and not sd:
             raise Invalid(errno.EINVAL, "parts are those of the standard deviation; give sd=True")
@@ -596,12 +597,12 @@ class Model:
         )
         if not parts:
             return points.finish(block), points.finish(spread)
-        # struct incise_uncertainty_parts: the total, and four parts
-        whole, whole_address = points.results(5)
+        # struct incise_uncertainty_parts: the total, four parts, and the mean
+        whole, whole_address = points.results(6)
         function("incise_uncertainty_parts_many")(
             self._uncertainty, self._pointer, points.address, points.n, whole_address
         )
-        each = points.finish(whole, 5)
+        each = points.finish(whole, 6)
         if points.array is not None:
             each = each[..., 1:]
         elif points.shape is None:

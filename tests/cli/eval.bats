@@ -166,9 +166,9 @@ refuses() {
 	cp bell.fis.sd alone.fis.sd
 	run --separate-stderr incise eval alone.fis --uncertainty total <<<'5 20'
 	failed_with alone.fis.sd:2 stale
-	sed '9s/ / x/' m.fis.sd >alone.fis.sd
+	sed '12s/ / x/' m.fis.sd >alone.fis.sd
 	run --separate-stderr incise eval alone.fis --uncertainty total <<<'5 20'
-	failed_with alone.fis.sd:9 "not a number"
+	failed_with alone.fis.sd:12 "not a number"
 	run --separate-stderr incise eval - --uncertainty total <m.fis
 	failed_with "--uncertainty:"
 	# without --uncertainty nobody looks

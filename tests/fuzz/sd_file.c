@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * A standard deviation (.sd) of versions 1 and 2: refused with a reason, or finite at any inputs, and
+ * A standard deviation (.sd): refused with a reason, or finite at any inputs, and
  * written again it gives the same values.
  */
 #include <fcntl.h>

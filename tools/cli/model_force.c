@@ -59,19 +59,20 @@ void model_force_print(FILE *out, const struct model_force *force)
 	const struct incise_uncertainty_parts *u = &force->u;
 
 	fprintf(out,
-		"%.3f N at %.1f mm and %.3g mm/s, u = %.2g N (data %.2g, model %.2g, "
-		"calibration %.2g)\n",
+		"%.3f N at %.1f mm and %.3g mm/s, u = %.2g N of a new cut (data %.2g, model "
+		"%.2g, calibration %.2g), %.2g N of the mean of all cuts\n",
 		force->force_N, force->depth_mm, force->velocity_mm_s, u->total, u->data,
-		u->model, hypot(u->calibration, u->rig));
+		u->model, hypot(u->calibration, u->rig), u->mean);
 }
 
 json_t *model_force_json(const struct model_force *force)
 {
 	if (!force)
 		return json_null();
-	return json_pack("{sf sf sf sf sf sf sf}", "depth_mm", force->depth_mm,
+	return json_pack("{sf sf sf sf sf sf sf sf}", "depth_mm", force->depth_mm,
 			 "velocity_mm_s", force->velocity_mm_s, "force_N", force->force_N,
 			 "sd_N", force->u.total, "sd_data_N", force->u.data, "sd_model_N",
 			 force->u.model, "sd_calibration_N",
-			 hypot(force->u.calibration, force->u.rig));
+			 hypot(force->u.calibration, force->u.rig), "sd_mean_N",
+			 force->u.mean);
 }

@@ -174,7 +174,7 @@ static struct incise_uncertainty *uncertainty_of(const char *path,
 	return uncertainty;
 }
 
-/* Input, output, half the 95 % interval of all parts and of all but the data's scatter. */
+/* Input, output, half the 95 % interval of a new cut and of the mean of all cuts. */
 static void write_band(const struct incise_model *model,
 		       const struct incise_uncertainty *uncertainty, int input,
 		       const char *folder, const char *name)
@@ -193,7 +193,7 @@ static void write_band(const struct incise_model *model,
 		incise_uncertainty_parts(uncertainty, model, x, &u);
 		fprintf(data, "%.6g %.6g %.6g %.6g\n", x[input],
 			incise_model_eval(model, x, NULL), INCISE_INTERVAL95 * u.total,
-			INCISE_INTERVAL95 * hypot(u.model, u.calibration));
+			INCISE_INTERVAL95 * u.mean);
 	}
 	plot_data_end(data, folder);
 }
@@ -213,7 +213,7 @@ static void put_band(struct model_grid *grid, const struct model_surface *surfac
 		"\nplot '%s' using 1:($2-$3):($2+$3) with filledcurves lc rgb blue fs "
 		"transparent solid 0.2 noborder title 'a new cut on a new rig', \\\n  "
 		"'' using 1:($2-$4):($2+$4) with filledcurves lc rgb blue fs transparent "
-		"solid 0.4 noborder title 'the model', \\\n  "
+		"solid 0.4 noborder title 'the mean of all cuts', \\\n  "
 		"'' using 1:2 with lines lc rgb ink title 'output'\n",
 		grid->bands[input]);
 }

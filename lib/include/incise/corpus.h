@@ -134,6 +134,8 @@ struct incise_trained {
 	struct incise_corpus *corpus;
 	double noise; /**< of @ref uncertainty */
 	double coverage; /**< share of the held-out sample in the 95 % interval; NaN without */
+	double thirds[3]; /**< the same of the thirds of its pairs by the first input */
+	double least;	  /**< the same of the group of which the fewest are */
 	struct incise_propagation_report propagated; /**< with weights */
 	bool shared; /**< of ranks: all know of the failure, or only this one still works */
 };

@@ -3,18 +3,18 @@
  * The uncertainty of a model's prediction: the standard deviation of a new output, by Bayesian
  * linear consequents,
  *
- *   sd(x)² = noise² (1 + |R⁻ᵀφ(x)|²)
+ *   sd(x)² = noise(x)² (1 + |R⁻ᵀφ(x)|²)
  *
  * with φ(x) the firing strengths times (1, x), inputs scaled to [0, 1] over their ranges, and
  * R the triangular factor of the training rows with their ridge. It grows where training data
  * are sparse. The noise comes from held-out groups, so that ±1.96 sd should contain 95 % of a
- * new cut.
+ * new cut; its logarithm is linear in the inputs.
  *
  * With uncertainties of pairs (incise/propagation.h), the calibrations of the rigs add to it: of
  * the rigs that the model was trained on, and of the rig that measures a new output.
  *
- *   sd(x)² = noise² (1 + |R⁻ᵀφ(x)|²) + |K φ(x)|² + |B φ(x)|²
- *            data     model            calibration  rig
+ *   sd(x)² = noise(x)² (1 + |R⁻ᵀφ(x)|²) + |K φ(x)|² + |B φ(x)|²
+ *            data        model            calibration  rig
  *
  * MATLAB cannot read a .fis file with this data. It is in a separate file, MODEL.fis.sd
  * (incise-sd(5)), with a checksum of the parameters of its model.
@@ -71,7 +71,29 @@ INCISE_API int incise_uncertainty_save(const struct incise_uncertainty *uncertai
 /** NULL is accepted. */
 INCISE_API void incise_uncertainty_free(struct incise_uncertainty *uncertainty);
 
-/** The noise, in the unit of the output. */
+/**
+ * How the noise depends on the inputs: noise(x) = noise·exp(offset + Σ slope·u), with u of each
+ * input 0 up to low and 1 from high on. All 0: it does not.
+ */
+struct incise_uncertainty_shape {
+	double offset;
+	double slope[INCISE_MODEL_INPUTS_MAX];
+	double low[INCISE_MODEL_INPUTS_MAX], high[INCISE_MODEL_INPUTS_MAX];
+	/** Variance of the mean tissue that few cuts leave, as a part of that of the noise, ≥ 0. */
+	double shared;
+};
+
+/**
+ * Set that; a new uncertainty has none.
+ *
+ * @return 0; -EINVAL (a number is not finite, shared below 0, a slope with high not above low): then
+ *         nothing is changed
+ */
+INCISE_API int incise_uncertainty_set_shape(struct incise_uncertainty *uncertainty,
+					    const struct incise_uncertainty_shape *shape,
+					    struct incise_error *err);
+
+/** The noise, in the unit of the output: its root mean square over the training. */
 INCISE_API double incise_uncertainty_noise(const struct incise_uncertainty *uncertainty);
 
 /**
@@ -79,7 +101,7 @@ INCISE_API double incise_uncertainty_noise(const struct incise_uncertainty *unce
  * incise_model_eval().
  *
  * @param model its model
- * @return finite, at least the noise. Real-time safe.
+ * @return finite, at least the noise there. Real-time safe.
  */
 INCISE_API double incise_uncertainty_sd(const struct incise_uncertainty *uncertainty,
 					const struct incise_model *model,
@@ -88,10 +110,11 @@ INCISE_API double incise_uncertainty_sd(const struct incise_uncertainty *uncerta
 /** Parts of a standard deviation, in the unit of the output. */
 struct incise_uncertainty_parts {
 	double total; /**< root of the sum of squares, as of incise_uncertainty_sd() */
-	double data;  /**< scatter from cut to cut: the noise */
+	double data;  /**< scatter of new cuts: the noise there */
 	double model; /**< of a fit to limited data; it grows where they are sparse */
 	double calibration; /**< of the rigs that the model was trained on; 0: not stated */
 	double rig; /**< of another rig as well calibrated, that measures; 0: not stated */
+	double mean; /**< of the mean of all cuts, not of a new one: no part of the total */
 };
 
 /**

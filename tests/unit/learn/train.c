@@ -805,11 +805,58 @@ TEST(test_new_groups_are_covered)
 		double sd = incise_uncertainty_sd(uncertainty, model, rows + 2 * i);
 		double e = incise_model_eval(model, rows + 2 * i, NULL) - rows[2 * i + 1];
 
-		assert_true(sd >= noise);
 		inside += fabs(e) <= INCISE_INTERVAL95 * sd;
 	}
 	/* 60 levels: 57 expected, give or take two standard deviations of 1.7. */
 	assert_true(inside > 0.89 * half);
+	incise_uncertainty_free(uncertainty);
+	incise_model_free(model);
+}
+
+/* The noise grows with the input 20 times, and the interval with it. */
+TEST(test_interval_follows_the_noise)
+{
+	static const struct incise_variable in = {"x", 0, 1}, out = {"y", -1, 1};
+	const int n_mfs = 3, half = GROUPS * PER_GROUP;
+	struct incise_pairs train = {.rows = rows, .n = half, .n_inputs = 1};
+	struct incise_uncertainty *uncertainty = NULL;
+	struct incise_uncertainty_parts parts;
+	struct incise_model *model =
+		incise_model_new_grid(1, &in, &n_mfs, INCISE_MF_GAUSS, &out, NULL);
+	uint64_t seed = 12;
+	int inside[3] = {0}, n[3] = {0};
+
+	for (int g = 0; g < 2 * GROUPS; g++) {
+		double level = normal(&seed);
+
+		for (int i = g * PER_GROUP; i < (g + 1) * PER_GROUP; i++) {
+			rows[2 * i] = (1 + incise_random_symmetric(&seed)) / 2;
+			rows[2 * i + 1] =
+				rows[2 * i] + 0.02 * exp(3 * rows[2 * i]) *
+						      (0.9 * level + 0.4 * normal(&seed));
+			if (i < half)
+				groups[i] = g;
+		}
+	}
+	incise_train_options_init(&options);
+	options.groups = groups;
+	options.uncertainty = &uncertainty;
+	assert_int_equal(incise_train(model, &train, NULL, &options, NULL, NULL), 0);
+	for (int i = half; i < 2 * half; i++) {
+		int third = rows[2 * i] * 3;
+		double e = incise_model_eval(model, rows + 2 * i, NULL) - rows[2 * i + 1];
+
+		incise_uncertainty_parts(uncertainty, model, rows + 2 * i, &parts);
+		inside[third] += fabs(e) <= INCISE_INTERVAL95 * parts.total;
+		n[third]++;
+		/* 60 levels leave about an eighth of the noise to the mean of all. */
+		assert_true(parts.mean > 0.08 * parts.data &&
+			    parts.mean < 0.4 * parts.data);
+	}
+	for (int k = 0; k < 3; k++)
+		assert_true(inside[k] > 0.85 * n[k]);
+	incise_uncertainty_parts(uncertainty, model, (double[]){0.1}, &parts);
+	assert_true(parts.data < 0.06);
 	incise_uncertainty_free(uncertainty);
 	incise_model_free(model);
 }
