@@ -22,17 +22,11 @@ double incise_student(int freedom)
 
 int incise_interval_noise(const struct incise_basis *basis,
 			  const struct incise_folds *folds,
-			  const struct incise_ridge *ridge, int epochs,
-			  const struct incise_average *average, double *noise)
+			  const struct incise_ridge *ridge, double *noise)
 {
-	double *error = malloc((size_t)epochs * folds->n_units * sizeof(*error));
 	double *ratios = malloc(folds->n_held * sizeof(*ratios));
-	int rc = -ENOMEM;
+	int rc = ratios ? incise_crossval_ratios(basis, folds, ridge, ratios) : -ENOMEM;
 
-	if (error && ratios)
-		rc = average ? incise_average_ratios(average, basis, folds, ratios)
-			     : incise_crossval_search(basis, folds, ridge, epochs, error,
-						      ratios);
 	if (!rc) {
 		/* The quantile that also holds the pair to come: (n+1)·0.95 from below. */
 		double rank = ceil(0.95 * (folds->n_held + 1.0));
@@ -42,7 +36,6 @@ int incise_interval_noise(const struct incise_basis *basis,
 		*noise = ratios[at] / INCISE_INTERVAL95 *
 			 incise_student(folds->n_units - 1) / INCISE_INTERVAL95;
 	}
-	free(error);
 	free(ratios);
 	return rc;
 }
