@@ -667,6 +667,8 @@ static void report_train_json(const struct train_options *options,
 	set_in_unit(object, "crossval_rms_error", options, report->crossval_rmse);
 	set_in_unit(object, "crossval_plane_rms_error", options, report->crossval_plane);
 	set_in_unit(object, "crossval_mean_rms_error", options, report->crossval_mean);
+	set_in_unit(object, "crossval_quadratic_rms_error", options,
+		    report->crossval_quadratic);
 	set_in_unit(object, "noise", options, trained->noise);
 	json_set_number(object, "interval95_coverage", trained->coverage);
 	json_object_set_new(object, "uncertainty",
@@ -681,6 +683,18 @@ static void print_row(const char *name, double train, double check)
 	printf("  %-22s", name);
 	isnan(train) ? printf("%12s", "") : printf("%12.5g", train);
 	isnan(check) ? printf("\n") : printf("%14.5g\n", check);
+}
+
+/* The law that the model is, or the kind of its penalty. */
+static const char *name_penalty(const struct train_options *options,
+				const struct incise_train_report *report)
+{
+	if (options->how.train.classic || !isnan(options->how.train.ridge))
+		return "ridge";
+	return report->crossval_rmse == report->crossval_quadratic ? "quadratic, penalty"
+	       : report->crossval_rmse == report->crossval_plane   ? "plane, penalty"
+	       : report->crossval_rmse == report->crossval_mean	   ? "mean, penalty"
+								   : "penalty";
 }
 
 static void print_clamped(const struct incise_trained *trained)
@@ -732,19 +746,14 @@ static void report_train_text(const struct train_options *options,
 	if (options->how.train.classic)
 		printf("%s (kept %d), ", cli_count(report->epochs, "epoch"),
 		       report->best_epoch);
-	printf("%s %g, condition %.2g\n",
-	       report->crossval_rmse == report->crossval_mean	 ? "the mean: penalty"
-	       : report->crossval_rmse == report->crossval_plane ? "a plane: penalty"
-	       : isnan(options->how.train.ridge) && !options->how.train.classic
-		       ? "penalty"
-		       : "ridge",
-	       report->ridge, report->condition);
+	printf("%s %g, condition %.2g\n", name_penalty(options, report), report->ridge,
+	       report->condition);
 	printf("  %-22s%12s%14s\n", "RMSE", "training", check ? unseen : "");
 	print_row("this model", report->train_rmse, report->check_rmse);
 	if (!isnan(report->crossval_rmse))
-		printf("  in cross-validation: %.5g; a plane %.5g, the mean %.5g\n",
-		       report->crossval_rmse, report->crossval_plane,
-		       report->crossval_mean);
+		printf("  cross-validated: %.5g; quadratic %.5g, plane %.5g, mean %.5g\n",
+		       report->crossval_rmse, report->crossval_quadratic,
+		       report->crossval_plane, report->crossval_mean);
 	snprintf(knn, sizeof(knn), "%d nearest", baselines->k);
 	print_row("mean", check ? NAN : baselines->mean, check ? baselines->mean : NAN);
 	print_row("linear regression", check ? NAN : baselines->linear,

@@ -101,7 +101,7 @@ void incise_folds_free(struct incise_folds *folds)
 	}
 }
 
-/* What the fits without each fold need. */
+/* Fits without each fold. */
 struct fits {
 	const struct incise_basis *basis;
 	const struct incise_folds *folds;
@@ -232,33 +232,59 @@ void incise_crossval_settings(const struct incise_basis *basis,
 	}
 }
 
-int incise_crossval_choose(const struct incise_basis *basis,
-			   const struct incise_folds *folds, struct incise_choice *choice)
+/* Take an error row for the one that is kept. */
+static void keep_setting(struct incise_choice *choice, const struct incise_ridge *ridge,
+			 const double *error, double total, int n_units)
 {
-	struct incise_ridge ridges[CROSSVAL_RIDGES];
-	size_t n = folds->n_units;
-	double *error = malloc(CROSSVAL_RIDGES * n * sizeof(*error)), *at = error;
-	int rc = error ? 0 : -ENOMEM;
+	choice->ridge = *ridge;
+	choice->total = total;
+	memmove(choice->error, error, n_units * sizeof(*error));
+}
 
-	incise_crossval_settings(basis, ridges);
-	if (!rc)
-		rc = incise_crossval_ridges(basis, folds, ridges, CROSSVAL_RIDGES, error);
-	*choice = (struct incise_choice){.total = HUGE_VAL};
-	for (int i = 0; i < CROSSVAL_RIDGES && !rc; i++, at += n) {
-		double total = incise_crossval_total(folds, at);
+/* Totals in the order of the settings: the plane, the mean and the quadratic are the last. */
+static void choose_setting(const struct incise_folds *folds,
+			   const struct incise_ridge *ridges, const double *error, int n,
+			   struct incise_choice *choice)
+{
+	for (int i = 0; i < n; i++, error += folds->n_units) {
+		double total = incise_crossval_total(folds, error), clear = 0;
 
-		choice->plane = choice->mean;
-		choice->mean = total;
-		if (total >= choice->total)
-			continue;
-		choice->total = total;
-		choice->ridge = ridges[i];
-		memmove(error, at, n * sizeof(*error));
+		if (i == CROSSVAL_RIDGES - 2)
+			choice->plane = total;
+		else if (i == CROSSVAL_RIDGES - 1)
+			choice->mean = total;
+		else if (i == CROSSVAL_RIDGES)
+			choice->quadratic = total;
+		if (i == CROSSVAL_RIDGES)
+			clear = incise_crossval_spread(folds, error, choice->error);
+		if (total < choice->total + clear)
+			keep_setting(choice, &ridges[i], error, total, folds->n_units);
 	}
+}
+
+int incise_crossval_choose(const struct incise_basis *basis,
+			   const struct incise_folds *folds, const double *quadratic,
+			   struct incise_choice *choice)
+{
+	struct incise_ridge ridges[CROSSVAL_RIDGES + 1];
+	int n = CROSSVAL_RIDGES + (quadratic != NULL), rc;
+	double *error = malloc((size_t)n * folds->n_units * sizeof(*error));
+
+	if (!error)
+		return -ENOMEM;
+	incise_crossval_settings(basis, ridges);
+	ridges[CROSSVAL_RIDGES] =
+		(struct incise_ridge){.ridge = RIGID,
+				      .n = basis->n_rules * (basis->n_inputs + 1),
+				      .free = quadratic,
+				      .n_free = basis->n_inputs + 1};
+	rc = incise_crossval_ridges(basis, folds, ridges, n, error);
+	*choice = (struct incise_choice){
+		.error = error, .total = HUGE_VAL, .quadratic = NAN};
 	if (rc)
 		free(error);
 	else
-		choice->error = error;
+		choose_setting(folds, ridges, error, n, choice);
 	return rc;
 }
 

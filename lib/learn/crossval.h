@@ -51,16 +51,27 @@ int incise_crossval_ratios(const struct incise_basis *basis,
 void incise_crossval_settings(const struct incise_basis *basis,
 			      struct incise_ridge *ridges);
 
-/* Held-out squared errors by unit, to be freed with free(3), of the best of these ridges. */
+/*
+ * The law a·d + b·d² + c·v + … of the first input and the others, through the raw 0 of all, for
+ * incise_ridge.free: as many rows as inputs and one, and its constant. offset and scale are those of
+ * the inputs and the output. To be freed with free(3); NULL: the grid has none.
+ */
+double *incise_quadratic(const struct incise_basis *basis, const double *offset,
+			 const double *scale);
+
+/* The best of these ridges, with its held-out squared errors by unit, to be freed with free(3). */
 struct incise_choice {
 	struct incise_ridge ridge;
 	double *error, total;
-	double plane, mean; /* totals of these */
+	double plane, mean, quadratic; /* totals of these; the last may be NAN */
 };
 
-/* Returns 0, -EDOM, -ECANCELED, -ENOMEM. */
+/*
+ * quadratic is NULL or that law, which outlives the choice: it is preferred where it is not worse by
+ * more than a standard error. Returns 0, -EDOM, -ECANCELED, -ENOMEM.
+ */
 int incise_crossval_choose(const struct incise_basis *basis,
-			   const struct incise_folds *folds,
+			   const struct incise_folds *folds, const double *quadratic,
 			   struct incise_choice *choice);
 
 /* Sum over units. */

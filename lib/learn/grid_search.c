@@ -103,7 +103,8 @@ static int visit(struct race *race, const int *n_mfs)
 	struct incise_choice choice;
 	struct incise_basis basis;
 	struct incise_model *model = make_grid(race, n_mfs, &basis, NULL);
-	int rc = model ? incise_crossval_choose(&basis, &race->folds, &choice) : -errno;
+	int rc = model ? incise_crossval_choose(&basis, &race->folds, NULL, &choice)
+		       : -errno;
 
 	incise_model_free(model);
 	if (rc)
@@ -242,18 +243,25 @@ static double *find_variable(struct incise_variable *v, const struct incise_pair
 }
 
 /*
- * The range of an input without far tails: a speed that was measured wrong once does not spread
- * the functions. Pairs outside are clamped, as inputs of a model are.
+ * The range of an input ends with the last pair before a far tail: a speed that was measured wrong
+ * once does not spread the functions. Pairs outside are clamped, as inputs of a model are.
  */
 static void cut_tails(struct incise_variable *v, const double *sorted, size_t n)
 {
-	double low = sorted[(size_t)(TAIL * (n - 1))],
-	       high = sorted[n - 1 - (size_t)(TAIL * (n - 1))];
+	size_t low = (size_t)(TAIL * (n - 1)), high = n - 1 - low;
+	double reach = REACH * (sorted[high] - sorted[low]);
+	double min = sorted[low] - reach, max = sorted[high] + reach;
 
-	if (!(low < high))
+	if (!(reach > 0))
 		return;
-	v->min = fmax(v->min, low - REACH * (high - low));
-	v->max = fmin(v->max, high + REACH * (high - low));
+	while (low > 0 && sorted[low - 1] >= min)
+		low--;
+	while (high < n - 1 && sorted[high + 1] <= max)
+		high++;
+	if (v->min < min)
+		v->min = sorted[low];
+	if (v->max > max)
+		v->max = sorted[high];
 }
 
 /* Names and ranges of the columns: those of all pairs, if the options have them. */

@@ -350,11 +350,31 @@ static void find_rows(struct incise_lsq *lsq, const struct incise_ridge *ridge,
 	}
 }
 
+/* Rows of √ridge·(p - q), without what is along the free rows. */
+static void find_bound_rows(struct incise_lsq *lsq, const struct incise_ridge *ridge)
+{
+	double by = sqrt(ridge->ridge);
+	int n = ridge->n;
+
+	for (int i = 0; i < n; i++) {
+		double *row = lsq->ridge + (size_t)i * lsq->stride;
+
+		row[i] = by;
+		row[lsq->n] = by * ridge->free[(size_t)ridge->n_free * n + i];
+		for (int f = 0; f < ridge->n_free; f++)
+			for (int k = 0; k < n; k++)
+				row[k] -= by * ridge->free[(size_t)f * n + i] *
+					  ridge->free[(size_t)f * n + k];
+	}
+}
+
 static bool fold_ridge(struct incise_lsq *lsq, const struct incise_ridge *ridge)
 {
 	double *penalty = NULL;
 
-	if (*ridge->n_mfs) {
+	if (ridge->free) {
+		find_bound_rows(lsq, ridge);
+	} else if (*ridge->n_mfs) {
 		penalty = malloc((size_t)ridge->n * ridge->n * sizeof(*penalty));
 		if (!penalty)
 			return false;
@@ -363,7 +383,7 @@ static bool fold_ridge(struct incise_lsq *lsq, const struct incise_ridge *ridge)
 		for (int i = 0; i < ridge->n; i++)
 			lsq->ridge[(size_t)i * (lsq->stride + 1)] = sqrt(ridge->ridge);
 	}
-	fold(lsq, lsq->work, lsq->ridge, ridge->n, true);
+	fold(lsq, lsq->work, lsq->ridge, ridge->n, !ridge->free);
 	free(penalty);
 	return true;
 }

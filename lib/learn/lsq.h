@@ -26,6 +26,12 @@ struct incise_ridge {
 	int n;
 	double mean;
 	int n_mfs[INCISE_MODEL_INPUTS_MAX]; /* all 0: no grid */
+	/*
+	 * Or NULL; else the penalty is ridge·|p - q|², but for differences along n_free orthonormal
+	 * rows of n, which cost nothing; the row after these is q, orthogonal to them.
+	 */
+	const double *free;
+	int n_free;
 };
 
 /*

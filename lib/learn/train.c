@@ -46,6 +46,7 @@ struct learner {
 	struct incise_sample tuned;
 	struct incise_folds folds; /* of that */
 	struct incise_ridge ridge;
+	double *quadratic; /* or NULL */
 };
 
 void incise_train_options_init(struct incise_train_options *options)
@@ -230,7 +231,8 @@ static int choose_ridge(struct learner *l)
 	l->ridge = given;
 	if (l->folds.n < 2)
 		return 0;
-	rc = incise_crossval_choose(&l->basis, &l->folds, &choice);
+	l->quadratic = incise_quadratic(&l->basis, l->scaling.offset, l->scaling.scale);
+	rc = incise_crossval_choose(&l->basis, &l->folds, l->quadratic, &choice);
 	if (rc)
 		return rc;
 	if (isnan(l->options->ridge))
@@ -242,6 +244,7 @@ static int choose_ridge(struct learner *l)
 		unit * sqrt(incise_crossval_total(&l->folds, choice.error));
 	l->report->crossval_plane = unit * sqrt(choice.plane);
 	l->report->crossval_mean = unit * sqrt(choice.mean);
+	l->report->crossval_quadratic = unit * sqrt(choice.quadratic);
 	free(choice.error);
 	return rc;
 }
@@ -320,7 +323,8 @@ static int learn_train(struct learner *l)
 		rc = incise_folds_init(&l->folds, &l->tuned.pairs, l->tuned.groups,
 				       l->options->seed);
 	l->folds.watch = &l->watch;
-	report->crossval_rmse = report->crossval_plane = report->crossval_mean = NAN;
+	report->crossval_rmse = report->crossval_plane = report->crossval_mean =
+		report->crossval_quadratic = NAN;
 	if (!rc)
 		rc = classic ? train_classic(l) : train_default(l);
 	if (!rc)
@@ -402,6 +406,7 @@ int incise_train_sample(struct incise_model *model, const struct incise_pairs *t
 	incise_design_free(&l->design);
 	incise_folds_free(&l->folds);
 	free(l->consequents);
+	free(l->quadratic);
 	incise_sample_free(&l->tuned);
 	failed = l->failed;
 	free(l);

@@ -88,7 +88,8 @@ TrainOptionsStruct, TrainReportStruct = _library.structs(
         int epochs, best_epoch;
         double ridge, train_rmse, check_rmse, condition;
         int parameters, rules_unfired;
-        double train_r2, check_r2, crossval_rmse, crossval_plane, crossval_mean;
+        double train_r2, check_r2, crossval_rmse, crossval_plane, crossval_mean,
+            crossval_quadratic;
         size_t pairs_tuned;
         bool unfired[256];
     };

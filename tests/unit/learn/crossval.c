@@ -163,7 +163,8 @@ TEST(test_choice)
 		}
 		one_rule(&basis, 4);
 		assert_int_equal(incise_folds_init(&folds, &data, NULL, 3), 0);
-		assert_int_equal(incise_crossval_choose(&basis, &folds, &choice), 0);
+		assert_int_equal(incise_crossval_choose(&basis, &folds, NULL, &choice),
+				 0);
 		strength[kind] = choice.ridge.ridge;
 		assert_true(choice.total <= choice.plane && choice.total <= choice.mean);
 		assert_true(incise_crossval_total(&folds, choice.error) == choice.total);
@@ -173,6 +174,55 @@ TEST(test_choice)
 		incise_folds_free(&folds);
 	}
 	assert_true(strength[0] < 100 && strength[1] >= 100 && strength[2] >= 100);
+}
+
+/* Three cuts of one law with noise are best told by it; it goes through 0 and follows the square. */
+TEST(test_quadratic)
+{
+	static double curved[PAIRS * 2];
+	const struct incise_pairs data = {.rows = curved, .n = PAIRS, .n_inputs = 1};
+	/* Of inputs from 2 to 12, and outputs as they are. */
+	const double offset[] = {2, 1}, scale[] = {10, 3};
+	const int n_mfs = 5;
+	struct incise_choice choice;
+	struct incise_folds folds;
+	struct incise_basis basis;
+	struct incise_lsq *lsq;
+	double x[2 * 5], *law;
+	uint64_t seed = 9;
+
+	fill(80);
+	one_rule(&basis, n_mfs);
+	for (int i = 0; i < PAIRS; i++) {
+		double depth = 2 + 10 * rows[2 * i];
+
+		curved[2 * i] = rows[2 * i];
+		curved[2 * i + 1] = (0.2 * depth + 0.1 * depth * depth - 1) / 3 +
+				    incise_random_symmetric(&seed);
+	}
+	law = incise_quadratic(&basis, offset, scale);
+	assert_non_null(law);
+	assert_int_equal(incise_folds_init(&folds, &data, groups, 3), 0);
+	assert_int_equal(incise_crossval_choose(&basis, &folds, law, &choice), 0);
+	assert_true(choice.total == choice.quadratic && choice.ridge.free == law);
+	lsq = incise_lsq_new(10, NULL);
+	incise_basis_fold(&basis, &data, lsq);
+	assert_int_equal(incise_lsq_solve(lsq, &choice.ridge, x), 0);
+	/* The grid has the square to 0.02 of the range's, and noise leaves as much. */
+	for (double u = 0; u <= 1; u += 0.125) {
+		double depth = 2 + 10 * u;
+		double want = (0.2 * depth + 0.1 * depth * depth - 1) / 3;
+		double pair[] = {u, want};
+
+		assert_true(fabs(incise_basis_error(&basis, pair, x)) < 0.2);
+	}
+	incise_lsq_free(lsq);
+	free(choice.error);
+	free(law);
+	incise_folds_free(&folds);
+	/* One function has no square. */
+	one_rule(&basis, 1);
+	assert_null(incise_quadratic(&basis, offset, scale));
 }
 
 TEST(test_spread)

@@ -89,7 +89,7 @@ TEST(test_start)
 	assert_says(err.text, "column y");
 }
 
-/* One glitched row among many neither moves the functions nor widens the ranges much. */
+/* One glitched row among many neither moves the functions nor widens the ranges. */
 TEST(test_a_glitch)
 {
 	static const char *const names[] = {"a", "b", "y"};
@@ -112,7 +112,7 @@ TEST(test_a_glitch)
 		max[glitch] = incise_model_info(model)->input[0].max;
 		incise_model_free(model);
 	}
-	assert_true(fabs(centre[1] - centre[0]) < 0.05 && max[0] <= 1 && max[1] < 1.6);
+	assert_true(fabs(centre[1] - centre[0]) < 0.05 && max[0] <= 1 && max[1] <= 1);
 	/* The even grid of classic has all pairs in its range. */
 	options.classic = true;
 	incise_model_free(incise_train_start(&pairs, names, INCISE_MF_GAUSS, n_mfs,
