@@ -105,8 +105,6 @@ static void parse_search(void *whole, char *text)
 	static const struct cli_option keys[] = {
 		{0, "search type", "KIND", NULL,
 		 CLI_PARSED(struct train_options, how.type, parse_type)},
-		{0, "search starts", "N", NULL,
-		 CLI_INTEGER(struct train_options, how.train.starts, 1, 100)},
 		{0, "search sample", "N", NULL,
 		 CLI_INTEGER(struct train_options, sample, 0, 1000000000)},
 		{0, "search classic", NULL, NULL,
@@ -172,18 +170,18 @@ static const struct cli_option option_table[] = {
 	 "membership functions per input (default: 5,4 for two inputs, else 3 "
 	 "each), or auto: chosen by cross-validation",
 	 CLI_PARSED_BY(parse_mfs)},
-	{0, "epochs", "N", "largest number of epochs (default: 80)",
+	{0, "epochs", "N", "of classic: largest number of epochs (default: 80)",
 	 CLI_INTEGER(struct train_options, how.train.epochs, 1, 100000)},
 	{0, "search", "KEY[=VALUE],...",
-	 "of the membership functions: type=gaussmf (default) or gbellmf; starts=N, "
-	 "starting points (default: 3); sample=N, pairs at random, 0 for all "
-	 "(default: 3000); classic: train as MATLAB's anfis does, with no scaling "
-	 "and a ridge of 1e-6, and the held-out data choose the epoch; step=K, with "
-	 "classic: initial step (default: 0.01)",
+	 "of the membership functions: type=gaussmf (default) or gbellmf; sample=N, "
+	 "pairs at random that select the penalty, 0 for all (default: 3000); "
+	 "classic: train as MATLAB's anfis does, with no scaling and a ridge of "
+	 "1e-6, and the held-out data choose the epoch; step=K, with classic: "
+	 "initial step (default: 0.01)",
 	 CLI_PARSED_BY(parse_search)},
 	{0, "ridge", "R",
-	 "one ridge on scaled data (default: an average of fits, weighted by "
-	 "cross-validation)",
+	 "ridge on scaled data (default: a penalty on the differences of neighbouring "
+	 "rules, by cross-validation)",
 	 CLI_NUMBER(struct train_options, how.train.ridge, 0, 1e12)},
 	{0, "share", "I/N|mpi",
 	 "use share I of N of the sources, from 1, for the tasks of a job array, "
@@ -654,10 +652,6 @@ static void report_train_json(const struct train_options *options,
 	json_set_integer(object, "epochs", report->epochs);
 	json_set_integer(object, "best_epoch", report->best_epoch);
 	json_set_number(object, "ridge", report->ridge);
-	json_set_integer(object, "averaged", report->averaged);
-	json_set_number(object, "plane_weight", report->plane_weight);
-	json_set_number(object, "mean_weight", report->mean_weight);
-	json_set_number(object, "cut_weight", report->cut_weight);
 	json_set_number(object, "condition", report->condition);
 	json_set_integer(object, "rules_unfired", report->rules_unfired);
 	for (int r = 0; r < incise_model_info(model)->n_rules; r++)
@@ -668,9 +662,13 @@ static void report_train_json(const struct train_options *options,
 		json_array_append_new(mfs,
 				      json_integer(incise_model_info(model)->n_mfs[i]));
 	json_object_set_new(object, "mf", mfs);
-	json_set_integer(object, "start", report->start);
 	json_set_integer(object, "pairs_tuned", report->pairs_tuned);
+	json_set_integer(object, "clamped", trained->clamped);
 	set_in_unit(object, "crossval_rms_error", options, report->crossval_rmse);
+	set_in_unit(object, "crossval_plane_rms_error", options, report->crossval_plane);
+	set_in_unit(object, "crossval_mean_rms_error", options, report->crossval_mean);
+	set_in_unit(object, "crossval_quadratic_rms_error", options,
+		    report->crossval_quadratic);
 	set_in_unit(object, "noise", options, trained->noise);
 	json_set_number(object, "interval95_coverage", trained->coverage);
 	json_object_set_new(object, "interval95_thirds",
@@ -688,6 +686,28 @@ static void print_row(const char *name, double train, double check)
 	printf("  %-22s", name);
 	isnan(train) ? printf("%12s", "") : printf("%12.5g", train);
 	isnan(check) ? printf("\n") : printf("%14.5g\n", check);
+}
+
+/* The law that the model is, or the kind of its penalty. */
+static const char *name_penalty(const struct train_options *options,
+				const struct incise_train_report *report)
+{
+	if (options->how.train.classic || !isnan(options->how.train.ridge))
+		return "ridge";
+	return report->crossval_rmse == report->crossval_quadratic ? "quadratic, penalty"
+	       : report->crossval_rmse == report->crossval_plane   ? "plane, penalty"
+	       : report->crossval_rmse == report->crossval_mean	   ? "mean, penalty"
+								   : "penalty";
+}
+
+static void print_clamped(const struct incise_trained *trained)
+{
+	size_t n = incise_corpus_side(trained->corpus, false)->sample.pairs.n;
+
+	if (trained->clamped)
+		printf("%llu of %zu pairs are outside the ranges of the model, and count "
+		       "as their nearest ends\n",
+		       (unsigned long long)trained->clamped, n);
 }
 
 static void report_train_text(const struct train_options *options,
@@ -722,15 +742,21 @@ static void report_train_text(const struct train_options *options,
 	if (trained->group && !options->how.group)
 		printf("\ngrouped by %s, as no --group is given (none: each pair by itself)",
 		       trained->group);
-	printf("\n%s, %s, %s (kept %d), ",
-	       cli_count(incise_model_info(model)->n_rules, "rule"),
-	       cli_count(report->parameters, "parameter"),
-	       cli_count(report->epochs, "epoch"), report->best_epoch);
-	report->averaged ? printf("average of %s", cli_count(report->averaged, "fit"))
-			 : printf("ridge %g", report->ridge);
-	printf(", condition %.2g\n", report->condition);
+	printf("\n");
+	print_clamped(trained);
+	printf("%s, %s, ", cli_count(incise_model_info(model)->n_rules, "rule"),
+	       cli_count(report->parameters, "parameter"));
+	if (options->how.train.classic)
+		printf("%s (kept %d), ", cli_count(report->epochs, "epoch"),
+		       report->best_epoch);
+	printf("%s %g, condition %.2g\n", name_penalty(options, report), report->ridge,
+	       report->condition);
 	printf("  %-22s%12s%14s\n", "RMSE", "training", check ? unseen : "");
 	print_row("this model", report->train_rmse, report->check_rmse);
+	if (!isnan(report->crossval_rmse))
+		printf("  cross-validated: %.5g; quadratic %.5g, plane %.5g, mean %.5g\n",
+		       report->crossval_rmse, report->crossval_quadratic,
+		       report->crossval_plane, report->crossval_mean);
 	snprintf(knn, sizeof(knn), "%d nearest", baselines->k);
 	print_row("mean", check ? NAN : baselines->mean, check ? baselines->mean : NAN);
 	print_row("linear regression", check ? NAN : baselines->linear,
@@ -757,8 +783,7 @@ static void report_train_text(const struct train_options *options,
 		       trained->propagated.calibration, unit_of_train(options->target),
 		       trained->propagated.rig, unit_of_train(options->target));
 	if (report->pairs_tuned && report->pairs_tuned < fit->different)
-		printf("  membership functions from a random %zu of the pairs, consequents "
-		       "from all\n",
+		printf("  penalty from a random %zu of the pairs, consequents from all\n",
 		       report->pairs_tuned);
 	cli_written();
 }
@@ -810,8 +835,10 @@ static void run_training(struct train_options *options,
 	cli_fail_with(&err);
 }
 
-static void save_factor(const struct train_options *options, struct incise_factor *factor)
+static void save_factor(const struct train_options *options,
+			const struct incise_trained *trained)
 {
+	struct incise_factor *factor = trained->factor;
 	struct incise_factor_info info;
 	struct incise_error err = {0};
 
@@ -822,6 +849,7 @@ static void save_factor(const struct train_options *options, struct incise_facto
 	printf("%s: %s of %s, premises %.12s\n", options->data,
 	       cli_count(info.rows, "pair"), cli_count(info.groups, "group"),
 	       info.premises);
+	print_clamped(trained);
 	if (info.parts < INCISE_FACTOR_FOLDS)
 		printf("%d of %d parts, as small ones would reveal their pairs: a merge "
 		       "cross-validates over these\n",
@@ -896,7 +924,7 @@ int main(int argc, char **argv)
 						 : sources[0].name;
 	run_training(&options, sources, &trained, &history);
 	if (options.factor && trained.factor && (!job || !job->rank)) {
-		save_factor(&options, trained.factor);
+		save_factor(&options, &trained);
 	} else if (trained.model) {
 		save_model(&options, &trained, history);
 		report_model(&options, &trained);

@@ -14,15 +14,10 @@
 #include "anfis.h"
 #include "basis.h"
 
-/* Firing strengths are kept from the fit to the gradient for so many numbers: 8 MB. */
-#define KEPT_MAX (1 << 20)
-
 struct anfis_state {
 	struct incise_basis basis, best;
 	struct incise_lsq *lsq;
 	int n_linear;
-	size_t n_kept; /* pairs whose firing strengths are kept */
-	double *kept;
 	double *x, *best_x; /* consequents */
 	double *gradient;   /* of the premises */
 	double step;
@@ -31,22 +26,12 @@ struct anfis_state {
 	int raised, lowered;
 };
 
-/* Firing strengths of pair n: kept, or computed into w. */
-static const double *strengths(const struct anfis_state *s, size_t n, const double *x,
-			       double *w)
-{
-	if (n < s->n_kept)
-		return s->kept + n * s->basis.n_rules;
-	incise_basis_firing(&s->basis, x, w);
-	return w;
-}
-
 static int solve_anfis(struct anfis_state *s, const struct incise_pairs *pairs,
 		       double ridge)
 {
-	struct incise_ridge plain = {ridge, 1, s->n_linear, 1};
+	struct incise_ridge plain = {.ridge = ridge, .n = s->n_linear};
 
-	incise_basis_fold(&s->basis, pairs, s->lsq, s->kept, s->n_kept);
+	incise_basis_fold(&s->basis, pairs, s->lsq);
 	return incise_lsq_solve(s->lsq, &plain, s->x);
 }
 
@@ -85,16 +70,17 @@ static void add_gradient(struct anfis_state *s, const double *x, const double *w
 static double gradient(struct anfis_state *s, const struct incise_pairs *pairs,
 		       struct incise_watch *watch)
 {
-	double buffer[INCISE_MODEL_RULES_MAX], f[INCISE_MODEL_RULES_MAX], sum = 0;
+	double w[INCISE_MODEL_RULES_MAX], f[INCISE_MODEL_RULES_MAX], sum = 0;
 	int d = pairs->n_inputs;
 
 	memset(s->gradient, 0, s->basis.n_premises * sizeof(double));
 	for (size_t n = 0; n < pairs->n && !incise_watch_count(watch, 10 * s->n_linear);
 	     n++) {
 		const double *x = pairs->rows + n * (d + 1);
-		const double *w = strengths(s, n, x, buffer);
-		double y = incise_basis_output(&s->basis, w, x, s->x, f);
+		double y;
 
+		incise_basis_firing(&s->basis, x, w);
+		y = incise_basis_output(&s->basis, w, x, s->x, f);
 		sum += (y - x[d]) * (y - x[d]);
 		add_gradient(s, x, w, f, y, y - x[d]);
 	}
@@ -176,7 +162,6 @@ static void state_free(struct anfis_state *s)
 	if (!s)
 		return;
 	incise_lsq_free(s->lsq);
-	free(s->kept);
 	free(s->x);
 	free(s->best_x);
 	free(s->gradient);
@@ -192,16 +177,12 @@ int incise_anfis_run(struct incise_model *model, struct incise_anfis *anfis)
 		goto out;
 	s->step = anfis->step;
 	s->n_linear = s->basis.n_rules * (s->basis.n_inputs + 1);
-	s->n_kept = KEPT_MAX / s->basis.n_rules;
-	if (s->n_kept > anfis->train->n)
-		s->n_kept = anfis->train->n;
 	rc = -ENOMEM;
 	s->lsq = incise_lsq_new(s->n_linear, anfis->watch);
-	s->kept = malloc(s->n_kept * s->basis.n_rules * sizeof(double));
 	s->x = malloc(s->n_linear * sizeof(double));
 	s->best_x = malloc(s->n_linear * sizeof(double));
 	s->gradient = malloc(s->basis.n_premises * sizeof(double));
-	if (!s->lsq || !s->kept || !s->x || !s->best_x || !s->gradient)
+	if (!s->lsq || !s->x || !s->best_x || !s->gradient)
 		goto out;
 	anfis->best_epoch = 0;
 	rc = 0;

@@ -50,7 +50,7 @@ static int linear_rmse(const struct incise_pairs *train, const struct incise_pai
 	int d = train->n_inputs;
 	struct incise_lsq *lsq = incise_lsq_new(d + 1, NULL);
 	/* Just enough ridge to be defined where inputs depend on each other. */
-	struct incise_ridge ridge = {1e-9 * train->n, 1, d + 1, 1};
+	struct incise_ridge ridge = {.ridge = 1e-9 * train->n, .n = d + 1};
 	double p[INCISE_MODEL_INPUTS_MAX + 1], sum = 0;
 	int rc = lsq ? 0 : -ENOMEM;
 

@@ -11,8 +11,9 @@
  */
 #include <errno.h>
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
-#include "../base/random.h"
+#include "../base/ascending.h"
 #include "basis.h"
 
 /* As lib/model has them: distances beyond are not distinguished, sums stay finite. */
@@ -274,15 +275,14 @@ double incise_basis_error(const struct incise_basis *basis, const double *x,
 }
 
 void incise_basis_fold(const struct incise_basis *basis, const struct incise_pairs *pairs,
-		       struct incise_lsq *lsq, double *kept, size_t n_kept)
+		       struct incise_lsq *lsq)
 {
-	double own[INCISE_MODEL_RULES_MAX];
+	double w[INCISE_MODEL_RULES_MAX];
 	int d = pairs->n_inputs;
 
 	incise_lsq_reset(lsq);
 	for (size_t n = 0; n < pairs->n; n++) {
 		const double *x = pairs->rows + n * (d + 1);
-		double *w = n < n_kept ? kept + n * basis->n_rules : own;
 
 		incise_basis_firing(basis, x, w);
 		incise_basis_row(basis, w, x, incise_lsq_row(lsq));
@@ -301,113 +301,49 @@ int incise_basis_set_consequents(struct incise_model *model, const double *conse
 	return 0;
 }
 
-/* --- bounds and steps --- */
+/* --- placement --- */
 
-#define LEAST_GAP 0.25 /* between centres, in even spacings */
-#define LEAST_OVERLAP 0.1
-#define MOST_WIDTH 4.0 /* in widths of the even grid */
-#define JITTER 0.3
+/* Share of the even spacing in that of the centres. */
+#define EVEN 0.1
 
-static double spacing(const struct incise_basis *basis, int input)
+static void place_input(struct incise_basis *basis, int input, const double *sorted,
+			size_t n_pairs)
 {
+	double centre[INCISE_MODEL_MFS_MAX];
 	int n = basis->n_mfs[input];
-
-	return n > 1 ? 1.0 / (n - 1) : 1.0;
-}
-
-void incise_premises_scale(const struct incise_basis *basis, double *scale)
-{
-	for (int i = 0; i < basis->n_inputs; i++)
-		for (int k = 0; k < basis->n_mfs[i]; k++) {
-			int at = basis->at[i][k], c = incise_basis_centre(basis, i, k);
-
-			for (int j = at; j < c; j++)
-				scale[j] = basis->p[j];
-			scale[c] = spacing(basis, i);
-		}
-}
-
-static double clamp(double x, double min, double max)
-{
-	return fmax(min, fmin(max, x));
-}
-
-static void order_centres(struct incise_basis *basis, int input)
-{
-	int n = basis->n_mfs[input];
-	double gap = LEAST_GAP * spacing(basis, input), bound = 0;
 
 	for (int k = 0; k < n; k++) {
-		double *c = &basis->p[incise_basis_centre(basis, input, k)];
+		double even = (double)k / (n - 1);
+		double quantile = k == 0       ? 0
+				  : k == n - 1 ? 1
+					       : sorted[(size_t)(even * (n_pairs - 1))];
 
-		*c = fmax(*c, bound);
-		bound = *c + gap;
+		centre[k] = EVEN * even + (1 - EVEN) * quantile;
 	}
-	bound = 1;
-	for (int k = n - 1; k >= 0; k--) {
-		double *c = &basis->p[incise_basis_centre(basis, input, k)];
+	for (int k = 0; k < n; k++) {
+		double left = k ? centre[k] - centre[k - 1] : HUGE_VAL,
+		       right = k < n - 1 ? centre[k + 1] - centre[k] : HUGE_VAL,
+		       half = fmin(left, right) / 2;
+		double *p = basis->p + basis->at[input][k];
 
-		*c = fmin(*c, bound);
-		bound = *c - gap;
-	}
-}
-
-/* The distance that function k has to reach: half-way to its neighbours, or to the end. */
-static double reach(const struct incise_basis *basis, int input, int k)
-{
-	double c = basis->p[incise_basis_centre(basis, input, k)];
-	double left = c, right = 1 - c;
-
-	if (k > 0)
-		left = (c - basis->p[incise_basis_centre(basis, input, k - 1)]) / 2;
-	if (k + 1 < basis->n_mfs[input])
-		right = (basis->p[incise_basis_centre(basis, input, k + 1)] - c) / 2;
-	return fmax(left, right);
-}
-
-void incise_premises_project(struct incise_basis *basis)
-{
-	for (int i = 0; i < basis->n_inputs; i++) {
-		double half = spacing(basis, i) / 2;
-
-		order_centres(basis, i);
-		for (int k = 0; k < basis->n_mfs[i]; k++) {
-			double *p = basis->p + basis->at[i][k], least, most;
-
-			if (basis->type[i][k] == INCISE_MF_GAUSS) {
-				least = reach(basis, i, k) /
-					sqrt(-2 * log(LEAST_OVERLAP));
-				most = MOST_WIDTH * half / sqrt(2 * M_LN2);
-			} else {
-				p[1] = clamp(p[1], 1, 8);
-				least = reach(basis, i, k) /
-					pow(1 / LEAST_OVERLAP - 1, 0.5 / p[1]);
-				most = MOST_WIDTH * half;
-			}
-			/* If a wide gap asks for more than the most, overlap wins. */
-			p[0] = fmax(least, fmin(most, p[0]));
-		}
+		p[0] = basis->type[input][k] == INCISE_MF_GAUSS ? half / sqrt(2 * M_LN2)
+								: half;
+		basis->p[incise_basis_centre(basis, input, k)] = centre[k];
 	}
 }
 
-void incise_premises_step(struct incise_basis *basis, const double *step)
+int incise_basis_place(struct incise_basis *basis, const struct incise_pairs *pairs)
 {
-	for (int i = 0; i < basis->n_inputs; i++)
-		for (int k = 0; k < basis->n_mfs[i]; k++) {
-			int at = basis->at[i][k], c = incise_basis_centre(basis, i, k);
+	double *column = malloc(pairs->n * sizeof(*column));
 
-			for (int j = at; j < c; j++)
-				basis->p[j] *= exp(step[j]);
-			basis->p[c] += step[c] * spacing(basis, i);
-		}
-	incise_premises_project(basis);
-}
-
-void incise_premises_jitter(struct incise_basis *basis, uint64_t seed)
-{
-	double step[INCISE_MODEL_INPUTS_MAX * INCISE_MODEL_MFS_MAX * BASIS_PARAMS_MAX];
-
-	for (int i = 0; i < basis->n_premises; i++)
-		step[i] = JITTER * incise_random_symmetric(&seed);
-	incise_premises_step(basis, step);
+	for (int i = 0; i < basis->n_inputs && column; i++) {
+		if (basis->n_mfs[i] < 2)
+			continue;
+		for (size_t n = 0; n < pairs->n; n++)
+			column[n] = pairs->rows[n * (pairs->n_inputs + 1) + i];
+		qsort(column, pairs->n, sizeof(*column), ascending);
+		place_input(basis, i, column, pairs->n);
+	}
+	free(column);
+	return column ? 0 : -ENOMEM;
 }

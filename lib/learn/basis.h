@@ -60,34 +60,19 @@ double incise_basis_output(const struct incise_basis *basis, const double *w,
 double incise_basis_error(const struct incise_basis *basis, const double *x,
 			  const double *consequents);
 
-/* Fold the rows of all pairs; strengths of the first n_kept pairs are left in kept. */
+/* Fold the rows of all pairs. */
 void incise_basis_fold(const struct incise_basis *basis, const struct incise_pairs *pairs,
-		       struct incise_lsq *lsq, double *kept, size_t n_kept);
+		       struct incise_lsq *lsq);
 
 /* Set all consequents of a model; -EDOM when one is not finite. */
 int incise_basis_set_consequents(struct incise_model *model, const double *consequents);
 
 /*
- * Moves of the premises while they learn, on inputs scaled to [0, 1]. A step is in
- * coordinates where all premises are alike: widths and slopes by their logarithm, so that they
- * stay positive, and centres in units of the even spacing.
+ * Move the functions of a grid to where the pairs are, on inputs from 0 to 1: centres at even
+ * quantiles, with a tenth of the even spacing so that none coincide, and widths that
+ * cross at a half with the nearer neighbour. 0 or -ENOMEM.
  */
-
-/* ∂p/∂step of each premise. */
-void incise_premises_scale(const struct incise_basis *basis, double *scale);
-
-/* Take a step and bring the functions back into their bounds. */
-void incise_premises_step(struct incise_basis *basis, const double *step);
-
-/*
- * The bounds: centres in order within the range, a quarter of the even spacing apart at
- * least; a function still 0.1 half-way to its neighbours and at the end of the range next
- * to it; no wider than four times the even grid's; slopes of bells from 1 to 8.
- */
-void incise_premises_project(struct incise_basis *basis);
-
-/* Another start, by seed: centres by up to 0.3 spacings, widths by up to a third. */
-void incise_premises_jitter(struct incise_basis *basis, uint64_t seed);
+int incise_basis_place(struct incise_basis *basis, const struct incise_pairs *pairs);
 
 /* The weight of a pair. */
 static inline double incise_pairs_weight(const struct incise_pairs *pairs, size_t i)

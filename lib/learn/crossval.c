@@ -8,10 +8,6 @@
 #include <string.h>
 #include "crossval.h"
 #include "../base/random.h"
-#include "varpro.h"
-
-/* Up to so many pairs the division into folds is repeated. */
-#define REPEATED_MAX 1000
 
 /* Number the groups that occur from 0, in order; returns how many, or -ENOMEM. */
 static int count_groups(const int *groups, size_t n, int *unit)
@@ -37,36 +33,35 @@ static int count_groups(const int *groups, size_t n, int *unit)
 }
 
 /* Hold out the pairs whose element (group, or the pair itself) falls into fold f. */
-static int fill_fold(struct incise_folds *folds, int at, const struct incise_pairs *pairs,
-		     const size_t *place, const int *unit, bool grouped, int n_folds,
-		     int f)
+static int fill_fold(struct incise_folds *folds, int f, const struct incise_pairs *pairs,
+		     const size_t *place, const int *unit, bool grouped)
 {
 	size_t width = pairs->n_inputs + 1, n_fit = 0, n_held = 0;
 	/* Weights follow the rows. */
 	double *fit = malloc(pairs->n * (width + 1) * sizeof(*fit));
 	double *held = malloc(pairs->n * (width + 1) * sizeof(*held));
 
-	folds->fit[at].rows = fit;
-	folds->held[at].rows = held;
-	folds->unit[at] = malloc(pairs->n * sizeof(*unit));
-	if (!fit || !held || !folds->unit[at])
+	folds->fit[f].rows = fit;
+	folds->held[f].rows = held;
+	folds->unit[f] = malloc(pairs->n * sizeof(*unit));
+	if (!fit || !held || !folds->unit[f])
 		return -ENOMEM;
 	for (size_t i = 0; i < pairs->n; i++) {
 		const double *row = pairs->rows + width * i;
 
-		if (place[grouped ? (size_t)unit[i] : i] % n_folds != (size_t)f) {
+		if (place[grouped ? (size_t)unit[i] : i] % folds->n != (size_t)f) {
 			fit[width * pairs->n + n_fit] = incise_pairs_weight(pairs, i);
 			memcpy(fit + width * n_fit++, row, width * sizeof(*row));
 			continue;
 		}
-		folds->unit[at][n_held] = grouped ? unit[i] : (int)i;
+		folds->unit[f][n_held] = grouped ? unit[i] : (int)i;
 		held[width * pairs->n + n_held] = incise_pairs_weight(pairs, i);
 		memcpy(held + width * n_held++, row, width * sizeof(*row));
 	}
-	folds->fit[at] = (struct incise_pairs){fit, n_fit, pairs->n_inputs,
-					       fit + width * pairs->n};
-	folds->held[at] = (struct incise_pairs){held, n_held, pairs->n_inputs,
-						held + width * pairs->n};
+	folds->fit[f] = (struct incise_pairs){fit, n_fit, pairs->n_inputs,
+					      fit + width * pairs->n};
+	folds->held[f] = (struct incise_pairs){held, n_held, pairs->n_inputs,
+					       held + width * pairs->n};
 	folds->n_held += n_held;
 	return 0;
 }
@@ -76,7 +71,7 @@ int incise_folds_init(struct incise_folds *folds, const struct incise_pairs *pai
 {
 	int *unit = malloc(pairs->n * sizeof(*unit));
 	size_t *place = malloc(pairs->n * sizeof(*place));
-	int n_groups = 0, n_folds, repeats, rc = unit && place ? 0 : -ENOMEM;
+	int n_groups = 0, rc = unit && place ? 0 : -ENOMEM;
 	size_t elements = pairs->n;
 
 	memset(folds, 0, sizeof(*folds));
@@ -86,18 +81,12 @@ int incise_folds_init(struct incise_folds *folds, const struct incise_pairs *pai
 	}
 	if (n_groups >= 2)
 		elements = n_groups;
-	n_folds = elements < CROSSVAL_FOLDS ? (int)elements : CROSSVAL_FOLDS;
-	/* With no more elements than folds there is one division only. */
-	repeats = elements > CROSSVAL_FOLDS && pairs->n <= REPEATED_MAX ? CROSSVAL_REPEATS
-									: 1;
-	for (int repeat = 0; repeat < repeats && !rc; repeat++) {
-		incise_random_shuffle(place, elements, seed + repeat);
-		for (int f = 0; f < n_folds && !rc; f++)
-			rc = fill_fold(folds, folds->n++, pairs, place, unit,
-				       n_groups >= 2, n_folds, f);
-	}
+	folds->n = elements < CROSSVAL_FOLDS ? (int)elements : CROSSVAL_FOLDS;
+	if (!rc)
+		incise_random_shuffle(place, elements, seed);
+	for (int f = 0; f < folds->n && !rc; f++)
+		rc = fill_fold(folds, f, pairs, place, unit, n_groups >= 2);
 	folds->n_units = (int)elements;
-	folds->cuts = n_groups >= 2;
 	free(unit);
 	free(place);
 	return rc;
@@ -105,156 +94,197 @@ int incise_folds_init(struct incise_folds *folds, const struct incise_pairs *pai
 
 void incise_folds_free(struct incise_folds *folds)
 {
-	for (int f = 0; f < CROSSVAL_MAX; f++) {
+	for (int f = 0; f < CROSSVAL_FOLDS; f++) {
 		free((void *)folds->fit[f].rows);
 		free((void *)folds->held[f].rows);
 		free(folds->unit[f]);
 	}
 }
 
-/* Add the squared errors of fold f's held pairs. */
-static void add_errors(const struct incise_folds *folds, int f,
-		       const struct incise_basis *basis, const double *consequents,
-		       double *error)
+/* Fits without each fold. */
+struct fits {
+	const struct incise_basis *basis;
+	const struct incise_folds *folds;
+	struct incise_lsq *lsq; /* of the pairs outside a fold */
+	double *x, *phi;	/* a solution; a row */
+	int n;
+};
+
+static int fits_init(struct fits *fits, const struct incise_basis *basis,
+		     const struct incise_folds *folds)
 {
-	const struct incise_pairs *held = &folds->held[f];
+	int n = basis->n_rules * (basis->n_inputs + 1);
+
+	*fits = (struct fits){basis,
+			      folds,
+			      incise_lsq_new(n, folds->watch),
+			      malloc(n * sizeof(double)),
+			      malloc(n * sizeof(double)),
+			      n};
+	return fits->lsq && fits->x && fits->phi ? 0 : -ENOMEM;
+}
+
+static void fits_free(struct fits *fits)
+{
+	incise_lsq_free(fits->lsq);
+	free(fits->x);
+	free(fits->phi);
+}
+
+static int fold_others(struct fits *fits, int f)
+{
+	incise_basis_fold(fits->basis, &fits->folds->fit[f], fits->lsq);
+	return incise_watch_count(fits->folds->watch, 0) ? -ECANCELED : 0;
+}
+
+/* Add the squared errors of fold f's held pairs. */
+static void add_errors(const struct fits *fits, int f, double *error)
+{
+	const struct incise_pairs *held = &fits->folds->held[f];
 
 	for (size_t i = 0; i < held->n; i++) {
 		const double *x = held->rows + i * (held->n_inputs + 1);
-		double e = incise_basis_error(basis, x, consequents);
+		double e = incise_basis_error(fits->basis, x, fits->x);
 
-		error[folds->unit[f][i]] += incise_pairs_weight(held, i) * e * e;
+		error[fits->folds->unit[f][i]] += incise_pairs_weight(held, i) * e * e;
 	}
-}
-
-static int go_on(const struct incise_folds *folds)
-{
-	return incise_watch_count(folds->watch, 0) ? -ECANCELED : 0;
 }
 
 int incise_crossval_ridges(const struct incise_basis *basis,
 			   const struct incise_folds *folds,
 			   const struct incise_ridge *ridges, int n, double *error)
 {
-	int n_linear = basis->n_rules * (basis->n_inputs + 1);
-	struct incise_lsq *lsq = incise_lsq_new(n_linear, folds->watch);
-	double *x = malloc(n_linear * sizeof(*x));
-	int rc = lsq && x ? 0 : -ENOMEM;
+	struct fits fits;
+	int rc = fits_init(&fits, basis, folds);
 
 	memset(error, 0, (size_t)n * folds->n_units * sizeof(*error));
 	for (int f = 0; f < folds->n && !rc; f++) {
-		rc = go_on(folds);
-		incise_basis_fold(basis, &folds->fit[f], lsq, NULL, 0);
+		rc = fold_others(&fits, f);
 		for (int i = 0; i < n && !rc; i++) {
-			rc = incise_lsq_solve(lsq, &ridges[i], x);
+			rc = incise_lsq_solve(fits.lsq, &ridges[i], fits.x);
 			if (!rc)
-				add_errors(folds, f, basis, x,
-					   error + (size_t)i * folds->n_units);
+				add_errors(&fits, f, error + (size_t)i * folds->n_units);
 		}
 	}
-	incise_lsq_free(lsq);
-	free(x);
+	fits_free(&fits);
 	return rc;
 }
 
-struct search {
-	const struct incise_folds *folds;
-	int fold;
-	double *error;
-};
-
-static bool add_epoch(void *user, int epoch, const struct incise_basis *basis,
-		      const double *consequents)
+static int add_ratios(struct fits *fits, int f, const struct incise_ridge *ridge,
+		      double *ratios)
 {
-	struct search *s = user;
-
-	add_errors(s->folds, s->fold, basis, consequents,
-		   s->error + (size_t)(epoch - 1) * s->folds->n_units);
-	return true;
-}
-
-/* The errors of fold f's units at an epoch, again at the later ones. */
-static void repeat(const struct incise_folds *folds, int f, double *error, int epoch,
-		   int epochs, bool *mine)
-{
-	memset(mine, 0, folds->n_units * sizeof(*mine));
-	for (size_t i = 0; i < folds->held[f].n; i++)
-		mine[folds->unit[f][i]] = true;
-	for (int e = epoch; e < epochs; e++)
-		for (int u = 0; u < folds->n_units; u++)
-			if (mine[u])
-				error[(size_t)e * folds->n_units + u] =
-					error[(size_t)(epoch - 1) * folds->n_units + u];
-}
-
-static int find_ratios(const struct incise_folds *folds, int f,
-		       const struct incise_basis *basis, const double *consequents,
-		       const struct incise_ridge *ridge, double *ratios)
-{
-	const struct incise_pairs *held = &folds->held[f];
+	const struct incise_pairs *held = &fits->folds->held[f];
 	double w[INCISE_MODEL_RULES_MAX];
-	int d = held->n_inputs, n = basis->n_rules * (d + 1), stride, rc = -ENOMEM;
-	struct incise_lsq *lsq = incise_lsq_new(n, folds->watch);
-	double *phi = malloc(n * sizeof(*phi));
-	const double *factor;
+	int stride;
+	const double *factor = incise_lsq_factor(fits->lsq, ridge, &stride);
 
-	if (!lsq || !phi)
-		goto out;
-	rc = -EDOM;
-	incise_basis_fold(basis, &folds->fit[f], lsq, NULL, 0);
-	factor = incise_lsq_factor(lsq, ridge, &stride);
-	if (!factor)
-		goto out;
-	rc = 0;
+	if (!factor || incise_lsq_back(factor, stride, fits->n, fits->n, fits->x))
+		return -EDOM;
 	for (size_t i = 0;
-	     i < held->n && !incise_watch_count(folds->watch, (double)n * n); i++) {
-		const double *x = held->rows + i * (d + 1);
-		double e = incise_basis_error(basis, x, consequents);
+	     i < held->n && !incise_watch_count(fits->folds->watch, pow(fits->n, 2));
+	     i++) {
+		const double *x = held->rows + i * (held->n_inputs + 1);
 
-		incise_basis_firing(basis, x, w);
-		incise_basis_row(basis, w, x, phi);
-		ratios[i] = e / sqrt(1 + incise_lsq_leverage(factor, stride, n, phi));
+		incise_basis_firing(fits->basis, x, w);
+		incise_basis_row(fits->basis, w, x, fits->phi);
+		ratios[i] =
+			incise_basis_error(fits->basis, x, fits->x) /
+			sqrt(1 + incise_lsq_leverage(factor, stride, fits->n, fits->phi));
 	}
-out:
-	incise_lsq_free(lsq);
-	free(phi);
-	return rc;
+	return 0;
 }
 
-int incise_crossval_search(const struct incise_basis *basis,
+int incise_crossval_ratios(const struct incise_basis *basis,
 			   const struct incise_folds *folds,
-			   const struct incise_ridge *ridge, int epochs, double *error,
-			   double *ratios)
+			   const struct incise_ridge *ridge, double *ratios)
 {
-	int n = basis->n_rules * (basis->n_inputs + 1);
-	double *consequents = malloc(n * sizeof(*consequents));
-	bool *mine = malloc(folds->n_units * sizeof(*mine));
-	int rc = consequents && mine ? 0 : -ENOMEM;
+	struct fits fits;
+	int rc = fits_init(&fits, basis, folds);
 
-	memset(error, 0, (size_t)epochs * folds->n_units * sizeof(*error));
 	for (int f = 0; f < folds->n && !rc; f++) {
-		struct search search = {folds, f, error};
-		struct incise_varpro varpro = {.pairs = &folds->fit[f],
-					       .ridge = ridge,
-					       .epochs = epochs,
-					       .each = add_epoch,
-					       .user = &search,
-					       .watch = folds->watch};
-		struct incise_basis trial = *basis;
-
-		rc = go_on(folds);
+		rc = fold_others(&fits, f);
 		if (!rc)
-			rc = incise_varpro_run(&trial, consequents, &varpro);
-		if (rc)
-			break;
-		repeat(folds, f, error, varpro.run, epochs, mine);
-		if (!ratios)
-			continue;
-		rc = find_ratios(folds, f, &trial, consequents, ridge, ratios);
+			rc = add_ratios(&fits, f, ridge, ratios);
 		ratios += folds->held[f].n;
 	}
-	free(consequents);
-	free(mine);
+	fits_free(&fits);
+	return rc;
+}
+
+/* --- the ridge --- */
+
+/* The mean of the rules' consequents, a plane, is held down just enough to be defined. */
+#define PLANE 1e-3
+
+/* So strong that rules do not differ. */
+#define RIGID 1e5
+
+void incise_crossval_settings(const struct incise_basis *basis,
+			      struct incise_ridge *ridges)
+{
+	for (int i = 0; i < CROSSVAL_RIDGES; i++) {
+		ridges[i] = (struct incise_ridge){
+			.ridge = fmin(1e-3 * pow(10, i), RIGID),
+			.mean = i == CROSSVAL_RIDGES - 1 ? RIGID : PLANE,
+			.n = basis->n_rules * (basis->n_inputs + 1),
+		};
+		memcpy(ridges[i].n_mfs, basis->n_mfs, sizeof(ridges[i].n_mfs));
+	}
+}
+
+/* Take an error row for the one that is kept. */
+static void keep_setting(struct incise_choice *choice, const struct incise_ridge *ridge,
+			 const double *error, double total, int n_units)
+{
+	choice->ridge = *ridge;
+	choice->total = total;
+	memmove(choice->error, error, n_units * sizeof(*error));
+}
+
+/* Totals in the order of the settings: the plane, the mean and the quadratic are the last. */
+static void choose_setting(const struct incise_folds *folds,
+			   const struct incise_ridge *ridges, const double *error, int n,
+			   struct incise_choice *choice)
+{
+	for (int i = 0; i < n; i++, error += folds->n_units) {
+		double total = incise_crossval_total(folds, error), clear = 0;
+
+		if (i == CROSSVAL_RIDGES - 2)
+			choice->plane = total;
+		else if (i == CROSSVAL_RIDGES - 1)
+			choice->mean = total;
+		else if (i == CROSSVAL_RIDGES)
+			choice->quadratic = total;
+		if (i == CROSSVAL_RIDGES)
+			clear = incise_crossval_spread(folds, error, choice->error);
+		if (total < choice->total + clear)
+			keep_setting(choice, &ridges[i], error, total, folds->n_units);
+	}
+}
+
+int incise_crossval_choose(const struct incise_basis *basis,
+			   const struct incise_folds *folds, const double *quadratic,
+			   struct incise_choice *choice)
+{
+	struct incise_ridge ridges[CROSSVAL_RIDGES + 1];
+	int n = CROSSVAL_RIDGES + (quadratic != NULL), rc;
+	double *error = malloc((size_t)n * folds->n_units * sizeof(*error));
+
+	if (!error)
+		return -ENOMEM;
+	incise_crossval_settings(basis, ridges);
+	ridges[CROSSVAL_RIDGES] =
+		(struct incise_ridge){.ridge = RIGID,
+				      .n = basis->n_rules * (basis->n_inputs + 1),
+				      .free = quadratic,
+				      .n_free = basis->n_inputs + 1};
+	rc = incise_crossval_ridges(basis, folds, ridges, n, error);
+	*choice = (struct incise_choice){
+		.error = error, .total = HUGE_VAL, .quadratic = NAN};
+	if (rc)
+		free(error);
+	else
+		choose_setting(folds, ridges, error, n, choice);
 	return rc;
 }
 

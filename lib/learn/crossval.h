@@ -3,7 +3,7 @@
  * Errors on pairs that a fit has not seen, out of the training pairs alone: five folds
  * that leave whole groups out (cuts), because pairs of one group are not independent.
  * Errors are kept by unit (group, or pair where there are no groups), so that two settings
- * can be compared unit by unit. Pairs are scaled.
+ * can be compared unit by unit. The ridge is chosen by them. Pairs are scaled.
  */
 #ifndef INCISE_CROSSVAL_H
 #define INCISE_CROSSVAL_H
@@ -12,21 +12,16 @@
 #include "watch.h"
 
 #define CROSSVAL_FOLDS 5
-#define CROSSVAL_REPEATS 4
-#define CROSSVAL_MAX (CROSSVAL_FOLDS * CROSSVAL_REPEATS)
 
-/*
- * Few cuts make one division into folds a game of chance: it is repeated with others
- * where the pairs are few enough, and n counts the folds of all of them.
- */
+/* Pairs that choose settings unless told otherwise. */
+#define TUNED_PAIRS 3000
+
 struct incise_folds {
 	int n; /* below 2: nothing can be held out */
 	int n_units;
-	bool cuts;     /* units are groups, and the pairs are all that they have */
-	double zero;   /* raw output 0 in scaled units */
 	size_t n_held; /* pairs, over all folds */
-	struct incise_pairs fit[CROSSVAL_MAX], held[CROSSVAL_MAX];
-	int *unit[CROSSVAL_MAX];    /* of each held pair */
+	struct incise_pairs fit[CROSSVAL_FOLDS], held[CROSSVAL_FOLDS];
+	int *unit[CROSSVAL_FOLDS];  /* of each held pair */
 	struct incise_watch *watch; /* or NULL */
 };
 
@@ -44,15 +39,40 @@ int incise_crossval_ridges(const struct incise_basis *basis,
 			   const struct incise_ridge *ridges, int n, double *error);
 
 /*
- * Held-out squared errors while premises are searched (varpro.h), by epoch:
- * error[e·n_units + unit] for epoch e+1. Where a fold's search ends early its last error
- * stands for the epochs left. Returns as above. ratios is NULL, or gets error/√(1 + φᵀ(ΦᵀΦ+λ)⁻¹φ) of each
- * of the n_held pairs after the last epoch: the error in units of the noise.
+ * error/√(1 + φᵀ(ΦᵀΦ+λ)⁻¹φ) of each of the n_held pairs: the error in units of the noise.
+ * Returns as above.
  */
-int incise_crossval_search(const struct incise_basis *basis,
+int incise_crossval_ratios(const struct incise_basis *basis,
 			   const struct incise_folds *folds,
-			   const struct incise_ridge *ridge, int epochs, double *error,
-			   double *ratios);
+			   const struct incise_ridge *ridge, double *ratios);
+
+/* The ridges tried for a grid: rules that differ freely, …, a plane, the mean. */
+#define CROSSVAL_RIDGES 10
+void incise_crossval_settings(const struct incise_basis *basis,
+			      struct incise_ridge *ridges);
+
+/*
+ * The law a·d + b·d² + c·v + … of the first input and the others, through the raw 0 of all, for
+ * incise_ridge.free: as many rows as inputs and one, and its constant. offset and scale are those of
+ * the inputs and the output. To be freed with free(3); NULL: the grid has none.
+ */
+double *incise_quadratic(const struct incise_basis *basis, const double *offset,
+			 const double *scale);
+
+/* The best of these ridges, with its held-out squared errors by unit, to be freed with free(3). */
+struct incise_choice {
+	struct incise_ridge ridge;
+	double *error, total;
+	double plane, mean, quadratic; /* totals of these; the last may be NAN */
+};
+
+/*
+ * quadratic is NULL or that law, which outlives the choice: it is preferred where it is not worse by
+ * more than a standard error. Returns 0, -EDOM, -ECANCELED, -ENOMEM.
+ */
+int incise_crossval_choose(const struct incise_basis *basis,
+			   const struct incise_folds *folds, const double *quadratic,
+			   struct incise_choice *choice);
 
 /* Sum over units. */
 double incise_crossval_total(const struct incise_folds *folds, const double *error);

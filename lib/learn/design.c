@@ -49,10 +49,6 @@ int incise_design_add_to(struct incise_design *design, struct incise_gram *gram,
 	incise_basis_row(&design->basis, w, x, row);
 	row[n] = 1;
 	row[n + 1] = x[d];
-	/* Weights hide how far outside an input is. */
-	for (int i = 0; i < d; i++)
-		if (!(x[i] > -1 && x[i] < 2))
-			return -ERANGE;
 	if (weight != 1)
 		for (int i = 0; i < n + 2; i++)
 			row[i] *= sqrt(weight);

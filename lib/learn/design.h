@@ -29,7 +29,8 @@ void incise_design_free(struct incise_design *design);
 
 /*
  * Add a raw pair to the gram of a design of these premises, of the same width, with a weight above 0
- * and at most 1 of its square; -ERANGE if it is a whole range or more outside, -EOVERFLOW (gram.h).
+ * and at most 1 of its square; inputs outside the ranges are clamped. -ERANGE if its output is a
+ * whole range or more outside, -EOVERFLOW (gram.h).
  */
 int incise_design_add_to(struct incise_design *design, struct incise_gram *gram,
 			 const double *raw, double weight);

@@ -20,7 +20,7 @@
 #include "../base/random.h"
 #include "design.h"
 #include "factor.h"
-#include "tune.h"
+#include "crossval.h"
 
 #define FORM 2 /* of the file */
 #define FOLDS INCISE_FACTOR_FOLDS
@@ -325,7 +325,6 @@ int incise_factor_add(struct incise_factor *factor, const double *row, uint64_t 
 		      double weight, struct incise_error *err)
 {
 	const struct incise_model_info *info = incise_model_info(factor->model);
-	const struct incise_scaling *scaling = &factor->design.scaling;
 	int d = info->n_inputs;
 	bool first = !rows_of(factor);
 	int rc = incise_design_add_to(&factor->design,
@@ -333,21 +332,12 @@ int incise_factor_add(struct incise_factor *factor, const double *row, uint64_t 
 
 	if (rc == -EOVERFLOW)
 		return incise_error_set(err, EOVERFLOW, "more than 2^33 pairs");
-	for (int i = 0; i <= d && rc; i++) {
-		double low = i < d ? -1 : -2,
-		       x = (row[i] - scaling->offset[i]) / scaling->scale[i];
-
-		if (!(x > low && x < 2))
-			return incise_error_set(
-				err, ERANGE,
-				"%s = %g is a whole range or more outside the model's "
-				"%g to %g; remove the row, or train without --premises",
-				i < d ? info->input[i].name : info->output.name, row[i],
-				i < d ? info->input[i].min : info->output.min,
-				i < d ? info->input[i].max : info->output.max);
-	}
 	if (rc)
-		return incise_error_set(err, ERANGE, "a pair is out of range");
+		return incise_error_set(
+			err, ERANGE,
+			"%s = %g is a whole range or more outside the model's %g to %g; "
+			"remove the row, or train without --premises",
+			info->output.name, row[d], info->output.min, info->output.max);
 	for (int i = 0; i <= d; i++) {
 		factor->min[i] = first ? row[i] : fmin(factor->min[i], row[i]);
 		factor->max[i] = first ? row[i] : fmax(factor->max[i], row[i]);
@@ -1054,7 +1044,7 @@ struct incise_factor *incise_factor_load(const char *path, struct incise_error *
 
 /* --- solving ------------------------------------------------------------------------- */
 
-/* The ridge without cross-validation, as incise_tune() has it. */
+/* The ridge without cross-validation, as that of a training. */
 #define DEFAULT_RIDGE 1.0
 
 /* Just enough that the standard deviation is finite where the user wants no ridge. */
@@ -1097,19 +1087,18 @@ static int crossval(struct solver *s, const struct incise_ridge *ridges, int n_r
 static int choose_ridge(struct solver *s, const struct incise_factor_ridge *wanted,
 			struct incise_ridge *ridge, double *held)
 {
-	struct incise_ridge ridges[TUNE_RIDGES];
-	double errors[TUNE_RIDGES];
+	struct incise_ridge ridges[CROSSVAL_RIDGES];
+	double errors[CROSSVAL_RIDGES];
 	int parts = 0, n = 1, rc;
 
 	for (int f = 0; f < FOLDS; f++)
 		parts += incise_gram_rows(s->factor->fold[f]) > 0;
 	*held = NAN;
 	if (isnan(wanted->ridge)) {
-		incise_tune_ridges(&s->factor->design.basis, ridges);
-		n = TUNE_RIDGES;
+		incise_crossval_settings(&s->factor->design.basis, ridges);
+		n = CROSSVAL_RIDGES;
 	} else {
-		ridges[0] = (struct incise_ridge){wanted->ridge, wanted->mean, s->n,
-						  s->factor->design.basis.n_rules};
+		ridges[0] = (struct incise_ridge){.ridge = wanted->ridge, .n = s->n};
 	}
 	*ridge = ridges[0];
 	if (n > 1)

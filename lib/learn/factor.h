@@ -25,7 +25,7 @@ int incise_factor_start(struct incise_factor *factor, const char *hash, const ch
 /*
  * Add a pair of the source: inputs, then output; group: number of its group, the same in all
  * sources; weight: above 0 and at most 1, which is 1 in a factor that is saved or merged. 0, -ERANGE
- * (a value is a whole range or more outside the model's ranges), -EOVERFLOW (more than 2^33
+ * (an output that is a whole range or more outside the model's ranges), -EOVERFLOW (more than 2^33
  * pairs).
  */
 int incise_factor_add(struct incise_factor *factor, const double *row, uint64_t group,
@@ -69,7 +69,6 @@ struct incise_factor *incise_factor_decode(const void *bytes, size_t size,
 /* Ridge of a solution; see incise_train_report. */
 struct incise_factor_ridge {
 	double ridge; /* NAN: by cross-validation over the parts */
-	double mean; /* its share for the rules' mean, 0 … 1; used unless ridge is NAN */
 	double noise; /* in the unit of the output; NAN: from the held-out errors of the parts */
 };
 

@@ -246,21 +246,14 @@ int incise_interval_fit(const struct incise_folds *folds, const double *ratios,
 
 int incise_interval_noise(const struct incise_basis *basis,
 			  const struct incise_folds *folds,
-			  const struct incise_ridge *ridge, int epochs,
-			  const struct incise_average *average,
+			  const struct incise_ridge *ridge,
 			  struct incise_interval *interval)
 {
-	double *error = malloc((size_t)epochs * folds->n_units * sizeof(*error));
 	double *ratios = malloc(folds->n_held * sizeof(*ratios));
-	int rc = -ENOMEM;
+	int rc = ratios ? incise_crossval_ratios(basis, folds, ridge, ratios) : -ENOMEM;
 
-	if (error && ratios)
-		rc = average ? incise_average_ratios(average, basis, folds, ratios)
-			     : incise_crossval_search(basis, folds, ridge, epochs, error,
-						      ratios);
 	if (!rc)
 		rc = incise_interval_fit(folds, ratios, interval);
-	free(error);
 	free(ratios);
 	return rc;
 }

@@ -7,7 +7,7 @@
 #define INCISE_INTERVAL_H
 
 #include <incise/uncertainty.h>
-#include "average.h"
+#include "crossval.h"
 
 /* The noise of new pairs, and how it depends on the inputs. */
 struct incise_interval {
@@ -17,13 +17,11 @@ struct incise_interval {
 
 /*
  * Set *interval so that ±INCISE_INTERVAL95·noise(x)·√(1 + leverage) holds 95 % of the pairs of a
- * new unit, out of the held-out pairs of the average, or if it is NULL of a search with the ridge.
- * Returns 0, -EDOM, -ECANCELED, -ENOMEM.
+ * new unit, out of the held-out pairs. Returns 0, -EDOM, -ECANCELED, -ENOMEM.
  */
 int incise_interval_noise(const struct incise_basis *basis,
 			  const struct incise_folds *folds,
-			  const struct incise_ridge *ridge, int epochs,
-			  const struct incise_average *average,
+			  const struct incise_ridge *ridge,
 			  struct incise_interval *interval);
 
 /* The same out of error/√(1 + leverage) of each held-out pair. */

@@ -306,52 +306,86 @@ void incise_lsq_add_weighted(struct incise_lsq *lsq, double target, double weigh
 	incise_lsq_add(lsq, target * root);
 }
 
-/*
- * Rows that penalise what sets the blocks apart: orthonormal contrasts of block b against
- * the mean of those behind it, a staircase from column b·width on.
- *
- *     b:  √(m/(m+1))·p_b - √(1/(m(m+1)))·Σ p_after,   m blocks behind it
- */
-static void contrast_rows(struct incise_lsq *lsq, const struct incise_ridge *ridge)
+/* The penalty of the rules' consequents, one of each rule: upper triangle. Returns their number. */
+static int penalise_rules(const struct incise_ridge *ridge, double *penalty)
 {
-	int width = ridge->n / ridge->blocks;
+	int rules = 1, inner;
 
-	for (int i = 0; i < ridge->n - width; i++) {
-		double *row = lsq->ridge + (size_t)i * lsq->stride;
-		double m = ridge->blocks - 1 - i / width;
-		double scale = sqrt(ridge->ridge / (m * (m + 1)));
+	for (int i = 0; i < INCISE_MODEL_INPUTS_MAX && ridge->n_mfs[i]; i++)
+		rules *= ridge->n_mfs[i];
+	for (int k = 0; k < rules * rules; k++)
+		penalty[k] = ridge->mean / rules;
+	inner = rules;
+	for (int i = 0; i < INCISE_MODEL_INPUTS_MAX && ridge->n_mfs[i]; i++) {
+		inner /= ridge->n_mfs[i];
+		for (int a = 0, b = inner; b < rules; a++, b++) {
+			if (a / inner % ridge->n_mfs[i] == ridge->n_mfs[i] - 1)
+				continue;
+			penalty[a * rules + a] += ridge->ridge;
+			penalty[b * rules + b] += ridge->ridge;
+			penalty[a * rules + b] -= ridge->ridge;
+		}
+	}
+	return rules;
+}
 
-		row[i] = m * scale;
-		for (int k = i + width; k < ridge->n; k += width)
-			row[k] = -scale;
+/* Rows whose squares are the penalty: Cholesky's factor, for each parameter of a rule. */
+static void find_rows(struct incise_lsq *lsq, const struct incise_ridge *ridge,
+		      double *penalty)
+{
+	int rules = penalise_rules(ridge, penalty), width = ridge->n / rules;
+
+	for (int j = 0; j < rules; j++) {
+		double *row = penalty + (size_t)j * rules, pivot = sqrt(row[j]);
+
+		for (int k = j; k < rules; k++)
+			row[k] /= pivot;
+		for (int i = j + 1; i < rules; i++)
+			for (int k = i; k < rules; k++)
+				penalty[(size_t)i * rules + k] -= row[i] * row[k];
+		for (int c = 0; c < width; c++)
+			for (int k = j; k < rules; k++)
+				lsq->ridge[(size_t)(j * width + c) * lsq->stride +
+					   k * width + c] = row[k];
 	}
 }
 
-/* Rows that penalise the blocks' mean. */
-static void mean_rows(struct incise_lsq *lsq, const struct incise_ridge *ridge)
+/* Rows of √ridge·(p - q), without what is along the free rows. */
+static void find_bound_rows(struct incise_lsq *lsq, const struct incise_ridge *ridge)
 {
-	int width = ridge->n / ridge->blocks;
+	double by = sqrt(ridge->ridge);
+	int n = ridge->n;
 
-	for (int i = 0; i < width; i++)
-		for (int k = i; k < ridge->n; k += width)
-			lsq->ridge[(size_t)i * lsq->stride + k] =
-				sqrt(ridge->ridge * ridge->mean / ridge->blocks);
+	for (int i = 0; i < n; i++) {
+		double *row = lsq->ridge + (size_t)i * lsq->stride;
+
+		row[i] = by;
+		row[lsq->n] = by * ridge->free[(size_t)ridge->n_free * n + i];
+		for (int f = 0; f < ridge->n_free; f++)
+			for (int k = 0; k < n; k++)
+				row[k] -= by * ridge->free[(size_t)f * n + i] *
+					  ridge->free[(size_t)f * n + k];
+	}
 }
 
-static void fold_ridge(struct incise_lsq *lsq, const struct incise_ridge *ridge)
+static bool fold_ridge(struct incise_lsq *lsq, const struct incise_ridge *ridge)
 {
-	int width = ridge->n / ridge->blocks;
+	double *penalty = NULL;
 
-	if (ridge->mean == 1) {
+	if (ridge->free) {
+		find_bound_rows(lsq, ridge);
+	} else if (*ridge->n_mfs) {
+		penalty = malloc((size_t)ridge->n * ridge->n * sizeof(*penalty));
+		if (!penalty)
+			return false;
+		find_rows(lsq, ridge, penalty);
+	} else {
 		for (int i = 0; i < ridge->n; i++)
 			lsq->ridge[(size_t)i * (lsq->stride + 1)] = sqrt(ridge->ridge);
-		fold(lsq, lsq->work, lsq->ridge, ridge->n, true);
-		return;
 	}
-	contrast_rows(lsq, ridge);
-	fold(lsq, lsq->work, lsq->ridge, ridge->n - width, true);
-	mean_rows(lsq, ridge);
-	fold(lsq, lsq->work, lsq->ridge, width, false);
+	fold(lsq, lsq->work, lsq->ridge, ridge->n, !ridge->free);
+	free(penalty);
+	return true;
 }
 
 const double *incise_lsq_factor(struct incise_lsq *lsq, const struct incise_ridge *ridge,
@@ -370,7 +404,8 @@ const double *incise_lsq_factor(struct incise_lsq *lsq, const struct incise_ridg
 		if (!lsq->work || !lsq->ridge)
 			return NULL;
 		memcpy(lsq->work, lsq->r, size * sizeof(double));
-		fold_ridge(lsq, ridge);
+		if (!fold_ridge(lsq, ridge))
+			return NULL;
 		factor = lsq->work;
 	}
 	if (incise_watch_count(lsq->watch, 0))

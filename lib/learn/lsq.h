@@ -10,18 +10,28 @@
 #ifndef INCISE_LSQ_H
 #define INCISE_LSQ_H
 
+#include <incise/model.h>
+
 struct incise_lsq;
 struct incise_watch;
 
 /*
- * The ridge: ridge·|p|² over the first n unknowns. Where these are `blocks` alike ones
- * after each other (the consequents of rules), the part of it that holds their mean down
- * can be less: ridge·(Σ|p_b - p̄|² + mean·Σ|p̄|²) over the blocks b. With mean = 1 that is
- * the plain ridge, with 0 a large one leads to equal blocks.
+ * The ridge: ridge·|p|² over the first n unknowns. If these are the consequents of rules that
+ * count through a grid of n_mfs (the last input fastest), it penalises their differences:
+ * ridge·Σ|p_a - p_b|² over neighbours a and b, and mean·|p̄|²·(number of rules). A large one
+ * leads to equal consequents, which are a plane, and with a large mean to the mean output.
  */
 struct incise_ridge {
-	double ridge, mean;
-	int n, blocks;
+	double ridge;
+	int n;
+	double mean;
+	int n_mfs[INCISE_MODEL_INPUTS_MAX]; /* all 0: no grid */
+	/*
+	 * Or NULL; else the penalty is ridge·|p - q|², but for differences along n_free orthonormal
+	 * rows of n, which cost nothing; the row after these is q, orthogonal to them.
+	 */
+	const double *free;
+	int n_free;
 };
 
 /*

@@ -55,8 +55,12 @@ void incise_scaling_find(struct incise_scaling *scaling,
 void incise_scaling_row(const struct incise_scaling *scaling, const double *raw,
 			double *scaled)
 {
-	for (int i = 0; i <= scaling->n_inputs; i++)
-		scaled[i] = (raw[i] - scaling->offset[i]) / scaling->scale[i];
+	int d = scaling->n_inputs;
+
+	for (int i = 0; i < d; i++)
+		scaled[i] = fmax(
+			0, fmin(1, (raw[i] - scaling->offset[i]) / scaling->scale[i]));
+	scaled[d] = (raw[d] - scaling->offset[d]) / scaling->scale[d];
 }
 
 void incise_scaling_premises(const struct incise_scaling *scaling,
@@ -216,17 +220,22 @@ double incise_pairs_r2(const struct incise_pairs *pairs, double rmse)
 }
 
 double incise_pairs_rmse(const struct incise_model *model,
-			 const struct incise_pairs *pairs)
+			 const struct incise_pairs *pairs, bool clamped)
 {
+	const struct incise_variable *range = incise_model_info(model)->input;
+	double x[INCISE_MODEL_INPUTS_MAX];
 	double w[INCISE_MODEL_RULES_MAX], sum = 0, largest = 0;
 	struct incise_basis basis;
 	/* A grid has a quicker way to them. */
 	bool grid = !incise_basis_init(&basis, model);
 
 	for (size_t n = 0; n < pairs->n; n++) {
-		const double *x = pairs->rows + n * (pairs->n_inputs + 1);
-		double e = -x[pairs->n_inputs];
+		const double *row = pairs->rows + n * (pairs->n_inputs + 1);
+		double e = -row[pairs->n_inputs];
 
+		for (int i = 0; i < pairs->n_inputs; i++)
+			x[i] = clamped ? fmax(range[i].min, fmin(range[i].max, row[i]))
+				       : row[i];
 		if (grid)
 			incise_basis_firing(&basis, x, w);
 		else

@@ -47,7 +47,7 @@ void incise_scaling_find(struct incise_scaling *scaling,
 			 const struct incise_variable *inputs,
 			 const struct incise_pairs *pairs);
 
-/* One row, output included. */
+/* One row, output included; inputs outside the ranges become their nearest end. */
 void incise_scaling_row(const struct incise_scaling *scaling, const double *raw,
 			double *scaled);
 
@@ -87,9 +87,9 @@ void incise_sample_free(struct incise_sample *sample);
 /* 1 - rmse²/variance of the output; NaN where that is constant. */
 double incise_pairs_r2(const struct incise_pairs *pairs, double rmse);
 
-/* RMSE of a model; inputs are not clamped. */
+/* RMSE of a model; inputs outside its ranges are clamped to them, or extrapolated. */
 double incise_pairs_rmse(const struct incise_model *model,
-			 const struct incise_pairs *pairs);
+			 const struct incise_pairs *pairs, bool clamped);
 
 /*
  * Choose which of n rows are kept back for checking, by whole groups (or NULL) and as near to

@@ -2,9 +2,9 @@
 /*
  * Training a model; see incise/train.h.
  *
- *   classic:  anfis.c on the data as they are ──────────────────────────────┐
- *   default:  scaling ─▶ tune.c ─▶ varpro.c ─▶ consequents of all pairs ──┐ │
- *                        └ a random part of very many pairs ┘             ▼ ▼
+ *   classic:  anfis.c on the data as they are ─────────┐
+ *   default:  scaling ─▶ ridge by cross-validation ──┐  │
+ *             └ of a random part of very many pairs   ▼  ▼
  *        report, and the standard deviation ◀── the exact Gram matrix of all pairs
  *
  * Memory: the tuned part and its folds, and triangular factors; the pairs are read in order.
@@ -18,11 +18,12 @@
 #include "interval.h"
 #include "pairs.h"
 #include "train.h"
-#include "tune.h"
-#include "varpro.h"
 
 /* MATLAB's recursive least squares starts with S = 1e6 I, which is this ridge. */
 #define CLASSIC_RIDGE 1e-6
+
+/* The ridge where no pairs can be held out. */
+#define DEFAULT_RIDGE 1.0
 
 /* Just enough that the standard deviation is finite where the user wants no ridge. */
 #define LEAST_RIDGE 1e-9
@@ -44,13 +45,14 @@ struct learner {
 	bool failed; /* to find that */
 	struct incise_sample tuned;
 	struct incise_folds folds; /* of that */
-	struct incise_tuning tuning;
+	struct incise_ridge ridge;
+	double *quadratic; /* or NULL */
 };
 
 void incise_train_options_init(struct incise_train_options *options)
 {
 	*options = (struct incise_train_options){
-		.epochs = 80, .step = 0.01, .ridge = NAN, .seed = 1, .starts = 3};
+		.epochs = 80, .step = 0.01, .ridge = NAN, .seed = 1};
 }
 
 static int check_pairs(const struct incise_model *model, const struct incise_pairs *pairs,
@@ -83,11 +85,11 @@ static int check_all(const struct incise_model *model,
 					"the classic method takes no weights; leave "
 					"classic out");
 	if (options->epochs < 1 || !(options->step > 0) || !isfinite(options->step) ||
-	    options->ridge < 0 || isinf(options->ridge) || options->starts < 1)
+	    options->ridge < 0 || isinf(options->ridge))
 		return incise_error_set(
 			err, EINVAL,
-			"training needs at least 1 epoch and start, a positive step and a "
-			"ridge that is not negative");
+			"training needs at least 1 epoch, a positive step and a ridge that "
+			"is not negative");
 	if (train->n < n_linear)
 		return incise_error_set(
 			err, ENODATA,
@@ -121,34 +123,6 @@ static int check_trainable(const struct incise_model *model, struct incise_error
 					incise_mf_type_name(mf->type));
 		}
 	return 0;
-}
-
-/* RMSE in the output's unit of scaled parameters over raw pairs. */
-static double rmse_of(struct learner *l, const struct incise_basis *basis,
-		      const double *consequents, const struct incise_pairs *pairs)
-{
-	double x[INCISE_MODEL_INPUTS_MAX + 1], sum = 0;
-	int d = pairs->n_inputs;
-
-	for (size_t i = 0;
-	     i < pairs->n && !incise_watch_count(&l->watch, basis->n_rules * 10); i++) {
-		double e;
-
-		incise_scaling_row(&l->scaling, pairs->rows + i * (d + 1), x);
-		e = incise_basis_error(basis, x, consequents);
-		sum += e * e;
-	}
-	return sqrt(sum / pairs->n) * l->scaling.scale[d];
-}
-
-static bool on_epoch(void *user, int epoch, const struct incise_basis *basis,
-		     const double *consequents)
-{
-	struct learner *l = user;
-
-	return !incise_watch_epoch(
-		&l->watch, epoch, rmse_of(l, basis, consequents, l->train),
-		l->check ? rmse_of(l, basis, consequents, l->check) : NAN);
 }
 
 /* The design of the pairs given, which are all. */
@@ -211,7 +185,7 @@ static int fold_all(struct learner *l)
 	return rc;
 }
 
-static int train_classic(struct learner *l, struct incise_tuning *tuning)
+static int train_classic(struct learner *l)
 {
 	struct incise_anfis anfis = {
 		.train = l->train,
@@ -230,9 +204,8 @@ static int train_classic(struct learner *l, struct incise_tuning *tuning)
 	rc = fold_all(l);
 	if (rc)
 		return rc;
-	*tuning = (struct incise_tuning){.epochs = 1, .basis = l->basis, .rmse = NAN};
-	tuning->ridge = (struct incise_ridge){
-		CLASSIC_RIDGE, 1, l->basis.n_rules * (l->basis.n_inputs + 1), 1};
+	l->ridge = (struct incise_ridge){.ridge = CLASSIC_RIDGE,
+					 .n = l->basis.n_rules * (l->basis.n_inputs + 1)};
 	l->report->epochs = anfis.epochs;
 	l->report->best_epoch = anfis.best_epoch;
 	return 0;
@@ -246,73 +219,78 @@ static int set_consequents(struct learner *l, double *consequents)
 	return rc ? rc : incise_basis_set_consequents(l->model, consequents);
 }
 
-static int train_default(struct learner *l, struct incise_tuning *tuning)
+/* The ridge given, or the best on held-out pairs. */
+static int choose_ridge(struct learner *l)
 {
-	struct incise_varpro varpro = {.pairs = &l->tuned.pairs,
-				       .each = on_epoch,
-				       .user = l,
-				       .watch = &l->watch};
-	struct incise_basis raw;
-	int rc = incise_tune(&l->basis, &l->folds, l->options, tuning);
+	double unit = l->scaling.scale[l->basis.n_inputs] / sqrt(l->folds.n_held);
+	struct incise_ridge given = {.n = l->basis.n_rules * (l->basis.n_inputs + 1)};
+	struct incise_choice choice;
+	int rc;
 
+	given.ridge = isnan(l->options->ridge) ? DEFAULT_RIDGE : l->options->ridge;
+	l->ridge = given;
+	if (l->folds.n < 2)
+		return 0;
+	l->quadratic = incise_quadratic(&l->basis, l->scaling.offset, l->scaling.scale);
+	rc = incise_crossval_choose(&l->basis, &l->folds, l->quadratic, &choice);
 	if (rc)
 		return rc;
-	varpro.ridge = &tuning->ridge;
-	varpro.epochs = tuning->epochs;
-	l->basis = tuning->basis;
-	rc = incise_varpro_run(&l->basis, l->consequents, &varpro);
-	if (!rc && l->watch.stopped)
-		rc = -ECANCELED;
-	if (rc)
-		return rc;
-	raw = l->basis;
-	incise_scaling_premises(&l->scaling, &raw, true);
-	incise_basis_store(&raw, l->model);
-	if (l->sums && l->sums->weighted)
-		rc = set_consequents(l, l->consequents);
+	if (isnan(l->options->ridge))
+		l->ridge = choice.ridge;
+	else
+		rc = incise_crossval_ridges(&l->basis, &l->folds, &given, 1,
+					    choice.error);
+	l->report->crossval_rmse =
+		unit * sqrt(incise_crossval_total(&l->folds, choice.error));
+	l->report->crossval_plane = unit * sqrt(choice.plane);
+	l->report->crossval_mean = unit * sqrt(choice.mean);
+	l->report->crossval_quadratic = unit * sqrt(choice.quadratic);
+	free(choice.error);
+	return rc;
+}
+
+/* Consequents of the tuned pairs, from which weights follow. */
+static int solve_sample(struct learner *l)
+{
+	int rc;
+
+	incise_basis_fold(&l->basis, &l->tuned.pairs, l->lsq);
+	rc = incise_lsq_solve(l->lsq, &l->ridge, l->consequents);
+	return rc ? rc : set_consequents(l, l->consequents);
+}
+
+static int train_default(struct learner *l)
+{
+	int rc = choose_ridge(l);
+
+	if (!rc && l->sums && l->sums->weighted)
+		rc = solve_sample(l);
 	if (!rc)
 		rc = fold_all(l);
-	if (rc)
-		return rc;
-	if (tuning->average)
-		rc = incise_average_solve(tuning->average, l->lsq, l->consequents);
-	else
-		rc = incise_lsq_solve(l->lsq, &tuning->ridge, l->consequents);
+	if (!rc)
+		rc = incise_lsq_solve(l->lsq, &l->ridge, l->consequents);
 	if (!rc)
 		rc = set_consequents(l, l->consequents);
-	if (rc)
-		return rc;
-	l->report->epochs = l->report->best_epoch = varpro.run;
-	l->report->start = tuning->start;
+	l->report->epochs = l->report->best_epoch = 1;
 	l->report->pairs_tuned = l->tuned.pairs.n;
-	return 0;
+	return rc;
 }
 
 /* The standard deviation, from the factor of all pairs and the noise of held-out ones. */
-static int find_uncertainty(struct learner *l, const struct incise_tuning *tuning)
+static int find_uncertainty(struct learner *l)
 {
-	struct incise_ridge ridge = tuning->ridge;
+	struct incise_ridge ridge = l->ridge;
 	struct incise_interval interval;
 	int stride, rc;
 	const double *factor;
-	double *own = NULL;
 
 	ridge.ridge = fmax(ridge.ridge, LEAST_RIDGE);
-	rc = incise_interval_noise(&tuning->basis, &l->folds, &ridge, tuning->epochs,
-				   tuning->average, &interval);
+	rc = incise_interval_noise(&l->basis, &l->folds, &ridge, &interval);
 	if (rc)
 		return rc;
-	factor = own = tuning->average
-			       ? incise_average_factor(tuning->average, l->lsq, &stride)
-			       : NULL;
-	if (!tuning->average)
-		factor = incise_lsq_factor(l->lsq, &ridge, &stride);
+	factor = incise_lsq_factor(l->lsq, &ridge, &stride);
 	if (!factor)
-		return tuning->average ? -errno : -EDOM;
-	if (l->watch.stopped) {
-		free(own);
-		return -ECANCELED;
-	}
+		return -EDOM;
 	*l->options->uncertainty = incise_uncertainty_new(
 		l->model, interval.noise * l->scaling.scale[l->basis.n_inputs], factor,
 		stride, NULL);
@@ -323,18 +301,15 @@ static int find_uncertainty(struct learner *l, const struct incise_tuning *tunin
 		interval.shape.low[i] = offset + scale * interval.shape.low[i];
 		interval.shape.high[i] = offset + scale * interval.shape.high[i];
 	}
-	if (!rc)
-		rc = incise_uncertainty_set_shape(*l->options->uncertainty,
-						  &interval.shape, NULL);
-	free(own);
-	return rc;
+	return rc ? rc
+		  : incise_uncertainty_set_shape(*l->options->uncertainty,
+						 &interval.shape, NULL);
 }
 
 static int learn_train(struct learner *l)
 {
 	struct incise_train_report *report = l->report;
 	bool classic = l->options->classic;
-	struct incise_tuning *tuning = &l->tuning;
 	int rc = incise_basis_init(&l->basis, l->model), n;
 	size_t most;
 
@@ -356,48 +331,37 @@ static int learn_train(struct learner *l)
 		rc = incise_folds_init(&l->folds, &l->tuned.pairs, l->tuned.groups,
 				       l->options->seed);
 	l->folds.watch = &l->watch;
-	l->folds.zero = -l->scaling.offset[l->basis.n_inputs] /
-			l->scaling.scale[l->basis.n_inputs];
-	l->folds.cuts &=
-		l->tuned.pairs.n == l->train->n && !(l->sums && l->sums->weighted);
+	report->crossval_rmse = report->crossval_plane = report->crossval_mean =
+		report->crossval_quadratic = NAN;
 	if (!rc)
-		rc = classic ? train_classic(l, tuning) : train_default(l, tuning);
+		rc = classic ? train_classic(l) : train_default(l);
 	if (!rc)
 		rc = incise_lsq_condition(l->lsq, &report->condition);
 	if (rc)
 		return rc;
-	report->ridge = tuning->ridge.ridge;
-	report->crossval_rmse = tuning->rmse * l->scaling.scale[l->basis.n_inputs];
-	if (tuning->average) {
-		struct incise_average_shares shares =
-			incise_average_shares(tuning->average);
-
-		report->averaged = shares.settings;
-		report->plane_weight = shares.plane;
-		report->mean_weight = shares.mean;
-		report->cut_weight = shares.cuts;
-	}
+	report->ridge = l->ridge.ridge;
 	report->parameters = n + l->basis.n_premises;
-	report->train_rmse = incise_pairs_rmse(l->model, l->train);
+	report->train_rmse = incise_pairs_rmse(l->model, l->train, !classic);
 	report->train_r2 = incise_pairs_r2(l->train, report->train_rmse);
 	if (l->all)
 		report->train_rmse =
 			incise_factor_rmse(l->all, l->model, &report->train_r2);
 	report->check_rmse = report->check_r2 = NAN;
 	if (l->check) {
-		report->check_rmse = incise_pairs_rmse(l->model, l->check);
+		report->check_rmse = incise_pairs_rmse(l->model, l->check, !classic);
 		report->check_r2 = incise_pairs_r2(l->check, report->check_rmse);
 	}
-	return l->options->uncertainty ? find_uncertainty(l, tuning) : 0;
+	if (!classic &&
+	    incise_watch_epoch(&l->watch, 1, report->train_rmse, report->check_rmse))
+		return -ECANCELED;
+	return l->options->uncertainty ? find_uncertainty(l) : 0;
 }
 
 static int fail_train(struct incise_error *err, int rc)
 {
 	return incise_error_set(
 		err, -rc,
-		rc == -ENOMEM	? "no memory to train"
-		: rc == -ERANGE ? "a training pair is a whole range or more outside the "
-				  "model's ranges; give the model the ranges of the pairs"
+		rc == -ENOMEM	   ? "no memory to train"
 		: rc == -ECANCELED ? "training was stopped"
 		: rc == -ENOTSUP
 			? "only models whose rules are the full grid of Gaussians or "
@@ -449,8 +413,8 @@ int incise_train_sample(struct incise_model *model, const struct incise_pairs *t
 	incise_lsq_free(l->lsq);
 	incise_design_free(&l->design);
 	incise_folds_free(&l->folds);
-	incise_average_free(l->tuning.average);
 	free(l->consequents);
+	free(l->quadratic);
 	incise_sample_free(&l->tuned);
 	failed = l->failed;
 	free(l);

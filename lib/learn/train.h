@@ -17,10 +17,7 @@ struct incise_train_sums {
 	int (*find)(void *user, const struct incise_model *premises,
 		    struct incise_factor **sums);
 	void *user;
-	/*
-	 * They have weights: there are no fits with a random factor of each group, and the model
-	 * that find is given has the consequents of the sample.
-	 */
+	/* They have weights: the model that find is given has the consequents of the sample. */
 	bool weighted;
 };
 

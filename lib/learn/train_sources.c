@@ -2,7 +2,7 @@
 /*
  * Training from sources; see incise/corpus.h.
  *
- *   sources ─► survey ─► sample ─► search of the premises ─┐
+ *   sources ─► survey ─► sample ─► premises and penalty ───┐
  *      └──────────────────────────► sums of all pairs ─────┴─► model, or a factor
  *
  * The sources are shared among processes: each surveys its own, all have all surveys, the first
@@ -478,7 +478,7 @@ static double find_scatter(const struct incise_model *model,
 /* One pass with the weights that follow from a model, which the model of the weights replaces. */
 static int fold_pass(struct training *t, struct incise_model **model, double *scatter)
 {
-	const struct incise_factor_ridge ridge = {1e-3, 1, 1};
+	const struct incise_factor_ridge ridge = {1e-3, 1};
 	struct incise_uncertainty *uncertainty = NULL;
 	struct incise_model *next = NULL;
 	int rc = incise_propagation_start(t->propagation, *model, *scatter, &t->err);
@@ -532,7 +532,6 @@ static int find_sums(void *user, const struct incise_model *premises,
 	return rc;
 }
 
-/* From an even grid over the ranges of all training pairs. */
 static int search_premises(struct training *t)
 {
 	const struct incise_corpus *corpus = t->trained->corpus;
@@ -570,7 +569,7 @@ static int search_premises(struct training *t)
 /* The consequents of all pairs at given premises. */
 static int solve_premises(struct training *t)
 {
-	const struct incise_factor_ridge ridge = {t->options->train.ridge, 1, NAN};
+	const struct incise_factor_ridge ridge = {t->options->train.ridge, NAN};
 	struct incise_trained *trained = t->trained;
 	int rc = fold_passes(t, t->options->premises);
 
@@ -690,6 +689,27 @@ static char *make_notes(const struct training *t)
 	return fclose(out) ? NULL : text;
 }
 
+/* The pairs of the sample that the ranges of the model leave out. */
+static uint64_t count_clamped(const struct training *t)
+{
+	const struct incise_pairs *fit =
+		&incise_corpus_side(t->trained->corpus, false)->sample.pairs;
+	const struct incise_model *model =
+		t->options->premises ? t->options->premises : t->trained->model;
+	const struct incise_model_info *info = incise_model_info(model);
+	uint64_t n = 0;
+
+	for (size_t i = 0; i < fit->n; i++) {
+		const double *x = fit->rows + i * (fit->n_inputs + 1);
+		bool outside = false;
+
+		for (int k = 0; k < fit->n_inputs; k++)
+			outside |= x[k] < info->input[k].min || x[k] > info->input[k].max;
+		n += outside;
+	}
+	return n;
+}
+
 /* Find what a report says about the model. */
 static int judge_model(struct training *t)
 {
@@ -747,6 +767,8 @@ static int train_all(struct training *t)
 	if (!is_first(t))
 		return fold_sources(t, NULL);
 	rc = options->premises ? solve_premises(t) : search_premises(t);
+	if (!rc)
+		t->trained->clamped = count_clamped(t);
 	if (!rc && options->end == INCISE_TRAIN_TO_MODEL)
 		rc = judge_model(t);
 	return rc;
@@ -793,7 +815,7 @@ int incise_train_factors(const char *const *paths, int n, double ridge,
 			 enum incise_train_end end, struct incise_trained *trained,
 			 struct incise_error *err)
 {
-	const struct incise_factor_ridge wanted = {ridge, 1, NAN};
+	const struct incise_factor_ridge wanted = {ridge, NAN};
 	int rc = 0;
 
 	*trained = (struct incise_trained){0};

@@ -65,7 +65,7 @@ SourceStruct, SourcesOptionsStruct, PropagationReportStruct, TrainedStruct = _li
         const char *notes;
         struct incise_train_report report;
         struct incise_baselines baselines;
-        uint64_t pairs, check_pairs, left_out, repeated, check_outside;
+        uint64_t pairs, check_pairs, left_out, repeated, check_outside, clamped;
         const char *group;
         void *initial, *factor, *corpus;
         double noise, coverage, thirds[3], least;

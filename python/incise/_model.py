@@ -80,7 +80,6 @@ TrainOptionsStruct, TrainReportStruct = _library.structs(
         uint64_t seed;
         _Progress progress;
         void *user;
-        int starts;
         size_t tuned;
         void **uncertainty;
         struct incise_variable *ranges;
@@ -89,12 +88,10 @@ TrainOptionsStruct, TrainReportStruct = _library.structs(
         int epochs, best_epoch;
         double ridge, train_rmse, check_rmse, condition;
         int parameters, rules_unfired;
-        double train_r2, check_r2, crossval_rmse;
-        int start;
+        double train_r2, check_r2, crossval_rmse, crossval_plane, crossval_mean,
+            crossval_quadratic;
         size_t pairs_tuned;
         bool unfired[256];
-        int averaged;
-        double plane_weight, mean_weight, cut_weight;
     };
     """,
     _Progress=_Progress,
@@ -881,7 +878,6 @@ def train(
     mf_type: str = "gaussmf",
     epochs: int = 80,
     ridge: Optional[float] = None,
-    starts: int = 3,
     classic: bool = False,
     all_rows: bool = False,
     progress: Optional[Callable[[TrainStep], object]] = None,
@@ -909,7 +905,7 @@ def train(
     names, the order of the list changes nothing.
 
     One table is a CSV file, a recording (its pairs averaged in 12 × 10 bins, by cut), or a table as
-    above. The tool searches the premises of more than 20000 pairs on a random sample of them, and
+    above. The tool places the functions of more than 20000 pairs by a random sample of them, and
     holds out other single rows where check is given without group; so does a list, [source] too.
 
     group: column that names the cut, or with y the cut of each row; cross-validation and check
@@ -919,7 +915,7 @@ def train(
     sample_weight: of each row of X, 0 or more: one of weight 2 counts as two; without check.
     check: share that is kept back, 0 to 1; its error is in ``model.report``.
     mf: membership functions of each input (default 5, 4; else 3 each), or "auto".
-    classic: the method of MATLAB's anfis; not for a list.
+    classic: the method of MATLAB's anfis, with so many epochs; not for a list.
     all_rows: also take rows whose column ``advancing`` is 0, as X and y always do.
     progress: called with a :class:`incise.TrainStep` after each epoch and some 10 ms of computing,
     in another thread; an exception of it ends the training, as Ctrl-C does.
@@ -944,7 +940,7 @@ def train(
     counts = _mf_counts(mf, len(inputs))
     options = TrainOptionsStruct()
     function("incise_train_options_init")(options)
-    options.epochs, options.seed, options.starts = epochs, seed, starts
+    options.epochs, options.seed = epochs, seed
     options.classic = classic
     if ridge is not None:
         options.ridge = ridge

@@ -30,7 +30,7 @@ class ForceRegressor(RegressorMixin, BaseEstimator):
     ----------
     mf : "auto": membership functions by cross-validation, or their count for each input
     mf_type : "gaussmf" or "gbellmf"
-    epochs, ridge, starts, seed : as of :func:`incise.train`
+    ridge, seed : as of :func:`incise.train`
 
     Attributes
     ----------
@@ -43,16 +43,12 @@ class ForceRegressor(RegressorMixin, BaseEstimator):
         *,
         mf: Union[str, Sequence[int]] = "auto",
         mf_type: str = "gaussmf",
-        epochs: int = 80,
         ridge: Optional[float] = None,
-        starts: int = 3,
         seed: int = 1,
     ):
         self.mf = mf
         self.mf_type = mf_type
-        self.epochs = epochs
         self.ridge = ridge
-        self.starts = starts
         self.seed = seed
 
     def fit(
@@ -79,9 +75,7 @@ class ForceRegressor(RegressorMixin, BaseEstimator):
             seed=self.seed,
             mf=self.mf,
             mf_type=self.mf_type,
-            epochs=self.epochs,
             ridge=self.ridge,
-            starts=self.starts,
         )
         return self
 

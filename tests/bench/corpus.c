@@ -70,7 +70,7 @@ int main(int argc, char **argv)
 	const struct incise_variable inputs[] = {{"depth_mm", 0, 20},
 						 {"velocity_mm_s", 0, 50}};
 	const struct incise_variable output = {"force_N", -0.1, 3.5};
-	const struct incise_factor_ridge none = {0, 1, 0};
+	const struct incise_factor_ridge none = {0, 0};
 	struct stream stream = {argc > 1 ? strtoull(argv[1], NULL, 10) : 1000000, NULL};
 	char hash[] = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
 	const struct incise_corpus_source source = {.name = "made",

@@ -159,7 +159,7 @@ static struct incise_factor *sums(const struct learning *l,
 static int all_sums(void *user, const struct incise_model *premises,
 		    struct incise_factor **factor)
 {
-	const struct incise_factor_ridge ridge = {1e-3, 1, 1};
+	const struct incise_factor_ridge ridge = {1e-3, 1};
 	struct learning *l = user;
 	struct incise_model *model = NULL, *next;
 	struct incise_uncertainty *uncertainty;
@@ -232,7 +232,6 @@ static struct incise_model *learn(struct rig *rigs, int n, bool with,
 	incise_train_options_init(&options);
 	options.groups = fit->sample.groups;
 	options.ranges = ranges;
-	options.starts = 1;
 	model = cli_require(incise_train_start(&fit->sample.pairs, names, INCISE_MF_GAUSS,
 					       mfs, &options, &err),
 			    &err);

@@ -112,7 +112,7 @@ VALUES = """
 --ros2 | neck /lab/neck_2 neck,domain=0 neck,domain=232,interface=lo | {} 2neck a//b a/ a-b neck,domain=233 neck,interface=nosuch0 neck,nosuch=1 neck,domain
 --scale | 0.5g 1kg | -1 1mm {}
 --scene | any |
---search | type=gaussmf type=gbellmf,starts=1 starts=100 sample=0,starts=3 classic,step=1e-9 | type=trimf starts=0 starts=101 sample=-1 sample=1.5 classic=1 step=11 nosuch {}
+--search | type=gaussmf type=gbellmf,sample=0 classic,step=1e-9 | type=trimf starts=1 sample=-1 sample=1.5 classic=1 step=11 nosuch {}
 --seed | 0 7 | -1 x 1.5 {}
 --seed bench | 1 7 | 0 x {}
 --share | 1/1 2/3 mpi | 0/2 3/2 1 a/b {}

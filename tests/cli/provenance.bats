@@ -58,7 +58,7 @@ setup() {
 		incise export "a b;.rec" -o e.h5
 		files+=" e.h5"
 	fi
-	incise train "a b;.rec" --rate 1000 --mf 2,2 --search starts=1 -o r.fis >/dev/null 2>&1
+	incise train "a b;.rec" --rate 1000 --mf 2,2 -o r.fis >/dev/null 2>&1
 	incise train "a b;.rec" --rate 1000 --premises r.fis -o r.fac >/dev/null 2>&1
 	incise merge r.fac -o merged.fis >/dev/null
 	for file in $files r.fis merged.fis; do

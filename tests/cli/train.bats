@@ -109,7 +109,7 @@ parameters() {
 	incise train pairs.csv --seed 2 -o a.fis 2>/dev/null
 	incise train - --seed 2 -o - <pairs.csv >b.fis 2>/dev/null
 	cmp <(parameters a.fis) <(parameters b.fis)
-	incise train <(cat pairs.csv) --mf 2,2 --search starts=1 -o c.fis --overwrite | grep -q "^grouped by cut"
+	incise train <(cat pairs.csv) --mf 2,2 -o c.fis --overwrite | grep -q "^grouped by cut"
 	run --separate-stderr incise train - -o c.fis --overwrite < <(sed '5s/^/x,/' pairs.csv)
 	failed_with "standard input:5:"
 }

@@ -13,7 +13,7 @@
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-	const struct incise_factor_ridge ridge = {1e-3, 1, NAN};
+	const struct incise_factor_ridge ridge = {1e-3, NAN};
 	struct incise_error err = {0};
 	char *bytes = malloc(size + 4);
 	uint32_t crc = htole32(incise_crc32c(0, data, size));

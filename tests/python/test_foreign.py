@@ -78,7 +78,7 @@ class Foreign(Case):
     def test_training_from_their_tables(self):
         stream = table = self.tables["bins"]
         self.assertIs(stream, table)
-        options = {"group": "cut", "check": 0.3, "mf": (2, 2), "starts": 1, "epochs": 5}
+        options = {"group": "cut", "check": 0.3, "mf": (2, 2), "epochs": 5}
         wanted = incise.train(table, **options)((5, 20))
         for other in (
             pyarrow.table(table),
@@ -119,7 +119,7 @@ class Foreign(Case):
 
             return pyarrow.RecordBatchReader.from_batches(reader.schema, all_batches())
 
-        options = {"group": "cut", "check": 0.3, "mf": (2, 2), "starts": 1}
+        options = {"group": "cut", "check": 0.3, "mf": (2, 2)}
         wanted = incise.train([("bins", table)], **options)((5, 20))
         for other in (read, pyarrow.table(table), polars.DataFrame(table)):
             model = incise.train([("bins", other)], **options)

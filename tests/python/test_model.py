@@ -17,8 +17,8 @@ import incise
 from fixtures import SANITIZED, SOURCE, Case, has, run
 
 OPTIONS = {"group": "cut", "check": 0.3}
-QUICK = {"mf": (2, 2), "starts": 1, "epochs": 5}
-QUICK_TOOL = ("--mf", "2,2", "--search", "starts=1", "--epochs", "5")
+QUICK = {"mf": (2, 2), "epochs": 5}
+QUICK_TOOL = ("--mf", "2,2", "--epochs", "5")
 
 
 class Models(Case):
@@ -319,7 +319,7 @@ class Models(Case):
         model.save(self.path("a.fis"))
         self.assertIn("bins\n", run("incise", "info", self.path("a.fis")))
         # pairs that are not sampled, in one source: the grid and its consequents are those of a table
-        few = {"group": "cut", "starts": 1, "epochs": 5}
+        few = {"group": "cut", "epochs": 5}
         one = incise.train([table], **few)
         self.assertAlmostEqual(one((5, 20)), incise.train(table, **few)((5, 20)), places=9)
 
@@ -442,7 +442,7 @@ class Models(Case):
             "    return run(*arguments)\n"
             "training.run = tell_and_run\n"
             "try:\n"
-            "    incise.train(data, inputs=('a', 'b', 'c'), target='y', mf=(4, 4, 4), starts=100)\n"
+            "    incise.train(data, inputs=('a', 'b', 'c'), target='y', mf=(6, 6, 6), epochs=1000, classic=True)\n"
             "except KeyboardInterrupt:\n"
             "    print('stopped')\n"
         )

@@ -148,14 +148,14 @@ class Typed(Case):
         fis = os.path.join(self.shared, "bare.fis")
         if not os.path.exists(fis):
             with contextlib.suppress(incise.Exists):
-                quick = {"mf": (2, 2), "starts": 1, "epochs": 1}
+                quick = {"mf": (2, 2), "epochs": 1}
                 trained = incise.train(rec.pairs(12, 10, by_cut=True), **quick)
                 trained.save(fis)
                 os.remove(fis + ".sd")
         columns = dict(rec.pairs(12, 10, by_cut=True).numpy())
 
         def train(*data, **options):
-            return incise.train(*data, mf=(2, 2), starts=1, epochs=1, **options)
+            return incise.train(*data, mf=(2, 2), epochs=1, **options)
 
         def loop(scene="neck", **options):
             return incise.Haptic(scene, "sim:clock=simulated", **options)
@@ -169,7 +169,7 @@ class Typed(Case):
             "y": columns["force_N"], "cut": columns["cut"], "weight": numpy.where(columns["force_N"] < 1, 10.0, 0.1), "nan": numpy.nan, "inf": numpy.inf,
             "name": lambda n: list(dict.fromkeys(rec.pairs()["cut"]))[n - 1],
             "axis": lambda: None,
-            "regressor": lambda X, y: incise.ForceRegressor(mf=(2, 2), starts=1, epochs=1).fit(X, y),
+            "regressor": lambda X, y: incise.ForceRegressor(mf=(2, 2)).fit(X, y),
         }
         if has("pandas"):
             import pandas

@@ -84,6 +84,7 @@ static const struct {
 } kinds[] = {
 	{"tracker", "trackers", ""},
 	{"force", "force", ""},
+	{"haptic", "haptic", ""},
 	{"camera", "cameras", ""},
 	{"stepper", "steppers", ""},
 	{"driver", "chips", ""},

@@ -127,8 +127,11 @@ struct incise_trained {
 	uint64_t pairs, check_pairs; /**< rows used; those held out */
 	uint64_t left_out;	     /**< rows in which the blade did not advance */
 	uint64_t repeated;	     /**< rows that are equal to another one */
-	uint64_t check_outside;	     /**< rows held out, a whole range or more outside */
-	const char *group;	     /**< what the pairs were grouped by; NULL: nothing */
+	uint64_t
+		check_outside; /**< rows held out whose output is a whole range or more outside */
+	uint64_t
+		clamped; /**< pairs of the sample whose inputs are outside the model's ranges */
+	const char *group; /**< what the pairs were grouped by; NULL: nothing */
 	struct incise_model *initial; /**< before the search */
 	struct incise_factor *factor; /**< sums of the pairs that are not held out */
 	struct incise_corpus *corpus;

@@ -62,12 +62,12 @@ typedef int (*incise_train_progress)(void *user, const struct incise_train_step 
 
 /** Options of training; incise_train_options_init() fills in the defaults. */
 struct incise_train_options {
-	int epochs;  /**< at most, 1 …; default 80, as in Song et al. */
+	int epochs;  /**< at most, 1 …; default 80, as in Song et al.; classic only */
 	double step; /**< initial step of the premises, default 0.01; classic only */
 	/**
 	 * Ridge of the least squares: penalty ridge·Σp² with inputs scaled to [0, 1] and the
-	 * output to its standard deviation; NAN (default) averages fits with different penalties,
-	 * weighted by cross-validation.
+	 * output to its standard deviation; NAN (default) penalises the differences of
+	 * neighbouring rules instead, with a strength selected by cross-validation.
 	 * Ignored if classic.
 	 */
 	double ridge;
@@ -82,14 +82,11 @@ struct incise_train_options {
 	 * whole groups, because pairs of one cut are not independent.
 	 */
 	const int *groups;
-	uint64_t seed;			/**< seed of the folds and the starts */
+	uint64_t seed;			/**< seed of the folds */
 	incise_train_progress progress; /**< or NULL */
 	void *user;
-	/** Number of initial premises: the given ones and others near them; default 3. */
-	int starts;
 	/**
-	 * Pairs that the search of the premises and of the ridge uses, at random; at least three for
-	 * each consequent. 0 (default): 3000. SIZE_MAX: all, in time that grows with them.
+	 * Pairs that select the ridge, at random; at least three for each consequent. 0 (default): 3000. SIZE_MAX: all, in time that grows with them.
 	 */
 	size_t tuned;
 	/**
@@ -107,9 +104,9 @@ struct incise_train_options {
 
 /** Report of a training. */
 struct incise_train_report {
-	int epochs;	/**< epochs of the final training */
+	int epochs;	/**< epochs of the training; 1 unless classic */
 	int best_epoch; /**< from 1: the epoch whose parameters were kept */
-	double ridge; /**< ridge of the search, and of the consequents unless averaged */
+	double ridge;	/**< strength of the penalty, or the ridge given */
 	double train_rmse,
 		check_rmse; /**< of the kept parameters; check NaN without data */
 	/** Condition of the scaled least squares, without ridge; infinite: not all is determined. */
@@ -123,35 +120,30 @@ struct incise_train_report {
 	double train_r2, check_r2;
 	/** RMSE on held-out pairs in cross-validation; NaN if classic. */
 	double crossval_rmse;
-	int start; /**< start whose premises were kept: 0: the given ones */
 	/**
-	 * Number of pairs for cross-validation and the search of premises: of very many pairs a
-	 * random subset. The consequents are fitted to all pairs. 0 if classic.
+	 * The same of a plane, of the mean, and of a·d + b·d² + c·v + …, d the first input and v
+	 * another (NaN if its functions are too few). The model is one of these where they are as good.
+	 */
+	double crossval_plane, crossval_mean, crossval_quadratic;
+	/**
+	 * Number of pairs for cross-validation: of very many pairs a random subset. The
+	 * consequents are fitted to all pairs. 0 if classic.
 	 */
 	size_t pairs_tuned;
 	bool unfired[INCISE_MODEL_RULES_MAX]; /**< the rules that rules_unfired counts */
-	/**
-	 * Ridge fits with a weight of at least 1 % in the average of the consequents; 0: one
-	 * fit with @ridge. Of these, the weight of the plane and of the mean of the output,
-	 * and of all fits with a random factor of each cut.
-	 */
-	int averaged;
-	double plane_weight, mean_weight, cut_weight;
 };
 
 /** Set the defaults documented above. */
 INCISE_API void incise_train_options_init(struct incise_train_options *options);
 
 /**
- * Train the consequents and the membership functions of a grid model in place.
+ * Train a grid model in place: its consequents, and if classic its membership functions.
  *
- * The default method scales the data and searches the premises by Levenberg–Marquardt on the
- * variable-projected problem (consequents always optimal for the premises), with functions
- * that remain ordered and overlapping. It selects ridge, start and number of epochs by the
- * smallest error on held-out groups of the training pairs. Unless a search is better beyond
- * chance, the premises stay and the consequents are an average of fits with different
- * penalties, up to the plane and the mean, with and without a random factor of each group,
- * weighted by that error. Check pairs are not used, except to
+ * The default method scales the data, clamps inputs to the model's ranges, and penalises
+ * the differences of neighbouring rules. The strength of the penalty is the one with the
+ * smallest error on held-out groups of the training pairs; the strongest ones lead to a
+ * plane and to the mean of the output. The law a·d + b·d² + c·v + … through 0, of the first input and
+ * the others, is preferred unless it is worse by more than a standard error. Check pairs are not used, except to
  * select the epoch with @options->classic (as in MATLAB's anfis). In the default mode the
  * check error is therefore an error on unseen data.
  *
@@ -162,8 +154,7 @@ INCISE_API void incise_train_options_init(struct incise_train_options *options);
  * @return 0; -EINVAL (no pairs, a value that is not finite, wrong n_inputs, a constant input, a weight
  *         that is not above 0, weights with classic),
  *         -ENODATA (fewer pairs than consequent parameters), -ENOTSUP (the rules are not a
- *         full grid, the AND method is min, or another kind of membership function), -ERANGE (a
- *         training pair is a whole range or more outside the model's ranges), -EDOM
+ *         full grid, the AND method is min, or another kind of membership function), -EDOM
  *         (least squares failed), -ECANCELED (options->progress), -ENOMEM. On error the model is
  *         unchanged.
  */
@@ -222,7 +213,9 @@ INCISE_API int incise_train_split(const struct incise_dataset *data, double shar
 INCISE_API void incise_train_side_free(struct incise_train_side *side);
 
 /**
- * Make the initial model of a training: an even grid over the ranges of the training pairs.
+ * Make the initial model of a training: functions at even quantiles of the training pairs, with
+ * ranges that leave far tails out (beyond half the width of the inner 98 %); if classic, an even grid
+ * over the ranges of the pairs.
  *
  * It can select @n_mfs from the pairs: the smallest number of rules whose error on held-out
  * groups is within one standard error of the best (the standard error of their difference), or

@@ -166,117 +166,39 @@ static double degree(const struct incise_basis *basis, int i, int k, double x)
 	return incise_mf_eval(&mf, x);
 }
 
-static void check_bounds(const struct incise_basis *basis)
+/* Centres at quantiles but for a tenth; each function is a half between its nearer neighbours. */
+TEST(test_place)
 {
-	/* Bounds are computed with a rounding or two. */
-	const double eps = 1e-12;
+	double rows[400 * 3];
+	const struct incise_pairs pairs = {.rows = rows, .n = 400, .n_inputs = 2};
 
-	for (int i = 0; i < 2; i++) {
-		int n = basis->n_mfs[i];
-		double gap = n > 1 ? 0.25 / (n - 1) : 0;
+	for (int i = 0; i < 400; i++) {
+		double even = i / 399.0;
 
-		for (int k = 0; k < n; k++) {
-			double c = basis->p[incise_basis_centre(basis, i, k)], next;
-
-			assert_true(c >= -eps && c <= 1 + eps);
-			assert_true(isfinite(basis->p[basis->at[i][k]]));
-			if (k == 0)
-				assert_true(degree(basis, i, k, 0) > 0.1 - eps);
-			if (k + 1 == n) {
-				assert_true(degree(basis, i, k, 1) > 0.1 - eps);
-				break;
-			}
-			next = basis->p[incise_basis_centre(basis, i, k + 1)];
-			assert_true(next - c > gap - eps);
-			assert_true(degree(basis, i, k, (c + next) / 2) > 0.1 - eps);
-			assert_true(degree(basis, i, k + 1, (c + next) / 2) > 0.1 - eps);
-		}
+		rows[3 * i] = pow(even, 4);
+		rows[3 * i + 1] = i < 300 ? 0 : 1;
 	}
-}
-
-TEST(test_even_grid_is_left_alone)
-{
-	for (int type = 0; type < 2; type++)
-		for (int n = 1; n <= 6; n++) {
-			struct incise_basis basis, before;
-
-			even(&basis, type, n, 3);
-			before = basis;
-			incise_premises_project(&basis);
-			for (int k = 0; k < basis.n_premises; k++)
-				assert_true(fabs(basis.p[k] - before.p[k]) < 1e-15);
-			check_bounds(&basis);
-		}
-}
-
-TEST(test_any_step_ends_within_bounds)
-{
-	uint64_t seed = 4;
-
-	for (int round = 0; round < 400; round++) {
-		struct incise_basis basis;
-		double step[64], size = pow(10, round % 4 - 1);
-
-		even(&basis, round & 1 ? INCISE_MF_GBELL : INCISE_MF_GAUSS, 1 + round % 7,
-		     4);
-		for (int times = 0; times < 3; times++) {
-			for (int k = 0; k < basis.n_premises; k++)
-				step[k] = size * incise_random_symmetric(&seed);
-			incise_premises_step(&basis, step);
-			check_bounds(&basis);
-		}
-	}
-}
-
-/* Functions on one spot are pulled apart, in their order. */
-TEST(test_collapsed)
-{
 	for (int type = 0; type < 2; type++) {
 		struct incise_basis basis;
+		double last = 0;
 
 		even(&basis, type, 5, 4);
+		assert_int_equal(incise_basis_place(&basis, &pairs), 0);
 		for (int k = 0; k < 5; k++) {
-			basis.p[incise_basis_centre(&basis, 0, k)] = 0.5;
-			basis.p[basis.at[0][k]] = 1e-12;
+			double c = basis.p[incise_basis_centre(&basis, 0, k)];
+
+			assert_true(fabs(c - (0.9 * pow(k / 4.0, 4) + 0.1 * k / 4)) <
+				    0.01);
+			if (k)
+				assert_true(fabs(degree(&basis, 0, k, (c + last) / 2) -
+						 0.5) < 1e-12);
+			last = c;
 		}
-		incise_premises_project(&basis);
-		check_bounds(&basis);
+		/* Quantiles that coincide leave the functions apart. */
+		for (int k = 1; k < 4; k++)
+			assert_true(
+				basis.p[incise_basis_centre(&basis, 1, k)] -
+					basis.p[incise_basis_centre(&basis, 1, k - 1)] >
+				0.03);
 	}
-}
-
-/* The scale is the derivative of a step, away from bounds. */
-TEST(test_scale)
-{
-	for (int type = 0; type < 2; type++) {
-		struct incise_basis basis, moved;
-		double step[64] = {0}, scale[64];
-
-		even(&basis, type, 3, 4);
-		incise_premises_jitter(&basis, 3);
-		incise_premises_scale(&basis, scale);
-		for (int k = 0; k < basis.n_premises; k++) {
-			moved = basis;
-			step[k] = 1e-7;
-			incise_premises_step(&moved, step);
-			step[k] = 0;
-			/* Second order 1e-7, rounding 1e-16/1e-7; a bound stops some. */
-			if (moved.p[k] != basis.p[k])
-				assert_true(fabs((moved.p[k] - basis.p[k]) / 1e-7 -
-						 scale[k]) < 1e-5);
-		}
-	}
-}
-
-TEST(test_jitter_depends_on_seed_alone)
-{
-	struct incise_basis a, b, c;
-
-	even(&a, INCISE_MF_GAUSS, 5, 4);
-	b = c = a;
-	incise_premises_jitter(&a, 7);
-	incise_premises_jitter(&b, 7);
-	incise_premises_jitter(&c, 8);
-	assert_memory_equal(a.p, b.p, sizeof(a.p));
-	assert_true(memcmp(a.p, c.p, sizeof(a.p)));
-	check_bounds(&a);
 }

@@ -191,7 +191,7 @@ TEST(test_factor)
 TEST(test_dependent)
 {
 	enum { N = 6 };
-	struct incise_ridge ridge = {1e-6, 1, N, 1};
+	struct incise_ridge ridge = {.ridge = 1e-6, .n = N};
 	struct incise_gram *gram = incise_gram_new(N + 2);
 	struct incise_lsq *lsq = incise_lsq_new(N, NULL);
 	double x[N], mean, sd;

@@ -3,7 +3,6 @@
 #include "../unit.h"
 #include <incise/train.h>
 #include "../../../lib/base/random.h"
-#include "../../../lib/learn/tune.h"
 #include "../message.h"
 
 static double rows[400 * 3];
@@ -11,10 +10,11 @@ static double rows[400 * 3];
 /* A force that bends so often with the first input and is a line in the second. */
 static void choose(double bends, double noise, size_t n, int *n_mfs, int want)
 {
-	static const struct incise_variable in[] = {{"a", 0, 1}, {"b", 0, 1}};
+	static const char *const names[] = {"a", "b", "y"};
 	struct incise_pairs pairs = {.rows = rows, .n = n, .n_inputs = 2};
 	struct incise_train_options options;
 	struct incise_error err = {0};
+	struct incise_model *model;
 	uint64_t seed = 4;
 
 	for (size_t i = 0; i < n; i++) {
@@ -26,9 +26,10 @@ static void choose(double bends, double noise, size_t n, int *n_mfs, int want)
 		       noise * incise_random_symmetric(&seed);
 	}
 	incise_train_options_init(&options);
-	assert_int_equal(incise_choose_grid(&pairs, in, INCISE_MF_GAUSS, &options, n_mfs,
-					    &err),
-			 want);
+	n_mfs[0] = 0;
+	model = incise_train_start(&pairs, names, INCISE_MF_GAUSS, n_mfs, &options, &err);
+	assert_int_equal(model ? 0 : -errno, want);
+	incise_model_free(model);
 	if (want)
 		assert_says(err.text, "pairs");
 }
@@ -86,4 +87,34 @@ TEST(test_start)
 	assert_null(incise_train_start(&pairs, names, INCISE_MF_GAUSS, given, &options,
 				       &err));
 	assert_says(err.text, "column y");
+}
+
+/* One glitched row among many neither moves the functions nor widens the ranges. */
+TEST(test_a_glitch)
+{
+	static const char *const names[] = {"a", "b", "y"};
+	struct incise_pairs pairs = {.rows = rows, .n = 400, .n_inputs = 2};
+	struct incise_train_options options;
+	int n_mfs[2] = {5, 4};
+	double centre[2], max[2];
+
+	choose(4, 0.1, 400, (int[2]){0}, 0);
+	incise_train_options_init(&options);
+	for (int glitch = 0; glitch < 2; glitch++) {
+		struct incise_model *model;
+
+		if (glitch)
+			rows[3 * 7] = 60;
+		model = incise_train_start(&pairs, names, INCISE_MF_GAUSS, n_mfs,
+					   &options, &err);
+		assert_non_null(model);
+		centre[glitch] = incise_model_mf(model, 0, 2)->p[1];
+		max[glitch] = incise_model_info(model)->input[0].max;
+		incise_model_free(model);
+	}
+	assert_true(fabs(centre[1] - centre[0]) < 0.05 && max[0] <= 1 && max[1] <= 1);
+	/* The even grid of classic has all pairs in its range. */
+	options.classic = true;
+	incise_model_free(incise_train_start(&pairs, names, INCISE_MF_GAUSS, n_mfs,
+					     &options, &err));
 }

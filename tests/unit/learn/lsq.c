@@ -62,7 +62,7 @@ TEST(test_ridge)
 		incise_lsq_add(lsq, t);
 	}
 	for (size_t i = 0; i < 5; i++) {
-		struct incise_ridge ridge = {ridges[i], 1, 1, 1};
+		struct incise_ridge ridge = {.ridge = ridges[i], .n = 1};
 
 		assert_int_equal(incise_lsq_solve(lsq, &ridge, &x), 0);
 		assert_true(fabs(x - at / (aa + ridges[i])) < 1e-13 * fabs(x));
@@ -74,7 +74,7 @@ TEST(test_ridge)
 TEST(test_rank_deficient)
 {
 	struct incise_lsq *lsq = incise_lsq_new(2, NULL);
-	struct incise_ridge little = {1e-6, 1, 2, 1}, one = {1, 1, 2, 1};
+	struct incise_ridge little = {.ridge = 1e-6, .n = 2}, one = {.ridge = 1, .n = 2};
 	double x[2], condition;
 
 	for (int n = 0; n < 20; n++) {
@@ -156,55 +156,65 @@ TEST(test_extreme_sizes)
 	incise_lsq_free(lsq);
 }
 
-/*
- * The ridge on blocks against the same penalty written out as rows: for each block
- * √ridge (p_b - p̄), and √(ridge·mean) p̄ as often as there are blocks.
- */
-TEST(test_ridge_of_blocks)
+/* Rows of √factor·(p_a - p_b), or of √factor·p_a without b, for both parameters of rules. */
+static void add_difference(struct incise_lsq *lsq, int n, int a, int b, double factor)
 {
-	static const double means[] = {1, 0.25, 1e-3};
+	for (int c = 0; c < 2; c++) {
+		double *row = incise_lsq_row(lsq);
 
-	for (size_t m = 0; m < sizeof(means) / sizeof(*means); m++)
-		for (int blocks = 1; blocks <= 5; blocks++) {
-			int n = 2 * blocks;
-			struct incise_lsq *a = incise_lsq_new(n, NULL),
-					  *b = incise_lsq_new(n, NULL);
-			struct incise_ridge ridge = {0.7, means[m], n, blocks};
-			double x[10], y[10];
+		for (int k = 0; k < n; k++)
+			row[k] = sqrt(factor) *
+				 ((k == 2 * a + c) - (b >= 0 && k == 2 * b + c));
+		incise_lsq_add(lsq, 0);
+	}
+}
 
-			seed = 10 * m + blocks;
-			for (int i = 0; i < 7; i++) {
-				double t = uniform();
+/* The ridge on a grid of rules against the same penalty written out as rows. */
+TEST(test_ridge_of_a_grid)
+{
+	static const struct {
+		double mean;
+		int n_mfs[2];
+	} cases[] = {{1, {1}}, {1, {5}}, {0.25, {3, 2}}, {1e-3, {2, 3}}, {1e-3, {1, 4}}};
 
-				for (int k = 0; k < n; k++)
-					incise_lsq_row(a)[k] = incise_lsq_row(b)[k] =
-						uniform();
-				incise_lsq_add(a, t);
-				incise_lsq_add(b, t);
-			}
-			for (int i = 0; i < n; i++) {
-				for (int k = 0; k < n; k++)
-					incise_lsq_row(b)[k] =
-						k % 2 != i % 2
-							? 0
-							: sqrt(0.7) * ((k == i) -
-								       1.0 / blocks);
-				incise_lsq_add(b, 0);
-				for (int k = 0; k < n; k++)
-					incise_lsq_row(b)[k] =
-						k % 2 != i % 2
-							? 0
-							: sqrt(0.7 * means[m]) / blocks;
-				incise_lsq_add(b, 0);
-			}
-			assert_int_equal(incise_lsq_solve(a, &ridge, x), 0);
-			assert_int_equal(incise_lsq_solve(b, NULL, y), 0);
-			/* Rounding, times a condition of √(1/1e-3) at most. */
-			for (int i = 0; i < n; i++)
-				assert_true(fabs(x[i] - y[i]) < 1e-12);
-			incise_lsq_free(a);
-			incise_lsq_free(b);
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		int m = cases[i].n_mfs[1] ? cases[i].n_mfs[1] : 1,
+		    rules = cases[i].n_mfs[0] * m, n = 2 * rules;
+		struct incise_lsq *a = incise_lsq_new(n, NULL),
+				  *b = incise_lsq_new(n, NULL);
+		struct incise_ridge ridge = {
+			0.7, n, cases[i].mean, {cases[i].n_mfs[0], cases[i].n_mfs[1]}};
+		double x[12], y[12];
+
+		seed = i;
+		for (int row = 0; row < 7; row++) {
+			double t = uniform();
+
+			for (int k = 0; k < n; k++)
+				incise_lsq_row(a)[k] = incise_lsq_row(b)[k] = uniform();
+			incise_lsq_add(a, t);
+			incise_lsq_add(b, t);
 		}
+		for (int r = 0; r < rules; r++) {
+			if (r + m < rules)
+				add_difference(b, n, r, r + m, 0.7);
+			if (r % m < m - 1)
+				add_difference(b, n, r, r + 1, 0.7);
+		}
+		for (int c = 0; c < 2; c++) {
+			for (int k = 0; k < n; k++)
+				incise_lsq_row(b)[k] =
+					k % 2 == c ? sqrt(cases[i].mean / rules) : 0;
+			incise_lsq_add(b, 0);
+		}
+		assert_int_equal(incise_lsq_solve(a, &ridge, x), 0);
+		assert_int_equal(incise_lsq_solve(b, NULL, y), 0);
+		/* Rounding, times the square of a condition of √(1/1e-3) at most. */
+		for (int k = 0; k < n; k++)
+			assert_true(fabs(x[k] - y[k]) < 1e-11);
+		incise_lsq_free(a);
+		incise_lsq_free(b);
+	}
 }
 
 /* |R⁻ᵀa|² = aᵀ(AᵀA)⁻¹a, which for a row of orthogonal columns is Σ a²/|column|². */

@@ -110,7 +110,7 @@ TEST(test_sample)
 	struct incise_scaling scaling = {1, {0, 0}, {1, 1}};
 
 	for (int i = 0; i < 1000; i++) {
-		rows[2 * i] = i;
+		rows[2 * i] = i / 1024.0;
 		groups[i] = i / 10;
 	}
 	for (size_t most = 10; most <= 100000; most *= 100) {
@@ -127,7 +127,7 @@ TEST(test_sample)
 		for (size_t i = 0; i < n; i++) {
 			if (i)
 				assert_true(a.rows[2 * i] > a.rows[2 * i - 2]);
-			assert_int_equal(a.groups[i], (int)a.rows[2 * i] / 10);
+			assert_int_equal(a.groups[i], (int)(1024 * a.rows[2 * i]) / 10);
 		}
 		assert_memory_equal(a.rows, b.rows, n * 2 * sizeof(double));
 		assert_int_equal(!memcmp(a.rows, c.rows, n * 2 * sizeof(double)),

@@ -50,7 +50,7 @@ static struct incise_model *fit(struct incise_propagation *p,
 				const struct incise_model *start, int rigs, double error,
 				struct incise_uncertainty **uncertainty, double *scatter)
 {
-	const struct incise_factor_ridge ridge = {RIDGE, 1, 0.3};
+	const struct incise_factor_ridge ridge = {RIDGE, 0.3};
 	struct incise_model *bare = premises(), *model;
 	struct incise_factor *factor = incise_factor_new(bare, NULL);
 

@@ -273,7 +273,6 @@ TEST(test_deterministic_and_scale_free)
 				scales[s] * sin(3 * rows[3 * i] + rows[3 * i + 1]);
 		}
 		incise_train_options_init(&options);
-		options.epochs = 10;
 		assert_int_equal(
 			incise_train(model, &pairs, NULL, &options, &report, NULL), 0);
 		rmse[s] = report.train_rmse / scales[s];
@@ -306,7 +305,6 @@ static struct incise_model *train_weighed(const struct incise_pairs *pairs, doub
 	struct incise_train_options options;
 
 	incise_train_options_init(&options);
-	options.epochs = options.starts = 1;
 	options.ridge = ridge;
 	assert_int_equal(incise_train(model, pairs, NULL, &options, NULL, NULL), 0);
 	return model;
@@ -335,7 +333,7 @@ TEST(test_a_weight_counts_pairs)
 	incise_model_free(repeated);
 }
 
-/* The heavy one of two outputs at the same places is learnt, by the average and by one ridge. */
+/* The heavy one of two outputs at the same places is learnt, by the penalty and by a ridge. */
 TEST(test_light_pairs_hardly_count)
 {
 	double rows[WEIGHED * 3], weights[WEIGHED];
@@ -569,10 +567,6 @@ TEST(test_extreme_data)
 			incise_train_options_init(&options);
 			options.classic = classic;
 			options.uncertainty = &uncertainty;
-#ifdef __SANITIZE_ADDRESS__
-			options.starts = 1; /* of 3, in the same memory */
-			options.epochs = 5;
-#endif
 			rc = incise_train(model, &pairs, NULL, &options, &report, &err);
 			if (rc) {
 				/* Consequents over 1e-310 are beyond a double; nothing
@@ -585,7 +579,7 @@ TEST(test_extreme_data)
 						    incise_model_mf(before, 0, 1)->p,
 						    2 * sizeof(double));
 			} else {
-				check_finite(model, !classic);
+				check_finite(model, !classic && what != COLLAPSED);
 				/* The classic ridge, 1e-6 on raw units, drowns targets of
 				 * 1e-9 no more than others; far inputs spoil its scale. */
 				if (!classic)
@@ -660,7 +654,8 @@ TEST(test_report)
 	options.progress = on_epoch;
 	options.user = &curve;
 	assert_int_equal(incise_train(model, &train, &check, &options, &report, NULL), 0);
-	assert_true(fabs(report.check_rmse - incise_pairs_rmse(model, &check)) < 1e-15);
+	assert_true(fabs(report.check_rmse - incise_pairs_rmse(model, &check, true)) <
+		    1e-15);
 	assert_true(fabs(curve.train[report.best_epoch - 1] - report.train_rmse) < 1e-9);
 	assert_true(fabs(curve.check[report.best_epoch - 1] - report.check_rmse) < 1e-9);
 	for (int i = 0; i < 100; i++)
@@ -695,14 +690,14 @@ static int stop_at(void *user, const struct incise_train_step *step)
 /* Stopped at any call of its progress, a training fails, changes nothing, and calls it no more. */
 TEST(test_training_can_be_stopped)
 {
-	double rows[200 * 3];
-	const int mfs[] = {4, 3};
+	static double rows[2000 * 3];
+	const int mfs[] = {6, 5};
 	const double min[] = {0, 0}, max[] = {1, 1};
-	struct incise_pairs train = {.rows = rows, .n = 200, .n_inputs = 2};
+	struct incise_pairs train = {.rows = rows, .n = 2000, .n_inputs = 2};
 	struct incise_model *model = grid(2, min, max, mfs, INCISE_MF_GAUSS);
 	static const char *const names[] = {"a", "b", "y"};
 
-	for (int i = 0; i < 200; i++) {
+	for (int i = 0; i < 2000; i++) {
 		rows[3 * i] = i * 37 % 101 / 100.0;
 		rows[3 * i + 1] = i * 53 % 97 / 96.0;
 		rows[3 * i + 2] = sin(9 * rows[3 * i]) + rows[3 * i + 1];
@@ -715,6 +710,7 @@ TEST(test_training_can_be_stopped)
 		int step;
 
 		options.classic = k == 1;
+		train.n = k == 1 ? 200 : 2000;
 		for (int at = 0; at <= whole.calls; at += step) {
 			struct stopping stopping = {.at = at};
 			struct incise_uncertainty *uncertainty = NULL;
@@ -738,7 +734,7 @@ TEST(test_training_can_be_stopped)
 			}
 			assert_int_equal(rc, at ? -ECANCELED : 0);
 			assert_int_equal(stopping.calls, at);
-			assert_true(at || k == 2 || whole.epochs > 1);
+			assert_true(at || k != 1 || whole.epochs > 1);
 			assert_true(k == 2 || (at > 0) == !uncertainty);
 			incise_uncertainty_free(uncertainty);
 			incise_model_free(copy);

@@ -92,7 +92,6 @@ static struct incise_sources_options make_options(enum way way,
 
 	incise_train_options_init(&options.train);
 	options.train.epochs = 4;
-	options.train.starts = 1;
 	options.train.classic = way == CLASSIC;
 	if (way == CHOSEN)
 		options.n_mfs[0] = 0;
