@@ -341,8 +341,8 @@ static void take_button(struct vrpn_device *device, size_t button, uint32_t stat
 {
 	if (button >= BUTTONS)
 		return;
-	if (device->haptic.info.buttons <= (int)button)
-		device->haptic.info.buttons = (int)button + 1;
+	if (device->haptic.info.buttons <= button)
+		device->haptic.info.buttons = (uint32_t)button + 1;
 	device->pressed &= ~(UINT32_C(1) << button);
 	device->pressed |= (uint32_t)(state != 0) << button;
 }
