@@ -20,16 +20,17 @@
 #include "../../rig/axes.h"
 #include "../../rig/backends.h"
 #include "../../rig/haptic_backend.h"
+#include "../can/bus/socketcan_netlink.h"
 #include "moteus.h"
 
 #define MOTORS INCISE_HAPTIC_MOTORS_MAX
 #define RATE_HZ 1000
 #define WATCHDOG_MS 50
 #define WATCHDOG_NS (WATCHDOG_MS * INT64_C(1000000))
-#define ANSWER_NS \
-	INT64_C(20000000)	 /* all of it is waited for: two answers are an error */
-#define SCAN_NS INT64_C(1000000) /* between the questions of a search */
-#define TEST_ROUNDS 25		 /* of an answer each; a drive needs time to start */
+/* All of it is waited for: two answers are an error. */
+#define ANSWER_NS INT64_C(20000000)
+#define SCAN_NS INT64_C(1000000)    /* between the questions of a search */
+#define TEST_ROUNDS 25		    /* of an answer each; a drive needs time to start */
 #define SILENT_NS INT64_C(10000000) /* without an answer the device fails */
 #define LATE_CYCLES 2		    /* without an answer there is no force */
 #define FORCE_LATENCY_NS 300000	    /* of a frame, and of the drive's own loop */
@@ -543,13 +544,16 @@ static int report_drive(const char *interface, int id, const struct motor *drive
 int moteus_scan_on(const struct can_transport *transport, const char *interface,
 		   incise_scan_found *found, void *context, struct incise_error *err)
 {
+	char where[INTERFACE + 8];
 	const struct can_bus_request request = {
-		.where = "moteus", .device = interface, .node = LOCK, .fd = true};
+		.where = where, .device = interface, .node = LOCK, .fd = true};
 	struct motor drives[MOTEUS_ID_MAX + 1] = {0};
 	struct canfd_frame frame;
 	struct can_bus *bus;
-	int rc = transport->open(&bus, &request, err), sent = 0;
+	int rc, sent = 0;
 
+	snprintf(where, sizeof(where), "moteus:%.39s", interface);
+	rc = transport->open(&bus, &request, err);
 	if (rc)
 		return rc;
 	for (int id = 1; id <= MOTEUS_ID_MAX && !sent; id++) {
@@ -564,25 +568,34 @@ int moteus_scan_on(const struct can_transport *transport, const char *interface,
 	return rc;
 }
 
+/* By netlink first: a socket of CAN would load modules of the kernel. */
+static bool is_can(const char *interface)
+{
+	struct can_netlink link;
+
+	return !can_netlink_query(interface, &link) && link.is_can && link.is_up;
+}
+
 /* Without arguments each interface that takes CAN FD, and that no other program has. */
 static int scan_moteus(const char *arguments, incise_scan_found *found, void *context,
 		       struct incise_error *err)
 {
-	struct if_nameindex *all = if_nameindex();
+	struct if_nameindex *all = *arguments ? NULL : if_nameindex();
 	char interface[INTERFACE];
 	int rc = 0;
 
-	if (*arguments) {
-		snprintf(interface, sizeof(interface), "%.*s",
-			 (int)strcspn(arguments, ":"), arguments);
-		rc = moteus_scan_on(&can_transport_socketcan, interface, found, context,
-				    err);
-	}
-	for (int i = 0; !*arguments && all && all[i].if_index && rc <= 0; i++)
-		rc = moteus_scan_on(&can_transport_socketcan, all[i].if_name, found,
-				    context, NULL);
-	if_freenameindex(all);
-	return *arguments || rc > 0 ? rc : 0;
+	snprintf(interface, sizeof(interface), "%.*s", (int)strcspn(arguments, ":"),
+		 arguments);
+	if (*arguments)
+		return moteus_scan_on(&can_transport_socketcan, interface, found, context,
+				      err);
+	for (int i = 0; all && all[i].if_index && rc <= 0; i++)
+		if (is_can(all[i].if_name))
+			rc = moteus_scan_on(&can_transport_socketcan, all[i].if_name,
+					    found, context, NULL);
+	if (all)
+		if_freenameindex(all);
+	return rc > 0 ? rc : 0;
 }
 
 INCISE_BACKEND(incise_haptic_moteus, "haptic", "moteus", .open = open_moteus,
