@@ -161,7 +161,7 @@ TEST(a_page_without_lock_or_magic_is_refused_at_once, open_page, close_page)
 
 TEST(a_property_that_makes_no_sense_is_named, open_page, close_page)
 {
-	struct incise_haptic_page_device *d = &page.map->device, good = *d;
+	struct incise_haptic_info *d = &page.map->device, good = *d;
 
 	for (int i = 0; i < 7; i++) {
 		static const char *const words[] = {
