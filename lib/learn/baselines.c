@@ -121,17 +121,18 @@ static void knn_predict(const struct pool *pool, const double *x, long excluded,
 		return;
 	for (size_t n = 0; n < pool->n; n++) {
 		const double *row = train->rows + pool->pairs[n] * width;
-		double distance = 0;
+		double distance = 0, most = found == K_MAX ? near[K_MAX - 1] : INFINITY;
 		int i;
 
-		if (excluded >= 0 && excluded == unit_of_baselines(pool, pool->pairs[n]))
-			continue;
-		for (int c = 0; c < train->n_inputs; c++) {
+		/* Most pairs are too far by the first input alone. */
+		for (int c = 0; c < train->n_inputs && distance < most; c++) {
 			double e = (row[c] - x[c]) / columns[c].sd;
 
 			distance += e * e;
 		}
-		if (found == K_MAX && distance >= near[K_MAX - 1])
+		if (distance >= most ||
+		    (excluded >= 0 &&
+		     excluded == unit_of_baselines(pool, pool->pairs[n])))
 			continue;
 		found += found < K_MAX;
 		for (i = found - 1; i > 0 && near[i - 1] > distance; i--) {

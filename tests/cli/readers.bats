@@ -61,7 +61,7 @@ state() {
 		export REC --resample --rate 100 -o out/a.mcap
 		plot REC -o out/a.svg
 		replay REC wall
-		train REC -o out/m.fis
+		train REC --premises m.fis -o out/m.fis
 		join REC closed.rec -o out/j.rec
 		info --dataset REC
 		recover REC -o out/r.rec

@@ -132,7 +132,7 @@ TEST(test_stopped_at_any_call)
 	assert_int_equal(train(&options, &start, &err), 0);
 	for (enum way way = DEFAULT; way < WAYS; way++) {
 		struct stopping whole = {0};
-		int most = cases_of(100, 5);
+		int most = cases_of(100, 3);
 
 		options = make_options(way, start.model);
 		options.train.progress = stop_at;
@@ -172,7 +172,7 @@ TEST(test_goes_on)
 	options.train.user = &whole;
 	assert_int_equal(train(&options, &wanted, &err), 0);
 	options.progress = kept;
-	for (int at = 1; at <= whole.calls; at += 1 + whole.calls / 15) {
+	for (int at = 1; at <= whole.calls; at += 1 + whole.calls / cases_of(15, 4)) {
 		struct stopping stopping = {.at = at};
 
 		next = (struct stopping){0};
