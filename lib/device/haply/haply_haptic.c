@@ -21,6 +21,7 @@
  * Safety and batteries are events of a second port, where there is one.
  */
 #include <errno.h>
+#include <netdb.h>
 #include <poll.h>
 #include <math.h>
 #include <stdio.h>
@@ -61,7 +62,8 @@ struct haply_link {
 struct haply {
 	struct incise_haptic haptic; /* first */
 	struct incise_clock *clock;
-	char host[256], id[HAPLY_ID_SIZE], grip[HAPLY_ID_SIZE];
+	char host[256], address[NI_MAXHOST];
+	char id[HAPLY_ID_SIZE], grip[HAPLY_ID_SIZE];
 	int port;
 	struct lws_context *context;
 	struct haply_link frames, events;
@@ -255,7 +257,7 @@ static void connect_link(struct haply *h, struct haply_link *link, int port)
 {
 	struct lws_client_connect_info info = {
 		.context = h->context,
-		.address = h->host,
+		.address = h->address,
 		.host = h->host,
 		.origin = h->host,
 		.port = port,
@@ -427,10 +429,29 @@ static bool create_context(struct haply *h)
 	return h->context;
 }
 
+/* Address by address: libwebsockets 4.3 gives up a host whose first address refuses it. */
+static void connect_host(struct haply *h, int64_t until_ns)
+{
+	struct addrinfo hints = {.ai_socktype = SOCK_STREAM}, *found = NULL, *one;
+
+	if (getaddrinfo(h->host, NULL, &hints, &found))
+		return;
+	for (one = found; one && !h->frames.wsi; one = one->ai_next) {
+		if (getnameinfo(one->ai_addr, one->ai_addrlen, h->address,
+				sizeof(h->address), NULL, 0, NI_NUMERICHOST))
+			continue;
+		connect_link(h, &h->frames, h->port);
+		wait_answer(h, until_ns);
+	}
+	freeaddrinfo(found);
+}
+
 /* Connect, and wait for the inventory, which is the first frame. */
 static int connect_service(struct haply *h, const char *arguments, const char *where,
 			   struct incise_error *err)
 {
+	int64_t until_ns;
+
 	if (!parse_arguments(h, arguments))
 		return incise_error_set(err, EINVAL,
 					"%s: \"%.80s\": expected haply:[HOST:PORT][/ID], "
@@ -440,14 +461,15 @@ static int connect_service(struct haply *h, const char *arguments, const char *w
 		return incise_error_set(err, ENOMEM, "%s: %s", where, strerror(ENOMEM));
 	h->waits = true;
 	h->sent_ns = get_now(h);
-	connect_link(h, &h->frames, h->port);
-	connect_link(h, &h->events, h->port + EVENTS_AFTER);
-	wait_answer(h, h->sent_ns + OPEN_NS);
+	until_ns = h->sent_ns + OPEN_NS;
+	connect_host(h, until_ns);
 	if (h->waits || h->bad)
 		return incise_error_set(err, h->bad ? EPROTO : ENODEV,
 					"%s: no Inverse Service at %.100s port %d; start "
 					"haply-inverse-service, or correct host and port",
 					where, h->host, h->port);
+	connect_link(h, &h->events, h->port + EVENTS_AFTER);
+	wait_answer(h, until_ns);
 	return 0;
 }
 

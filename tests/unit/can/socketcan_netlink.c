@@ -420,7 +420,7 @@ TEST(the_question_is_by_name, fake_begin, fake_end)
 	       sizeof(attr));
 	assert_int_equal(attr.nla_type, IFLA_IFNAME);
 	assert_int_equal(attr.nla_len, NLA_HDRLEN + sizeof("can0"));
-	assert_string_equal(fake.asked.bytes + fake.asked.n - 8, "can0");
+	assert_memory_equal(fake.asked.bytes + fake.asked.n - 8, "can0", sizeof("can0"));
 }
 
 TEST(what_is_no_name_is_not_asked, fake_begin, fake_end)

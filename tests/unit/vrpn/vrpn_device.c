@@ -671,3 +671,40 @@ TEST(wrong_devices_are_one_line)
 		assert_non_null(strstr(err.text, "vrpn:NAME@HOST:PORT"));
 	}
 }
+
+TEST(hosts_and_ports)
+{
+	static const struct {
+		const char *text, *host, *port, *rest;
+		int rc;
+	} cases[] = {
+		{"a", "a", "3883", "", 0},
+		{"a:1", "a", "1", "", 0},
+		{"a:65535:b", "a", "65535", ":b", 0},
+		{"[::1]", "::1", "3883", "", 0},
+		{"[::1]:7:b", "::1", "7", ":b", 0},
+		{"a:0", "", "", "", -ERANGE},
+		{"a:65536", "", "", "", -ERANGE},
+		{"a:1x", "", "", "", -ERANGE},
+		{"a:", "", "", "", -EINVAL},
+		{"[]", "", "", "", -EINVAL},
+	};
+	struct server_link link;
+	char longest[sizeof(link.host) + 1] = "";
+	const char *rest;
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		assert_int_equal(server_link_parse(&link, cases[i].text, 3883, &rest),
+				 cases[i].rc);
+		if (cases[i].rc)
+			continue;
+		assert_string_equal(link.host, cases[i].host);
+		assert_string_equal(link.port, cases[i].port);
+		assert_string_equal(rest, cases[i].rest);
+	}
+	memset(longest, 'a', sizeof(link.host) - 1);
+	assert_int_equal(server_link_parse(&link, longest, 1, &rest), 0);
+	assert_string_equal(link.host, longest);
+	longest[sizeof(link.host) - 1] = 'a';
+	assert_int_equal(server_link_parse(&link, longest, 1, &rest), -EINVAL);
+}
