@@ -671,6 +671,10 @@ static void report_train_json(const struct train_options *options,
 		    report->crossval_quadratic);
 	set_in_unit(object, "noise", options, trained->noise);
 	json_set_number(object, "interval95_coverage", trained->coverage);
+	json_set_number(object, "low_end", trained->end[0]);
+	json_set_number(object, "low_end_bias", trained->end_bias[0]);
+	json_set_number(object, "high_end", trained->end[1]);
+	json_set_number(object, "high_end_bias", trained->end_bias[1]);
 	json_object_set_new(object, "uncertainty",
 			    propagated_json(options, &trained->propagated));
 	json_object_set_new(object, "warnings", warned);
@@ -691,10 +695,11 @@ static const char *name_penalty(const struct train_options *options,
 {
 	if (options->how.train.classic || !isnan(options->how.train.ridge))
 		return "ridge";
-	return report->crossval_rmse == report->crossval_quadratic ? "quadratic, penalty"
-	       : report->crossval_rmse == report->crossval_plane   ? "plane, penalty"
-	       : report->crossval_rmse == report->crossval_mean	   ? "mean, penalty"
-								   : "penalty";
+	return report->crossval_rmse == report->crossval_quadratic
+		       ? "near a quadratic, penalty"
+	       : report->crossval_rmse == report->crossval_plane ? "plane, penalty"
+	       : report->crossval_rmse == report->crossval_mean	 ? "mean, penalty"
+								 : "penalty";
 }
 
 static void print_clamped(const struct incise_trained *trained)
@@ -769,6 +774,10 @@ static void report_train_text(const struct train_options *options,
 	if (check)
 		printf(", holds %.1f %% of the %s", 100 * trained->coverage, unseen);
 	printf("\n");
+	printf("  bias at the ends of %s: %+.2g %% of the mean below %.3g, %+.2g %% above "
+	       "%.3g\n",
+	       incise_model_info(model)->input[0].name, 100 * trained->end_bias[0],
+	       trained->end[0], 100 * trained->end_bias[1], trained->end[1]);
 	if (options->how.n_parts)
 		printf("  uncertainties: own parts %.3g %s; calibrations %.3g %s on the "
 		       "model, %.3g %s of another rig\n",

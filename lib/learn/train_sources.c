@@ -15,6 +15,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <incise/version.h>
+#include "../base/ascending.h"
 #include "reader.h"
 #include "train.h"
 
@@ -642,6 +643,41 @@ static char *make_notes(const struct training *t)
 	return fclose(out) ? NULL : text;
 }
 
+/* The mean error at both ends of the first input. */
+static int find_bias(struct training *t)
+{
+	struct incise_trained *trained = t->trained;
+	const struct incise_corpus *corpus = trained->corpus;
+	bool unseen = incise_corpus_side(corpus, true)->sample.pairs.n > 0;
+	const struct incise_pairs *pairs =
+		&incise_corpus_side(corpus, unseen)->sample.pairs;
+	size_t width = pairs->n_inputs + 1, tail = (pairs->n - 1) / 20;
+	double *sorted = malloc(pairs->n * sizeof(*sorted));
+	double error[2] = {0}, output[2] = {0};
+
+	if (!sorted)
+		return no_train_sources_memory(t);
+	for (size_t i = 0; i < pairs->n; i++)
+		sorted[i] = pairs->rows[i * width];
+	qsort(sorted, pairs->n, sizeof(*sorted), ascending);
+	trained->end[0] = sorted[tail];
+	trained->end[1] = sorted[pairs->n - 1 - tail];
+	free(sorted);
+	for (size_t i = 0; i < pairs->n; i++) {
+		const double *x = pairs->rows + i * width;
+		double e = incise_model_eval(trained->model, x, NULL) - x[width - 1];
+
+		for (int high = 0; high < 2; high++)
+			if (high ? *x >= trained->end[1] : *x <= trained->end[0]) {
+				error[high] += e;
+				output[high] += x[width - 1];
+			}
+	}
+	for (int high = 0; high < 2; high++)
+		trained->end_bias[high] = error[high] / fabs(output[high]);
+	return 0;
+}
+
 /* The pairs of the sample that the ranges of the model leave out. */
 static uint64_t count_clamped(const struct training *t)
 {
@@ -684,8 +720,9 @@ static int judge_model(struct training *t)
 	}
 	trained->noise = incise_uncertainty_noise(trained->uncertainty);
 	find_coverage(t);
-	if (t->watch.stopped)
-		return -ECANCELED;
+	rc = find_bias(t);
+	if (rc || t->watch.stopped)
+		return rc ? rc : -ECANCELED;
 	if (incise_baselines(&fit->sample.pairs, fit->sample.groups,
 			     &(check->sample.pairs.n ? check : fit)->sample.pairs,
 			     t->watch.progress, t->watch.user, &trained->baselines,
