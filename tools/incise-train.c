@@ -674,6 +674,10 @@ static void report_train_json(const struct train_options *options,
 	json_object_set_new(object, "interval95_thirds",
 			    json_numbers(trained->thirds, 3));
 	json_set_number(object, "interval95_least_group", trained->least);
+	json_set_number(object, "low_end", trained->end[0]);
+	json_set_number(object, "low_end_bias", trained->end_bias[0]);
+	json_set_number(object, "high_end", trained->end[1]);
+	json_set_number(object, "high_end_bias", trained->end_bias[1]);
 	json_object_set_new(object, "uncertainty",
 			    propagated_json(options, &trained->propagated));
 	json_object_set_new(object, "warnings", warned);
@@ -694,10 +698,11 @@ static const char *name_penalty(const struct train_options *options,
 {
 	if (options->how.train.classic || !isnan(options->how.train.ridge))
 		return "ridge";
-	return report->crossval_rmse == report->crossval_quadratic ? "quadratic, penalty"
-	       : report->crossval_rmse == report->crossval_plane   ? "plane, penalty"
-	       : report->crossval_rmse == report->crossval_mean	   ? "mean, penalty"
-								   : "penalty";
+	return report->crossval_rmse == report->crossval_quadratic
+		       ? "near a quadratic, penalty"
+	       : report->crossval_rmse == report->crossval_plane ? "plane, penalty"
+	       : report->crossval_rmse == report->crossval_mean	 ? "mean, penalty"
+								 : "penalty";
 }
 
 static void print_clamped(const struct incise_trained *trained)
@@ -776,6 +781,10 @@ static void report_train_text(const struct train_options *options,
 		       100 * trained->thirds[1], 100 * trained->thirds[2],
 		       incise_model_info(model)->input[0].name, 100 * trained->least);
 	printf("\n");
+	printf("  bias at the ends of %s: %+.2g %% of the mean below %.3g, %+.2g %% above "
+	       "%.3g\n",
+	       incise_model_info(model)->input[0].name, 100 * trained->end_bias[0],
+	       trained->end[0], 100 * trained->end_bias[1], trained->end[1]);
 	if (options->how.n_parts)
 		printf("  uncertainties: own parts %.3g %s; calibrations %.3g %s on the "
 		       "model, %.3g %s of another rig\n",

@@ -219,6 +219,13 @@ int incise_crossval_ratios(const struct incise_basis *basis,
 /* So strong that rules do not differ. */
 #define RIGID 1e5
 
+/*
+ * The pull towards the quadratic law, against that of many pairs, and the share of the squared error up to
+ * which it is kept.
+ */
+#define PULL 100
+#define ALIKE 0.15
+
 void incise_crossval_settings(const struct incise_basis *basis,
 			      struct incise_ridge *ridges)
 {
@@ -256,7 +263,8 @@ static void choose_setting(const struct incise_folds *folds,
 		else if (i == CROSSVAL_RIDGES)
 			choice->quadratic = total;
 		if (i == CROSSVAL_RIDGES)
-			clear = incise_crossval_spread(folds, error, choice->error);
+			clear = fmin(incise_crossval_spread(folds, error, choice->error),
+				     ALIKE * choice->total);
 		if (total < choice->total + clear)
 			keep_setting(choice, &ridges[i], error, total, folds->n_units);
 	}
@@ -274,7 +282,7 @@ int incise_crossval_choose(const struct incise_basis *basis,
 		return -ENOMEM;
 	incise_crossval_settings(basis, ridges);
 	ridges[CROSSVAL_RIDGES] =
-		(struct incise_ridge){.ridge = RIGID,
+		(struct incise_ridge){.ridge = PULL,
 				      .n = basis->n_rules * (basis->n_inputs + 1),
 				      .free = quadratic,
 				      .n_free = basis->n_inputs + 1};

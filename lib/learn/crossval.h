@@ -67,8 +67,8 @@ struct incise_choice {
 };
 
 /*
- * quadratic is NULL or that law, which outlives the choice: it is preferred where it is not worse by
- * more than a standard error. Returns 0, -EDOM, -ECANCELED, -ENOMEM.
+ * quadratic is NULL or that law, which outlives the choice: a ridge towards it is preferred where it is
+ * not worse by more than a standard error and 15 % of the squared error. Returns 0, -EDOM, -ECANCELED, -ENOMEM.
  */
 int incise_crossval_choose(const struct incise_basis *basis,
 			   const struct incise_folds *folds, const double *quadratic,

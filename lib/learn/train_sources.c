@@ -635,7 +635,7 @@ static void count_inside(struct training *t, const struct incise_train_side *sid
 	}
 }
 
-/* The shares of the sample that is held out within its interval. Returns 0 or -ENOMEM. */
+/* The shares of the sample that is held out within its interval. */
 static int find_coverage(struct training *t)
 {
 	const struct incise_train_side *side =
@@ -662,7 +662,7 @@ static int find_coverage(struct training *t)
 				fmin(trained->least, group[g].inside / group[g].n);
 	free(group);
 	free(first);
-	return group && first ? 0 : -ENOMEM;
+	return group && first ? 0 : no_train_sources_memory(t);
 }
 
 /* Notes of a model, also of a classic one, which has no factor; free(3), NULL: no memory. */
@@ -687,6 +687,41 @@ static char *make_notes(const struct training *t)
 			(unsigned long long)survey->rows, survey->text);
 	}
 	return fclose(out) ? NULL : text;
+}
+
+/* The mean error at both ends of the first input. */
+static int find_bias(struct training *t)
+{
+	struct incise_trained *trained = t->trained;
+	const struct incise_corpus *corpus = trained->corpus;
+	bool unseen = incise_corpus_side(corpus, true)->sample.pairs.n > 0;
+	const struct incise_pairs *pairs =
+		&incise_corpus_side(corpus, unseen)->sample.pairs;
+	size_t width = pairs->n_inputs + 1, tail = (pairs->n - 1) / 20;
+	double *sorted = malloc(pairs->n * sizeof(*sorted));
+	double error[2] = {0}, output[2] = {0};
+
+	if (!sorted)
+		return no_train_sources_memory(t);
+	for (size_t i = 0; i < pairs->n; i++)
+		sorted[i] = pairs->rows[i * width];
+	qsort(sorted, pairs->n, sizeof(*sorted), ascending);
+	trained->end[0] = sorted[tail];
+	trained->end[1] = sorted[pairs->n - 1 - tail];
+	free(sorted);
+	for (size_t i = 0; i < pairs->n; i++) {
+		const double *x = pairs->rows + i * width;
+		double e = incise_model_eval(trained->model, x, NULL) - x[width - 1];
+
+		for (int high = 0; high < 2; high++)
+			if (high ? *x >= trained->end[1] : *x <= trained->end[0]) {
+				error[high] += e;
+				output[high] += x[width - 1];
+			}
+	}
+	for (int high = 0; high < 2; high++)
+		trained->end_bias[high] = error[high] / fabs(output[high]);
+	return 0;
 }
 
 /* The pairs of the sample that the ranges of the model leave out. */
@@ -730,10 +765,11 @@ static int judge_model(struct training *t)
 		trained->check_outside = trained->check_pairs - info.rows;
 	}
 	trained->noise = incise_uncertainty_noise(trained->uncertainty);
-	if (find_coverage(t))
-		return no_train_sources_memory(t);
-	if (t->watch.stopped)
-		return -ECANCELED;
+	rc = find_coverage(t);
+	if (!rc)
+		rc = find_bias(t);
+	if (rc || t->watch.stopped)
+		return rc ? rc : -ECANCELED;
 	if (incise_baselines(&fit->sample.pairs, fit->sample.groups,
 			     &(check->sample.pairs.n ? check : fit)->sample.pairs,
 			     t->watch.progress, t->watch.user, &trained->baselines,

@@ -68,7 +68,7 @@ SourceStruct, SourcesOptionsStruct, PropagationReportStruct, TrainedStruct = _li
         uint64_t pairs, check_pairs, left_out, repeated, check_outside, clamped;
         const char *group;
         void *initial, *factor, *corpus;
-        double noise, coverage, thirds[3], least;
+        double noise, coverage, thirds[3], least, end[2], end_bias[2];
         struct incise_propagation_report propagated;
         bool shared;
     };

@@ -121,8 +121,8 @@ struct incise_train_report {
 	/** RMSE on held-out pairs in cross-validation; NaN if classic. */
 	double crossval_rmse;
 	/**
-	 * The same of a plane, of the mean, and of a·d + b·d² + c·v + …, d the first input and v
-	 * another (NaN if its functions are too few). The model is one of these where they are as good.
+	 * The same of a plane, of the mean, and of rules that are drawn towards a·d + b·d² + c·v + …,
+	 * d the first input and v another (NaN without). The model is one of these where they are as good.
 	 */
 	double crossval_plane, crossval_mean, crossval_quadratic;
 	/**
@@ -142,8 +142,8 @@ INCISE_API void incise_train_options_init(struct incise_train_options *options);
  * The default method scales the data, clamps inputs to the model's ranges, and penalises
  * the differences of neighbouring rules. The strength of the penalty is the one with the
  * smallest error on held-out groups of the training pairs; the strongest ones lead to a
- * plane and to the mean of the output. The law a·d + b·d² + c·v + … through 0, of the first input and
- * the others, is preferred unless it is worse by more than a standard error. Check pairs are not used, except to
+ * plane and to the mean of the output. A pull towards the law a·d + b·d² + c·v + … through 0, of the
+ * first input and the others, is preferred unless it is worse by more than a standard error. Check pairs are not used, except to
  * select the epoch with @options->classic (as in MATLAB's anfis). In the default mode the
  * check error is therefore an error on unseen data.
  *

@@ -38,7 +38,8 @@ static void one_rule(struct incise_basis *basis, int n)
 static int group_of(const double *row)
 {
 	for (int i = 0; i < PAIRS; i++)
-		if (rows[2 * i] == row[0])
+		/* Inputs that are held out are clamped. */
+		if (rows[2 * i + 1] == row[1])
 			return groups[i];
 	fail();
 	return -1;
