@@ -14,8 +14,7 @@
 #define PERIOD_S 1e-3
 
 void stability_rest(struct bench_run *run);
-void stability_integrators(struct bench_run *run);
 
-extern const struct bench_table stability_rest_table, stability_integrator_table;
+extern const struct bench_table stability_rest_table;
 
 #endif
