@@ -8,7 +8,13 @@
 #include <incise/model.h>
 #include "../../lib/control/plant.h"
 #include <incise/stability.h>
-#include "stability.h"
+#include "bench.h"
+
+/* The device: light, in a loop of 1 kHz. */
+#define DEVICE_KG 0.05
+#define N_S2_PER_MM_KG 1e-3		    /* 1 kg = 1 N s²/m */
+#define DEVICE (DEVICE_KG * N_S2_PER_MM_KG) /* N s²/mm */
+#define PERIOD_S 1e-3
 
 /* --- a row of a simulation next to theory --- */
 
