@@ -140,10 +140,3 @@ int incise_haptic_cause(struct incise_haptic *haptic, char *text, size_t size)
 	return haptic->ops->cause ? haptic->ops->cause(haptic, text, size)
 				  : snprintf(text, size, "%s", haptic->cause);
 }
-
-unsigned int incise_haptic_cuts(const struct incise_haptic *haptic,
-				char why[INCISE_HAPTIC_CUT_MAX])
-{
-	*why = 0;
-	return haptic->ops->cuts ? haptic->ops->cuts(haptic, why) : 0;
-}

@@ -278,5 +278,7 @@ void incise_stylus_ages(const struct incise_stylus *stylus,
 {
 	*ages = stylus->ages;
 	ages->lost = incise_haptic_lost(stylus->haptic);
+	if (stylus->haptic->ops->cuts)
+		ages->cuts = stylus->haptic->ops->cuts(stylus->haptic, ages->last_cut);
 	ages->assumed_ms = (double)assumed_ns(stylus) * 1e-6;
 }

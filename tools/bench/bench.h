@@ -129,6 +129,9 @@ struct bench {
 extern const struct bench bench_loop, bench_precision, bench_scenes, bench_stability,
 	bench_training;
 
+/* A part of bench_stability. */
+void stability_rest(struct bench_run *run);
+
 /* --- a run --- */
 
 #define BENCH_TABLES 16 /* of a report */

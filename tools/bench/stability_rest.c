@@ -20,9 +20,9 @@
 #include "../../lib/base/vector.h"
 #include "../cli/scene_argument.h"
 #include "../cli/stopwatch.h"
+#include "bench.h"
 #include "closed_loop.h"
 #include "sheet.h"
-#include "stability.h"
 
 /* --- cases --- */
 
@@ -211,7 +211,7 @@ struct rest_row {
 static struct rest_row cases[CASES_MAX];
 static int n_cases, sizes;
 
-const struct bench_table stability_rest_table = {
+static const struct bench_table stability_rest_table = {
 	.key = "rest",
 	.row_bytes = sizeof(struct rest_row),
 	.columns = {COLUMN(rest_row, "surface", surface, "%8s", "surface"),

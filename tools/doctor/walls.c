@@ -19,7 +19,7 @@
 #define REACTION_N_MM 20.0 /* of a wall at a gain of 1 */
 #define GAIN_MOST 10.0
 #define FORCE_N 4.0 /* largest, of a device that gives more */
-#define RUN "12"    /* s */
+#define RUN "12s"
 #define FROM_S 6.0
 #define UNTIL_S 11.5
 #define SWING_MM 0.1
@@ -120,19 +120,10 @@ static int run_wall(const struct protocol *protocol, double N_mm, const char *ha
 	char *program = cli_text("%s/incise-haptic", cli_folder());
 	char *rig = cli_text("%s%s%s", protocol->rig, protocol->has_hand ? "," : "",
 			     protocol->has_hand ? hand : "");
-	char *argv[] = {program,
-			"--rig",
-			rig,
-			"-c",
-			(char *)protocol->calibration,
-			"--state",
-			"none",
-			"--duration",
-			RUN "s",
-			"-o",
-			"-",
-			scene.path,
-			NULL};
+	char *argv[] = {
+		program,   "--rig",    rig,	     "-c", (char *)protocol->calibration,
+		"--state", "none",     "--duration", RUN,  "-o",
+		"-",	   scene.path, NULL};
 	int rc = 0;
 
 	write_wall(&scene, N_mm, protocol->info.peak_N);
@@ -161,9 +152,9 @@ static void ask(const struct protocol *protocol, const char *what, double N_mm)
 	if (protocol->simulated)
 		return;
 	fprintf(stderr,
-		"%s on the surface of %.3g N/mm below the handle, from %g s on until the " RUN
-		" s are over; press Enter to begin\n",
-		what, N_mm, FROM_S);
+		"%s on the surface of %.3g N/mm below the handle, from %g s on until the "
+		"%s are over; press Enter to begin\n",
+		what, N_mm, FROM_S, RUN);
 	while (c != '\n' && c != EOF)
 		c = getchar();
 }

@@ -108,42 +108,35 @@ void haptic_begin_device(struct haptic *haptic)
 
 json_t *haptic_device_json(const struct haptic *haptic)
 {
-	struct incise_haptic *device = incise_rig_haptic(haptic->rig);
 	struct incise_haptic_ages ages;
 	struct incise_haptic_info info;
-	char why[INCISE_HAPTIC_CUT_MAX];
-	unsigned int cuts;
 
-	if (!device)
+	if (!incise_rig_haptic(haptic->rig))
 		return json_null();
-	incise_haptic_info(device, &info);
+	incise_haptic_info(incise_rig_haptic(haptic->rig), &info);
 	incise_rig_haptic_ages(haptic->rig, &ages);
-	cuts = incise_haptic_cuts(device, why);
 	return json_pack("{so so sI sI so sf sf sf sf}", "name", json_text(info.name),
 			 "filters", json_text(info.filters), "lost",
-			 (json_int_t)ages.lost, "cuts", (json_int_t)cuts, "last_cut",
-			 json_text_or_null(why), "age_assumed_ms", ages.assumed_ms,
-			 "age_mean_ms", ages.mean_ms, "age_most_ms", ages.most_ms,
-			 "age_jitter_ms", ages.jitter_ms);
+			 (json_int_t)ages.lost, "cuts", (json_int_t)ages.cuts, "last_cut",
+			 json_text_or_null(ages.last_cut), "age_assumed_ms",
+			 ages.assumed_ms, "age_mean_ms", ages.mean_ms, "age_most_ms",
+			 ages.most_ms, "age_jitter_ms", ages.jitter_ms);
 }
 
 void haptic_device_line(const struct haptic *haptic)
 {
-	struct incise_haptic *device = incise_rig_haptic(haptic->rig);
 	struct incise_haptic_ages ages;
 	struct incise_haptic_info info;
-	char why[INCISE_HAPTIC_CUT_MAX];
-	unsigned int cuts;
 
-	if (!device)
+	if (!incise_rig_haptic(haptic->rig))
 		return;
-	incise_haptic_info(device, &info);
+	incise_haptic_info(incise_rig_haptic(haptic->rig), &info);
 	incise_rig_haptic_ages(haptic->rig, &ages);
-	cuts = incise_haptic_cuts(device, why);
 	printf("device     %s: poses %.2f ms old in the mean, jitter %.2f, at most %.2f "
 	       "(assumed %.2f); %llu lost; %llu gaps of the loop; force cut %s by its "
 	       "owner%s%s\n",
 	       info.name, ages.mean_ms, ages.jitter_ms, ages.most_ms, ages.assumed_ms,
 	       (unsigned long long)ages.lost, (unsigned long long)haptic->stats->overruns,
-	       cli_count(cuts, "time"), *why ? ", last: " : "", why);
+	       cli_count(ages.cuts, "time"), *ages.last_cut ? ", last: " : "",
+	       ages.last_cut);
 }

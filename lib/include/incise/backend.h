@@ -87,7 +87,7 @@ struct incise_haptic_ops {
 	uint64_t (*lost)(const struct incise_haptic *haptic);
 	/** Cause of an error, or of a flag of the last sample. */
 	int (*cause)(struct incise_haptic *haptic, char *text, size_t size);
-	/** As incise_haptic_cuts(), of a device with an owner; else NULL. */
+	/** Cuts and their last reason, of struct incise_haptic_ages; NULL: it has no owner. */
 	unsigned int (*cuts)(const struct incise_haptic *haptic,
 			     char why[INCISE_HAPTIC_CUT_MAX]);
 };

@@ -90,11 +90,17 @@ enum incise_haptic_off {
 /** The same in words: "on, …", or "off: …" with what to do. */
 INCISE_API const char *incise_haptic_off_text(enum incise_haptic_off off);
 
-/** Ages of a rig's samples at the ticks of a plan. */
+#define INCISE_HAPTIC_CUT_MAX 16 /**< bytes of the reason of a cut */
+
+/** Ages of a rig's samples at the ticks of a plan, and its losses. */
 struct incise_haptic_ages {
 	uint64_t ticks, lost;
 	double assumed_ms;		    /**< by the plan: latency and period */
 	double mean_ms, most_ms, jitter_ms; /**< jitter: standard deviation */
+	/** How often the device's owner has taken the force away though the loop asked for one; 0 without owner. */
+	unsigned int cuts;
+	/** Reason of the last time, as the state in the log of incise device; or "" */
+	char last_cut[INCISE_HAPTIC_CUT_MAX];
 };
 
 /** Count the age at @p now_ns of a sample of @p t_ns. Returns the age, ns. */
@@ -146,17 +152,6 @@ INCISE_API void incise_haptic_info(const struct incise_haptic *haptic,
 
 /** Samples lost so far. */
 INCISE_API uint64_t incise_haptic_lost(const struct incise_haptic *haptic);
-
-#define INCISE_HAPTIC_CUT_MAX 16 /**< bytes of the reason of a cut */
-
-/**
- * Count how often the device's owner has taken the force away, since the rig was opened, though the loop asked
- * for one: its heartbeat was late, or its force was invalid. 0 of a device without an owner.
- *
- * @param why reason of the last one, as the word in the log of incise device; "": none
- */
-INCISE_API unsigned int incise_haptic_cuts(const struct incise_haptic *haptic,
-					   char why[INCISE_HAPTIC_CUT_MAX]);
 
 /**
  * Print the cause of an error, or why there is no force, in one line that says what to do.

@@ -200,13 +200,13 @@ TEST(cuts_are_counted_since_the_user_came, open_page, close_page)
 	strcpy(half.cut, "late");
 	put_half();
 	succeeds(attach());
-	assert_int_equal(incise_haptic_cuts(user, why), 0);
+	assert_int_equal(user->ops->cuts(user, why), 0);
 	assert_string_equal(why, "");
 	half.cuts = 5;
 	memset(half.cut, '\n', sizeof(half.cut));
 	put_half();
 	assert_int_equal(incise_haptic_read(user, &sample, 1), 0);
-	assert_int_equal(incise_haptic_cuts(user, why), 2);
+	assert_int_equal(user->ops->cuts(user, why), 2);
 	assert_string_equal(why, "???????????????");
 }
 
