@@ -447,12 +447,33 @@ in_order() {
 	[ "$(of rest_sums 'sum(cases)')" = "$(of rest 'count(*)')" ]
 }
 
+@test "bench stability lists integrators that diverge, and the exact ones are exact" {
+	quick_report stability
+	ms="step_s = 0.001 AND K_N_m"
+	for name in explicit_euler semi_implicit_euler rk4; do
+		[ "$(of integrators failed "$ms = 1e7 AND integrator = '$name'")" = diverged ]
+		[ -z "$(of integrators max_error "$ms = 1e7 AND integrator = '$name'")" ]
+	done
+	holds "$(of integrators 'max(max_error)' "integrator IN ('exact_zoh', 'plant')") < 1e-9"
+	[ "$(of integrators 'count(*)' "integrator = 'plant'")" = 5 ]
+	# at 1 GN/m the trapezoid rings for ever, implicit Euler is off by 1/(K T^2/m)
+	holds "$(of integrators max_error "$ms = 1e9 AND integrator = 'trapezoid'") > 0.4"
+	holds "$(of integrators max_error "$ms = 1e9 AND integrator = 'implicit_euler'") < 1e-3"
+	# halved twice and once more: orders 1, 2 and 4 over a factor of 8
+	for order in explicit_euler:8 trapezoid:64 rk4:4096; do
+		holds "$(of integrators 'max(max_error) / min(max_error)' \
+			"integrator = '${order%:*}' AND K_N_m = 1000 AND step_s < 0.001") / ${order#*:} - 1 < 0.3"
+	done
+	holds "$(of integrators 'min(ns_per_step)') > 0"
+}
+
 # bats test_tags=slow
 @test "bench stability as text, with a verdict on every ratio, and its map" {
 	! command -v gnuplot >/dev/null || plot=(-o "a folder/w")
 	run -0 --separate-stderr incise bench stability --quick "${plot[@]}"
 	[ -z "$stderr" ]
 	[[ "$output" == *"quick: a part of each grid"* ]]
+	[[ "$output" == *"diverged"* ]]
 	[ "$(grep -c '  ok$' <<<"$output")" -ge 15 ]
 	[[ "$output" != *MISSED* ]]
 	[ -n "${plot[*]}" ] || skip "gnuplot is not installed, it draws the chart"

@@ -129,8 +129,13 @@ struct bench {
 extern const struct bench bench_loop, bench_precision, bench_scenes, bench_stability,
 	bench_training;
 
-/* A part of bench_stability. */
+/* Parts of bench_stability. */
 void stability_rest(struct bench_run *run);
+void stability_integrators(struct bench_run *run);
+
+/* Its device: light, in a loop of 1 kHz. */
+#define DEVICE_KG 0.05
+#define PERIOD_S 1e-3
 
 /* --- a run --- */
 

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * incise bench stability: how stiff a virtual wall may be, simulated in time next to
- * theory; scenes under a leaning hand. The device is light, in a loop of 1 kHz.
+ * theory; scenes under a leaning hand; error against run time of integrators of a stiff
+ * spring. The device is light, in a loop of 1 kHz.
  */
 #include <stdio.h>
 #include <string.h>
@@ -10,11 +11,8 @@
 #include <incise/stability.h>
 #include "bench.h"
 
-/* The device: light, in a loop of 1 kHz. */
-#define DEVICE_KG 0.05
 #define N_S2_PER_MM_KG 1e-3		    /* 1 kg = 1 N s²/m */
 #define DEVICE (DEVICE_KG * N_S2_PER_MM_KG) /* N s²/mm */
-#define PERIOD_S 1e-3
 
 /* --- a row of a simulation next to theory --- */
 
@@ -500,13 +498,15 @@ static void run(struct bench_run *run)
 	report_ratios(run);
 	add_curves(run);
 	stability_rest(run);
+	stability_integrators(run);
 }
 
 const struct bench bench_stability = {
 	.name = "stability",
 	.operands = "[MODEL.fis]",
 	.n_operands = 1,
-	.summary = "stability limits, simulated and computed; scenes at rest",
+	.summary = "stability limits, simulated and computed; scenes at rest; "
+		   "integrators",
 	.run = run,
 	.plot = {.suffix = "map",
 		 .script = text_stability_map_gp,
