@@ -428,7 +428,8 @@ TEST(a_force_goes_out_as_vrpn_accepted_it)
 
 	haptic = open_haptic(&peer);
 	incise_haptic_info(haptic, &info);
-	assert_true(info.rate_hz > 11.9 && info.rate_hz < 12.1 && info.features & INCISE_HAPTIC_PAGE_VELOCITY);
+	assert_true(info.rate_hz > 11.9 && info.rate_hz < 12.1 &&
+		    info.features & INCISE_HAPTIC_PAGE_VELOCITY);
 	assert_int_equal(info.buttons, 2);
 	assert_true(info.deadman_s == 0 && strstr(info.note, "keeps the last force"));
 	serve_last_frame(&peer);
