@@ -49,7 +49,7 @@ check: ## install what is missing, build and test: some ten minutes
 
 # Parts of check-full beside those of check. Each installs what it needs.
 part_plain := check-unit CASES=all
-part_cli := check-cli
+part_cli := check-cli CASES=all
 part_attack := check-attack
 part_fuzz := check-fuzz
 part_python := check-python
