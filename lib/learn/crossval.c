@@ -219,12 +219,11 @@ int incise_crossval_ratios(const struct incise_basis *basis,
 /* So strong that rules do not differ. */
 #define RIGID 1e5
 
-/*
- * The pull towards the quadratic law, against that of many pairs, and the share of the squared error up to
- * which it is kept.
- */
+/* The pull towards the quadratic law, against that of many pairs. */
 #define PULL 100
-#define ALIKE 0.15
+
+/* Weaker ones, towards the law with products: 1, 10. */
+#define PULLS 2
 
 void incise_crossval_settings(const struct incise_basis *basis,
 			      struct incise_ridge *ridges)
@@ -248,7 +247,7 @@ static void keep_setting(struct incise_choice *choice, const struct incise_ridge
 	memmove(choice->error, error, n_units * sizeof(*error));
 }
 
-/* Totals in the order of the settings: the plane, the mean and the quadratic are the last. */
+/* Totals in the order of the settings. The last is the quadratic, which may be worse by a standard error. */
 static void choose_setting(const struct incise_folds *folds,
 			   const struct incise_ridge *ridges, const double *error, int n,
 			   struct incise_choice *choice)
@@ -260,11 +259,10 @@ static void choose_setting(const struct incise_folds *folds,
 			choice->plane = total;
 		else if (i == CROSSVAL_RIDGES - 1)
 			choice->mean = total;
-		else if (i == CROSSVAL_RIDGES)
+		if (i == CROSSVAL_RIDGES + PULLS) {
 			choice->quadratic = total;
-		if (i == CROSSVAL_RIDGES)
-			clear = fmin(incise_crossval_spread(folds, error, choice->error),
-				     ALIKE * choice->total);
+			clear = incise_crossval_spread(folds, error, choice->error);
+		}
 		if (total < choice->total + clear)
 			keep_setting(choice, &ridges[i], error, total, folds->n_units);
 	}
@@ -274,18 +272,19 @@ int incise_crossval_choose(const struct incise_basis *basis,
 			   const struct incise_folds *folds, const double *quadratic,
 			   struct incise_choice *choice)
 {
-	struct incise_ridge ridges[CROSSVAL_RIDGES + 1];
-	int n = CROSSVAL_RIDGES + (quadratic != NULL), rc;
+	struct incise_ridge ridges[CROSSVAL_RIDGES + PULLS + 1];
+	int d = basis->n_inputs, n = CROSSVAL_RIDGES + (quadratic ? PULLS + 1 : 0), rc;
 	double *error = malloc((size_t)n * folds->n_units * sizeof(*error));
 
 	if (!error)
 		return -ENOMEM;
 	incise_crossval_settings(basis, ridges);
-	ridges[CROSSVAL_RIDGES] =
-		(struct incise_ridge){.ridge = PULL,
-				      .n = basis->n_rules * (basis->n_inputs + 1),
-				      .free = quadratic,
-				      .n_free = basis->n_inputs + 1};
+	for (int i = 0; i <= PULLS; i++)
+		ridges[CROSSVAL_RIDGES + i] =
+			(struct incise_ridge){.ridge = i < PULLS ? pow(10, i) : PULL,
+					      .n = basis->n_rules * (d + 1),
+					      .free = quadratic,
+					      .n_free = i < PULLS ? 2 * d : d + 1};
 	rc = incise_crossval_ridges(basis, folds, ridges, n, error);
 	*choice = (struct incise_choice){
 		.error = error, .total = HUGE_VAL, .quadratic = NAN};

@@ -52,9 +52,10 @@ void incise_crossval_settings(const struct incise_basis *basis,
 			      struct incise_ridge *ridges);
 
 /*
- * The law a·d + b·d² + c·v + … of the first input and the others, through the raw 0 of all, for
- * incise_ridge.free: as many rows as inputs and one, and its constant. offset and scale are those of
- * the inputs and the output. To be freed with free(3); NULL: the grid has none.
+ * The law a·d + b·d² + c·v + … of the first input and the others, through the raw 0 of all, and its
+ * products e·d·v + …, for incise_ridge.free: the law has as many rows as inputs and one, with its products
+ * twice as many as inputs. offset and scale are those of the inputs and the output. To be freed with
+ * free(3); NULL: the grid has none.
  */
 double *incise_quadratic(const struct incise_basis *basis, const double *offset,
 			 const double *scale);
@@ -67,8 +68,9 @@ struct incise_choice {
 };
 
 /*
- * quadratic is NULL or that law, which outlives the choice: a ridge towards it is preferred where it is
- * not worse by more than a standard error and 15 % of the squared error. Returns 0, -EDOM, -ECANCELED, -ENOMEM.
+ * quadratic is NULL or these rows, which outlive the choice: also ridges towards the law with products are
+ * tried, and the law is preferred where it is not worse by more than a standard error. Returns 0, -EDOM,
+ * -ECANCELED, -ENOMEM.
  */
 int incise_crossval_choose(const struct incise_basis *basis,
 			   const struct incise_folds *folds, const double *quadratic,

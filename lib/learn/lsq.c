@@ -360,11 +360,15 @@ static void find_bound_rows(struct incise_lsq *lsq, const struct incise_ridge *r
 		double *row = lsq->ridge + (size_t)i * lsq->stride;
 
 		row[i] = by;
-		row[lsq->n] = by * ridge->free[(size_t)ridge->n_free * n + i];
-		for (int f = 0; f < ridge->n_free; f++)
-			for (int k = 0; k < n; k++)
-				row[k] -= by * ridge->free[(size_t)f * n + i] *
-					  ridge->free[(size_t)f * n + k];
+		row[lsq->n] = by * ridge->free[i];
+		for (int f = 1; f <= ridge->n_free; f++) {
+			const double *along = ridge->free + (size_t)f * n;
+
+			for (int k = 0; k < n; k++) {
+				row[k] -= by * along[i] * along[k];
+				row[lsq->n] -= by * along[i] * along[k] * ridge->free[k];
+			}
+		}
 	}
 }
 

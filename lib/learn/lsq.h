@@ -27,8 +27,8 @@ struct incise_ridge {
 	double mean;
 	int n_mfs[INCISE_MODEL_INPUTS_MAX]; /* all 0: no grid */
 	/*
-	 * Or NULL; else the penalty is ridge·|p - q|², but for differences along n_free orthonormal
-	 * rows of n, which cost nothing; the row after these is q, orthogonal to them.
+	 * Or NULL; else a row of n, q, and the penalty is ridge·|p - q|², but for differences along the
+	 * n_free orthonormal rows that follow it, which cost nothing.
 	 */
 	const double *free;
 	int n_free;

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The law a·d + b·d² + c·v + … of the first input d and the others, which is 0 where all inputs
+ * The law a·d + b·d² + c·v + … + e·d·v + … of the first input d and the others, which is 0 where all inputs
  * are, as directions of the consequents of a grid; see crossval.h.
  *
  * A line is the same consequents in all rules. The square has other ones along the first input: those
- * nearest to it over the range.
+ * nearest to it over the range. A product has its tangent at the centres of each rule.
  */
 #include <errno.h>
 #include <math.h>
@@ -45,24 +45,39 @@ static int fit_square(const struct incise_basis *basis, double *square)
 	return rc;
 }
 
-/* Rows d, …, d² and the raw output 0, in scaled consequents; inputs are in units of their scale. */
+/* Rows of the raw output 0, d, …, d² and d·v, … in scaled consequents; inputs are in units of their scale. */
 static void fill_rows(const struct incise_basis *basis, const double *offset,
 		      const double *scale, const double *square, double *rows)
 {
 	int d = basis->n_inputs, n = basis->n_rules * (d + 1);
+	int slice = basis->n_rules / basis->n_mfs[0];
 	double start = offset[0] / scale[0];
 
 	for (int r = 0; r < basis->n_rules; r++) {
-		const double *own = square + r / (basis->n_rules / basis->n_mfs[0]) * 2;
+		int k = r / slice, inner = slice;
+		double deep = start + basis->p[incise_basis_centre(basis, 0, k)];
 		double *at = rows + (size_t)r * (d + 1);
 
-		for (int i = 0; i < d; i++, at += n) {
+		at[0] = -offset[d] / scale[d];
+		for (int i = 0; i < d; i++) {
+			at += n;
 			at[0] = offset[i] / scale[i];
 			at[i + 1] = 1;
 		}
-		at[0] = start * start + own[0];
-		at[1] = 2 * start + own[1];
-		at[n] = -offset[d] / scale[d];
+		at += n;
+		at[0] = start * start + square[2 * k];
+		at[1] = 2 * start + square[2 * k + 1];
+		for (int i = 1; i < d; i++) {
+			double from = offset[i] / scale[i], side;
+
+			inner /= basis->n_mfs[i];
+			k = r / inner % basis->n_mfs[i];
+			side = from + basis->p[incise_basis_centre(basis, i, k)];
+			at += n;
+			at[0] = deep * from + side * start - deep * side;
+			at[1] = side;
+			at[i + 1] = deep;
+		}
 	}
 }
 
@@ -91,18 +106,18 @@ double *incise_quadratic(const struct incise_basis *basis, const double *offset,
 	int d = basis->n_inputs, n = basis->n_rules * (d + 1);
 	double square[2 * INCISE_MODEL_MFS_MAX];
 	bool enough = basis->n_mfs[0] >= FUNCTIONS_MIN;
-	double *rows = enough ? calloc((size_t)(d + 2) * n, sizeof(*rows)) : NULL;
+	double *rows = enough ? calloc((size_t)(2 * d + 1) * n, sizeof(*rows)) : NULL;
 	int rc = rows ? fit_square(basis, square) : -ENOMEM;
 
 	if (!rc)
 		fill_rows(basis, offset, scale, square, rows);
-	for (int row = 0; row <= d + 1 && !rc; row++) {
-		double length = make_orthogonal(rows, row, n);
+	for (int row = 0; row < 2 * d && !rc; row++) {
+		double length = make_orthogonal(rows + n, row, n);
 
-		if (!isfinite(length) || (row <= d && length < DEPENDENT))
+		if (!(length >= DEPENDENT) || isinf(length))
 			rc = -EDOM;
-		for (int i = 0; i < n && row <= d; i++)
-			rows[(size_t)row * n + i] /= length;
+		for (int i = 0; i < n; i++)
+			rows[(size_t)(row + 1) * n + i] /= length;
 	}
 	if (!rc)
 		return rows;

@@ -226,6 +226,52 @@ TEST(test_quadratic)
 	assert_null(incise_quadratic(&basis, offset, scale));
 }
 
+/* A force that is 0 at depth 0 at any speed pulls to the law with products, which follows it. */
+TEST(test_products)
+{
+	static const struct incise_variable in[] = {{"d", 0, 1}, {"v", 0, 1}};
+	static const int n_mfs[] = {5, 4};
+	static double product[PAIRS * 3];
+	const struct incise_pairs data = {.rows = product, .n = PAIRS, .n_inputs = 2};
+	const double offset[] = {0.5, 0, 1}, scale[] = {20, 50, 3};
+	struct incise_model *model =
+		incise_model_new_grid(2, in, n_mfs, INCISE_MF_GAUSS, in, NULL);
+	struct incise_choice choice;
+	struct incise_folds folds;
+	struct incise_basis basis;
+	uint64_t seed = 9;
+	double *law;
+
+	fill(20);
+	assert_int_equal(incise_basis_init(&basis, model), 0);
+	for (int i = 0; i < PAIRS; i++) {
+		double *row = product + 3 * i;
+
+		row[0] = rows[2 * i];
+		row[1] = (1 + incise_random_symmetric(&seed)) / 2;
+		row[2] = ((0.5 + 20 * row[0]) * (0.05 + 0.1 * row[1]) - 1) / 3;
+	}
+	law = incise_quadratic(&basis, offset, scale);
+	assert_non_null(law);
+	assert_int_equal(incise_folds_init(&folds, &data, groups, 3), 0);
+	for (int products = 0; products < 2; products++) {
+		struct incise_ridge ridge = {
+			.ridge = 1e9, .n = 60, .free = law, .n_free = products ? 4 : 3};
+		double error[PAIRS];
+
+		assert_int_equal(incise_crossval_ridges(&basis, &folds, &ridge, 1, error),
+				 0);
+		assert_true((incise_crossval_total(&folds, error) < PAIRS * 1e-5) ==
+			    products);
+	}
+	assert_int_equal(incise_crossval_choose(&basis, &folds, law, &choice), 0);
+	assert_true(choice.total < choice.quadratic);
+	free(choice.error);
+	free(law);
+	incise_folds_free(&folds);
+	incise_model_free(model);
+}
+
 TEST(test_spread)
 {
 	struct incise_folds folds = {.n_units = 4};
