@@ -90,11 +90,9 @@ static double product_of(const double *a, const double *b, int n)
 	return sum;
 }
 
-/* Slopes of log|error| over the other folds of fold's division, over all of them if it is -1. */
+/* Slopes of log|error| over the other folds, over all of them if fold is -1. */
 static int fit_slopes(struct held *h, int fold, double least, double *slope)
 {
-	int division =
-		h->folds->n_units < CROSSVAL_FOLDS ? h->folds->n_units : CROSSVAL_FOLDS;
 	double *row, x[INCISE_MODEL_INPUTS_MAX + 1];
 	size_t at = 0;
 	int rc;
@@ -102,7 +100,7 @@ static int fit_slopes(struct held *h, int fold, double least, double *slope)
 	incise_lsq_reset(h->lsq);
 	for (int f = 0; f < h->folds->n; f++)
 		for (size_t i = 0; i < h->folds->held[f].n; i++, at++) {
-			if (fold >= 0 && (f == fold || f / division != fold / division))
+			if (f == fold)
 				continue;
 			row = incise_lsq_row(h->lsq);
 			for (int k = 0; k < h->d; k++)
@@ -158,8 +156,7 @@ static int find_shared(const struct held *h, const double *slope, double *shared
 
 	if (!unit)
 		return -ENOMEM;
-	/* In the first division each pair is held out once. */
-	for (int f = 0; f < h->folds->n && f < CROSSVAL_FOLDS && f < n_units; f++)
+	for (int f = 0; f < h->folds->n; f++)
 		for (size_t i = 0; i < h->folds->held[f].n; i++, at++) {
 			struct unit *u = &unit[h->folds->unit[f][i]];
 			double e = h->ratios[at] *

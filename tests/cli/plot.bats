@@ -49,7 +49,7 @@ shows() {
 	shows "depth / mm" "velocity / (mm/s)" "force / N" "degree of membership / 1" shallow
 	! grep -q residual texts
 	# a curve for each function: 5 over the depth and 4 over the velocity
-	[ "$(grep -cxE 'shallow|medium|deep|slow|fast' texts)" = 9 ]
+	[ "$(grep -cxE '(very )?(shallow|medium|deep|slow|fast)' texts)" = 9 ]
 }
 
 @test "residuals are those of incise eval" {
