@@ -767,10 +767,8 @@ static void report_train_text(const struct train_options *options,
 	print_row("linear regression", check ? NAN : baselines->linear,
 		  check ? baselines->linear : NAN);
 	print_row(knn, check ? NAN : baselines->knn, check ? baselines->knn : NAN);
-	printf("  %-22s%12.5g", "MSE of this model",
-	       report->train_rmse * report->train_rmse);
-	check ? printf("%14.5g\n", report->check_rmse * report->check_rmse)
-	      : printf("\n");
+	print_row("MSE of this model", pow(report->train_rmse, 2),
+		  pow(report->check_rmse, 2));
 	print_row("R² of this model", report->train_r2, report->check_r2);
 	printf("  95 %% interval: noise %.4g %s", trained->noise,
 	       unit_of_train(options->target));

@@ -219,10 +219,8 @@ int incise_crossval_ratios(const struct incise_basis *basis,
 /* So strong that rules do not differ. */
 #define RIGID 1e5
 
-/* The pull towards the quadratic law, against that of many pairs. */
+/* The pull towards the quadratic law, against that of many pairs; weaker ones, 1 and 10, are towards its products too. */
 #define PULL 100
-
-/* Weaker ones, towards the law with products: 1, 10. */
 #define PULLS 2
 
 void incise_crossval_settings(const struct incise_basis *basis,
@@ -238,20 +236,13 @@ void incise_crossval_settings(const struct incise_basis *basis,
 	}
 }
 
-/* Take an error row for the one that is kept. */
-static void keep_setting(struct incise_choice *choice, const struct incise_ridge *ridge,
-			 const double *error, double total, int n_units)
-{
-	choice->ridge = *ridge;
-	choice->total = total;
-	memmove(choice->error, error, n_units * sizeof(*error));
-}
-
 /* Totals in the order of the settings. The last is the quadratic, which may be worse by a standard error. */
 static void choose_setting(const struct incise_folds *folds,
-			   const struct incise_ridge *ridges, const double *error, int n,
+			   const struct incise_ridge *ridges, int n,
 			   struct incise_choice *choice)
 {
+	const double *error = choice->error, *kept = error;
+
 	for (int i = 0; i < n; i++, error += folds->n_units) {
 		double total = incise_crossval_total(folds, error), clear = 0;
 
@@ -261,11 +252,15 @@ static void choose_setting(const struct incise_folds *folds,
 			choice->mean = total;
 		if (i == CROSSVAL_RIDGES + PULLS) {
 			choice->quadratic = total;
-			clear = incise_crossval_spread(folds, error, choice->error);
+			clear = incise_crossval_spread(folds, error, kept);
 		}
-		if (total < choice->total + clear)
-			keep_setting(choice, &ridges[i], error, total, folds->n_units);
+		if (total >= choice->total + clear)
+			continue;
+		choice->ridge = ridges[i];
+		choice->total = total;
+		kept = error;
 	}
+	memmove(choice->error, kept, folds->n_units * sizeof(*kept));
 }
 
 int incise_crossval_choose(const struct incise_basis *basis,
@@ -291,7 +286,7 @@ int incise_crossval_choose(const struct incise_basis *basis,
 	if (rc)
 		free(error);
 	else
-		choose_setting(folds, ridges, error, n, choice);
+		choose_setting(folds, ridges, n, choice);
 	return rc;
 }
 

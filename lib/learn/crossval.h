@@ -52,10 +52,9 @@ void incise_crossval_settings(const struct incise_basis *basis,
 			      struct incise_ridge *ridges);
 
 /*
- * The law a·d + b·d² + c·v + … of the first input and the others, through the raw 0 of all, and its
- * products e·d·v + …, for incise_ridge.free: the law has as many rows as inputs and one, with its products
- * twice as many as inputs. offset and scale are those of the inputs and the output. To be freed with
- * free(3); NULL: the grid has none.
+ * The law a·d + b·d² + c·v + … of the first input and the others, through the raw 0 of all, for
+ * incise_ridge.free: as many rows as inputs and one; with its products e·d·v, … twice as many as inputs.
+ * offset and scale are those of the inputs and the output. To be freed with free(3); NULL: the grid has none.
  */
 double *incise_quadratic(const struct incise_basis *basis, const double *offset,
 			 const double *scale);

@@ -50,33 +50,30 @@ static void fill_rows(const struct incise_basis *basis, const double *offset,
 		      const double *scale, const double *square, double *rows)
 {
 	int d = basis->n_inputs, n = basis->n_rules * (d + 1);
-	int slice = basis->n_rules / basis->n_mfs[0];
 	double start = offset[0] / scale[0];
 
 	for (int r = 0; r < basis->n_rules; r++) {
-		int k = r / slice, inner = slice;
-		double deep = start + basis->p[incise_basis_centre(basis, 0, k)];
-		double *at = rows + (size_t)r * (d + 1);
+		double *line = rows + (size_t)r * (d + 1), *product = line + d * n;
+		double deep = 0;
 
-		at[0] = -offset[d] / scale[d];
-		for (int i = 0; i < d; i++) {
-			at += n;
-			at[0] = offset[i] / scale[i];
-			at[i + 1] = 1;
-		}
-		at += n;
-		at[0] = start * start + square[2 * k];
-		at[1] = 2 * start + square[2 * k + 1];
-		for (int i = 1; i < d; i++) {
-			double from = offset[i] / scale[i], side;
+		line[0] = -offset[d] / scale[d];
+		for (int i = 0, inner = basis->n_rules; i < d; i++) {
+			double from = offset[i] / scale[i], at;
+			int k;
 
 			inner /= basis->n_mfs[i];
 			k = r / inner % basis->n_mfs[i];
-			side = from + basis->p[incise_basis_centre(basis, i, k)];
-			at += n;
-			at[0] = deep * from + side * start - deep * side;
-			at[1] = side;
-			at[i + 1] = deep;
+			at = from + basis->p[incise_basis_centre(basis, i, k)];
+			deep = i ? deep : at;
+			line += n;
+			line[0] = from;
+			line[i + 1] = 1;
+			product += n;
+			product[0] = i ? deep * from + at * start - deep * at
+				       : start * start + square[2 * k];
+			product[1] = i ? at : 2 * start + square[2 * k + 1];
+			if (i)
+				product[i + 1] = deep;
 		}
 	}
 }
