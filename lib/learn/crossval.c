@@ -263,7 +263,8 @@ static void choose_setting(const struct incise_folds *folds,
 		else if (i == CROSSVAL_RIDGES)
 			choice->quadratic = total;
 		if (i == CROSSVAL_RIDGES)
-			clear = fmin(incise_crossval_spread(folds, error, choice->error),
+			clear = fmin(incise_crossval_spread(folds->n_units, error,
+							    choice->error),
 				     ALIKE * choice->total);
 		if (total < choice->total + clear)
 			keep_setting(choice, &ridges[i], error, total, folds->n_units);
@@ -287,8 +288,10 @@ int incise_crossval_choose(const struct incise_basis *basis,
 				      .free = quadratic,
 				      .n_free = basis->n_inputs + 1};
 	rc = incise_crossval_ridges(basis, folds, ridges, n, error);
-	*choice = (struct incise_choice){
-		.error = error, .total = HUGE_VAL, .quadratic = NAN};
+	*choice = (struct incise_choice){.error = error,
+					 .total = HUGE_VAL,
+					 .n_units = folds->n_units,
+					 .quadratic = NAN};
 	if (rc)
 		free(error);
 	else
@@ -305,11 +308,9 @@ double incise_crossval_total(const struct incise_folds *folds, const double *err
 	return sum;
 }
 
-double incise_crossval_spread(const struct incise_folds *folds, const double *a,
-			      const double *b)
+double incise_crossval_spread(int n, const double *a, const double *b)
 {
 	double mean = 0, sum = 0;
-	int n = folds->n_units;
 
 	if (n < 2)
 		return 0;
