@@ -20,6 +20,7 @@
 struct train_options {
 	char **paths;
 	int n_paths;
+	char *typed;	  /* the command and its arguments */
 	const char *data; /* for messages: the path, or the number of sources */
 	const char *model, *initial, *history, *premises, *factor;
 	struct recording_rows rows;
@@ -30,7 +31,7 @@ struct train_options {
 	char *inputs[INCISE_MODEL_INPUTS_MAX];
 	const char *target;
 	int n_mfs;
-	bool auto_mfs, json, mpi;
+	bool auto_mfs, json, mpi, wanted; /* the latter of the inputs */
 	enum uncertainties_wanted uncertainty;
 	struct incise_sources_options how;
 };
@@ -41,6 +42,7 @@ static void parse_inputs(void *whole, char *text)
 
 	options->how.n_inputs =
 		cli_list("inputs", text, options->inputs, INCISE_MODEL_INPUTS_MAX);
+	options->wanted = true;
 }
 
 static void parse_mfs(void *whole, char *text)
@@ -226,11 +228,27 @@ static const char *default_model(const struct train_options *options)
 	return path;
 }
 
+/* The command as a shell reads it: free(3). */
+static char *spell_command(char **argv)
+{
+	char *text = cli_text("incise train");
+
+	while (*++argv) {
+		bool plain = !strpbrk(*argv, " \t\n\"$`\\&|;<>()*?[#~!{}");
+		char *more = cli_text(plain ? "%s %s" : "%s '%s'", text, *argv);
+
+		free(text);
+		text = more;
+	}
+	return text;
+}
+
 static void parse_train(struct train_options *options, int argc, char **argv)
 {
 	char *sd;
 
 	*options = (struct train_options){
+		.typed = spell_command(argv),
 		.inputs = {"depth_mm", "velocity_mm_s"},
 		.how.n_inputs = 2,
 		.target = "force_N",
@@ -307,7 +325,8 @@ static void parse_train(struct train_options *options, int argc, char **argv)
 			  options->how.n_inputs, options->n_mfs);
 	for (int i = 0;
 	     i < options->how.n_inputs && !options->n_mfs && !options->auto_mfs; i++)
-		options->how.n_mfs[i] = options->how.n_inputs == 2 ? 5 - i : 3;
+		options->how.n_mfs[i] =
+			options->how.n_inputs == 2 ? 5 - i : INCISE_TRAIN_MFS;
 }
 
 /* --- progress ------------------------------------------------------------------------ */
@@ -472,6 +491,26 @@ static void choose_uncertainties(struct train_options *options,
 	options->how.parts = found->parts;
 	options->how.n_parts = found->n;
 	options->rows.uncertainty = found->n > 0;
+}
+
+/* The inputs that a haptic loop has besides the default ones, history first. */
+static const char *const further[] = {"time_in_tissue_s", "mean_speed_mm_s", "deepest_mm",
+				      "acceleration_mm_s2", "tilt_deg"};
+#define HISTORY 3
+#define FURTHER 5
+
+/* They are tried for a model of the default search. */
+static void choose_further(struct train_options *options)
+{
+	const char **columns = (const char **)options->how.columns +
+			       options->how.n_inputs + 1 + options->how.n_parts;
+
+	if (options->wanted || options->premises || options->mpi || options->n_mfs ||
+	    options->auto_mfs || options->how.train.classic || options->sample >= 0 ||
+	    !isnan(options->how.train.ridge) || !strcmp(options->model, "-"))
+		return;
+	memcpy(columns, further, sizeof(further));
+	options->how.n_further = FURTHER;
 }
 
 /* --- the report ---------------------------------------------------------------------- */
@@ -669,6 +708,13 @@ static void report_train_json(const struct train_options *options,
 	set_in_unit(object, "crossval_mean_rms_error", options, report->crossval_mean);
 	set_in_unit(object, "crossval_quadratic_rms_error", options,
 		    report->crossval_quadratic);
+	json_object_set_new(object, "better_inputs",
+			    trained->better
+				    ? json_pack("[sss]", options->inputs[0],
+						options->inputs[1], trained->better)
+				    : json_null());
+	set_in_unit(object, "better_inputs_rms_error", options,
+		    trained->better ? trained->better_rmse : NAN);
 	set_in_unit(object, "noise", options, trained->noise);
 	json_set_number(object, "interval95_coverage", trained->coverage);
 	json_object_set_new(object, "interval95_thirds",
@@ -703,6 +749,25 @@ static const char *name_penalty(const struct train_options *options,
 	       : report->crossval_rmse == report->crossval_plane ? "plane, penalty"
 	       : report->crossval_rmse == report->crossval_mean	 ? "mean, penalty"
 								 : "penalty";
+}
+
+/* Print the gain with a further input, and the command that replaces this model. */
+static void print_better(const struct train_options *options,
+			 const struct incise_trained *trained)
+{
+	bool history = true;
+
+	if (!trained->better)
+		return;
+	for (int i = HISTORY; i < FURTHER; i++)
+		history &= trained->better != further[i];
+	printf("with %s the cross-validated error is %.4g %s, %.0f %% less%s: "
+	       "%s --inputs %s,%s,%s%s\n",
+	       trained->better, trained->better_rmse, unit_of_train(options->target),
+	       100 * (1 - trained->better_rmse / trained->report.crossval_rmse),
+	       history ? " (it may only reflect how the hand moved in these cuts)" : "",
+	       options->typed, options->inputs[0], options->inputs[1], trained->better,
+	       cli_overwrite() ? "" : " --overwrite");
 }
 
 static void print_clamped(const struct incise_trained *trained)
@@ -792,6 +857,7 @@ static void report_train_text(const struct train_options *options,
 	if (report->pairs_tuned && report->pairs_tuned < fit->different)
 		printf("  penalty from a random %zu of the pairs, consequents from all\n",
 		       report->pairs_tuned);
+	print_better(options, trained);
 	cli_written();
 }
 
@@ -898,7 +964,7 @@ static void report_model(const struct train_options *options,
 
 int main(int argc, char **argv)
 {
-	const char *columns[INCISE_MODEL_INPUTS_MAX + 1 + INCISE_BUDGET_PARTS];
+	const char *columns[INCISE_MODEL_INPUTS_MAX + 1 + INCISE_BUDGET_PARTS + FURTHER];
 	struct incise_model *premises = NULL;
 	struct incise_train_source *sources;
 	struct incise_outfile *history = NULL;
@@ -920,6 +986,7 @@ int main(int argc, char **argv)
 		options.how.premises = premises = load_premises(options.premises);
 	choose_columns(&options, columns);
 	choose_uncertainties(&options, &uncertainties);
+	choose_further(&options);
 	if (job && job->size == 1)
 		cli_warn(
 			"--share mpi: a single process; start several by 'mpirun -n N incise "
@@ -941,5 +1008,6 @@ int main(int argc, char **argv)
 	incise_model_free(premises);
 	sources_free(sources, options.n_paths);
 	free(data);
+	free(options.typed);
 	return 0;
 }

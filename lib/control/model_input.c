@@ -38,8 +38,12 @@ double incise_input_tilt_deg(const double quaternion[4], const double axis[3],
 void incise_stay_add(struct incise_stay *stay, int64_t t_ns, double depth_mm,
 		     double speed_mm_s)
 {
-	double before_mm_s = stay->speed_mm_s;
+	double before_mm_s = stay->speed_mm_s, gap_ns;
 	int64_t from_ns = stay->t_ns;
+
+	/* A record that the filter passes over has no speed of its own. */
+	if (isnan(speed_mm_s))
+		speed_mm_s = before_mm_s;
 
 	if (!stay->inside && depth_mm > 0) {
 		double rise_mm = depth_mm - stay->depth_mm;
@@ -56,8 +60,8 @@ void incise_stay_add(struct incise_stay *stay, int64_t t_ns, double depth_mm,
 		stay->inside = false;
 	}
 	if (stay->inside) {
-		stay->path_mm += 0.5 * (before_mm_s + speed_mm_s) *
-				 (double)(t_ns - from_ns) * 1e-9;
+		gap_ns = fmin((double)(t_ns - from_ns), INCISE_INPUT_GAP_NS);
+		stay->path_mm += 0.5 * (before_mm_s + speed_mm_s) * gap_ns * 1e-9;
 		stay->deepest_mm = fmax(stay->deepest_mm, depth_mm);
 	}
 	stay->known = true;

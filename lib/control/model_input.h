@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
  * The inputs that a model can have in the haptic loop, and how each is computed: an export writes
- * columns of these names with the same functions, so that training and loop agree.
+ * columns of these names by the same definitions, so that training and loop agree.
  *
  *   depth_mm            of the tip below the surface
  *   velocity_mm_s       speed of the tip, |v|

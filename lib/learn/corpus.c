@@ -39,6 +39,7 @@ struct group {
 
 struct incise_corpus {
 	int columns;
+	int further_at, n_further; /* the sample has these behind the columns */
 	bool grouped;
 	uint64_t seed;
 	struct incise_corpus_survey *surveys;
@@ -96,6 +97,12 @@ void incise_corpus_weigh(struct incise_corpus *corpus,
 			 struct incise_propagation *propagation)
 {
 	corpus->propagation = propagation;
+}
+
+void incise_corpus_keep(struct incise_corpus *corpus, int at, int n)
+{
+	corpus->further_at = at;
+	corpus->n_further = n;
 }
 
 /* --- random numbers of rows ---------------------------------------------------------- */
@@ -305,6 +312,8 @@ static int survey_row(void *user, const double *row, const char *name,
 		group->sum[i] += row[i];
 		c.values[i] = row[i];
 	}
+	for (int i = 0; i < corpus->n_further; i++)
+		c.values[corpus->columns + i] = row[corpus->further_at + i];
 	group->rows++;
 	survey->rows++;
 	survey->digest = incise_random_bits(survey->digest ^ c.group, c.hash);
@@ -319,6 +328,8 @@ static int survey_row(void *user, const double *row, const char *name,
 static int add_survey(struct incise_corpus *corpus, const char *name, const char *hash,
 		      const char *text, struct incise_error *err)
 {
+	struct incise_corpus_survey *survey;
+
 	for (int i = 0; i < corpus->n_surveys; i++)
 		if (!strcmp(corpus->surveys[i].hash, hash) ||
 		    incise_is_same_recording(corpus->surveys[i].text, text))
@@ -330,13 +341,11 @@ static int add_survey(struct incise_corpus *corpus, const char *name, const char
 	if (!grow_array(&corpus->surveys, (size_t)corpus->n_surveys,
 			&corpus->survey_capacity, 16, sizeof(*corpus->surveys)))
 		return incise_error_set(err, ENOMEM, "no memory");
-	corpus->surveys[corpus->n_surveys] = (struct incise_corpus_survey){0};
-	snprintf(corpus->surveys[corpus->n_surveys].name, sizeof(corpus->surveys->name),
-		 "%s", name);
-	snprintf(corpus->surveys[corpus->n_surveys].hash, sizeof(corpus->surveys->hash),
-		 "%s", hash);
-	snprintf(corpus->surveys[corpus->n_surveys].text, sizeof(corpus->surveys->text),
-		 "%s", text);
+	survey = &corpus->surveys[corpus->n_surveys];
+	*survey = (struct incise_corpus_survey){0};
+	snprintf(survey->name, sizeof(survey->name), "%s", name);
+	snprintf(survey->hash, sizeof(survey->hash), "%s", hash);
+	snprintf(survey->text, sizeof(survey->text), "%s", text);
 	return 0;
 }
 
@@ -375,7 +384,7 @@ static size_t size_of_bins(const struct incise_corpus *corpus)
 
 void *incise_corpus_encode(struct incise_corpus *corpus, size_t *size)
 {
-	struct header header = {.magic = "survey4",
+	struct header header = {.magic = "survey5",
 				.columns = corpus->columns,
 				.n_surveys = corpus->n_surveys};
 	char *bytes, *at;
@@ -425,7 +434,7 @@ int incise_corpus_add(struct incise_corpus *corpus, const void *bytes, size_t si
 		return incise_error_set(err, EINVAL, "%s", damaged);
 	memcpy(&header, at, sizeof(header));
 	at += sizeof(header);
-	if (memcmp(header.magic, "survey4", 8) || header.columns != corpus->columns ||
+	if (memcmp(header.magic, "survey5", 8) || header.columns != corpus->columns ||
 	    header.size != size || header.n_surveys < 0 ||
 	    (size_t)(end - at) < size_of_bins(corpus) ||
 	    ((size_t)(end - at) - size_of_bins(corpus)) / sizeof(struct candidate) <
@@ -644,6 +653,25 @@ static int take_sample(struct incise_corpus *corpus)
 		to->pairs.n++;
 	}
 	return 0;
+}
+
+double *incise_corpus_extend(const struct incise_corpus *corpus, int i)
+{
+	const struct incise_pairs *fit = &corpus->sides[0].sample.pairs;
+	size_t n = fit->n_inputs, size = (n + 2) * sizeof(double);
+	double *rows = malloc((fit->n + 1) * size), *to = rows;
+
+	for (size_t r = 0; r < corpus->n_rows && rows; r++) {
+		const struct candidate *c = &corpus->rows[r];
+
+		if (is_check(corpus, c->hash, c->group))
+			continue;
+		memcpy(to, c->values, size);
+		to[n] = c->values[n + 1 + i];
+		to[n + 1] = c->values[n];
+		to += n + 2;
+	}
+	return rows;
 }
 
 static void count_sides(struct incise_corpus *corpus)

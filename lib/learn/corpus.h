@@ -47,6 +47,12 @@ void incise_corpus_free(struct incise_corpus *corpus);
 void incise_corpus_weigh(struct incise_corpus *corpus,
 			 struct incise_propagation *propagation);
 
+/* Keep n further columns of the sample, which rows have from number @at. */
+void incise_corpus_keep(struct incise_corpus *corpus, int at, int n);
+
+/* The rows of the training's sample with further column i as their last input; free(3). NULL: no memory. */
+double *incise_corpus_extend(const struct incise_corpus *corpus, int i);
+
 /*
  * Survey a source. 0; -EEXIST (its hash is there already, or a recording that its text names),
  * -ENOMEM, or the negative errno of its read: the corpus is then of no further use.

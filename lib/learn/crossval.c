@@ -252,7 +252,7 @@ static void choose_setting(const struct incise_folds *folds,
 			choice->mean = total;
 		if (i == CROSSVAL_RIDGES + PULLS) {
 			choice->quadratic = total;
-			clear = incise_crossval_spread(folds, error, kept);
+			clear = incise_crossval_spread(folds->n_units, error, kept);
 		}
 		if (total >= choice->total + clear)
 			continue;
@@ -281,8 +281,10 @@ int incise_crossval_choose(const struct incise_basis *basis,
 					      .free = quadratic,
 					      .n_free = i < PULLS ? 2 * d : d + 1};
 	rc = incise_crossval_ridges(basis, folds, ridges, n, error);
-	*choice = (struct incise_choice){
-		.error = error, .total = HUGE_VAL, .quadratic = NAN};
+	*choice = (struct incise_choice){.error = error,
+					 .total = HUGE_VAL,
+					 .n_units = folds->n_units,
+					 .quadratic = NAN};
 	if (rc)
 		free(error);
 	else
@@ -299,11 +301,9 @@ double incise_crossval_total(const struct incise_folds *folds, const double *err
 	return sum;
 }
 
-double incise_crossval_spread(const struct incise_folds *folds, const double *a,
-			      const double *b)
+double incise_crossval_spread(int n, const double *a, const double *b)
 {
 	double mean = 0, sum = 0;
-	int n = folds->n_units;
 
 	if (n < 2)
 		return 0;

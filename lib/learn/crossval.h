@@ -63,6 +63,7 @@ double *incise_quadratic(const struct incise_basis *basis, const double *offset,
 struct incise_choice {
 	struct incise_ridge ridge;
 	double *error, total;
+	int n_units;
 	double plane, mean, quadratic; /* totals of these; the last may be NAN */
 };
 
@@ -82,7 +83,6 @@ double incise_crossval_total(const struct incise_folds *folds, const double *err
  * Standard error of the difference of two totals, from the differences by unit; 0 where
  * there is one unit.
  */
-double incise_crossval_spread(const struct incise_folds *folds, const double *a,
-			      const double *b);
+double incise_crossval_spread(int n_units, const double *a, const double *b);
 
 #endif

@@ -200,7 +200,7 @@ static int grow_dataset(struct incise_dataset *data, bool groups)
 /* The columns that are read, and the taker of the rows. */
 struct sink {
 	const char *const *columns;
-	int n;
+	int n, n_required;
 	const char *group, *where;
 	incise_row_taker take;
 	void *user;
@@ -242,8 +242,9 @@ static int read_rows(struct dataset_reader *in, struct sink *sink)
 					  "the file is empty; expected a header row with "
 					  "column names, and rows of numbers");
 	for (int i = 0; i < sink->n; i++) {
-		at[i] = find_column(in, sink->columns[i]);
-		if (at[i] < 0)
+		at[i] = i < sink->n_required ? find_column(in, sink->columns[i])
+					     : look_for_column(in, sink->columns[i]);
+		if (at[i] < 0 && i < sink->n_required)
 			return at[i];
 	}
 	if (sink->group) {
@@ -278,9 +279,12 @@ static int read_rows(struct dataset_reader *in, struct sink *sink)
 			continue;
 		}
 		for (int i = 0; i < sink->n; i++) {
-			rc = read_dataset_number(in, at[i], sink->columns[i], &row[i]);
-			if (rc)
+			rc = at[i] < 0 ? -ENOENT
+				       : read_dataset_number(in, at[i], sink->columns[i],
+							     &row[i]);
+			if (rc && i < sink->n_required)
 				return rc;
+			row[i] = rc ? NAN : row[i];
 		}
 		rc = sink->take(sink->user, row, sink->group ? in->field[group_at] : NULL,
 				in->lines.err);
@@ -336,10 +340,11 @@ bool incise_dataset_has(const char *path, const char *column, bool *stated)
 }
 
 int incise_dataset_each(const char *path, const char *const *columns, int n,
-			const char *group, const char *where, incise_row_taker take,
-			void *user, uint64_t *left_out, struct incise_error *err)
+			int n_required, const char *group, const char *where,
+			incise_row_taker take, void *user, uint64_t *left_out,
+			struct incise_error *err)
 {
-	struct sink sink = {columns, n, group, where, take, user, 0, 0};
+	struct sink sink = {columns, n, n_required, group, where, take, user, 0, 0};
 	int rc = n < 1 || n > FIELDS_MAX
 			 ? incise_error_set(err, EINVAL, "%s: cannot read %d columns",
 					    path, n)
@@ -373,13 +378,14 @@ struct incise_dataset *incise_dataset_read_where(const char *path,
 						 struct incise_error *err)
 {
 	struct incise_dataset *data = new_dataset(path, n, err);
-	struct sink sink = {columns, n, group, where, keep_row, data, 0, 0};
+	uint64_t omitted;
 	int rc;
 
 	if (!data)
 		return NULL;
-	rc = read_dataset_file(path, &sink, err);
-	*left_out = (size_t)sink.left_out;
+	rc = incise_dataset_each(path, columns, n, n, group, where, keep_row, data,
+				 &omitted, err);
+	*left_out = (size_t)omitted;
 	if (rc) {
 		incise_dataset_free(data);
 		errno = -rc;
@@ -473,8 +479,10 @@ static int arrow_columns(struct arrow_reader *in, const struct ArrowSchema *sche
 	for (int i = 0; i < in->sink->n && !rc; i++) {
 		struct arrow_column *column = &in->columns[i];
 
-		rc = arrow_find(in, schema, in->sink->columns[i], false, column);
-		if (!rc && (column->index_format || !is_number(column->format)))
+		rc = arrow_find(in, schema, in->sink->columns[i],
+				i >= in->sink->n_required, column);
+		if (!rc && column->at >= 0 &&
+		    (column->index_format || !is_number(column->format)))
 			rc = arrow_fail(in, column, "is not a column of numbers");
 	}
 	if (!rc)
@@ -604,8 +612,12 @@ static int arrow_row(struct arrow_reader *in, const struct ArrowArray *batch, in
 		sink->left_out++;
 		return 0;
 	}
-	for (int i = 0; i < sink->n && !rc; i++)
+	for (int i = 0; i < sink->n_required && !rc; i++)
 		rc = arrow_number(in, batch, &in->columns[i], row, &values[i]);
+	for (int i = sink->n_required; i < sink->n; i++)
+		if (in->columns[i].at < 0 ||
+		    arrow_number(in, batch, &in->columns[i], row, &values[i]))
+			values[i] = NAN;
 	if (!rc && grouped) {
 		const struct ArrowArray *array = batch->children[in->group.at];
 
@@ -694,11 +706,11 @@ static int arrow_read(struct ArrowArrayStream *stream, struct sink *sink,
 }
 
 int incise_dataset_each_arrow(struct ArrowArrayStream *stream, const char *const *columns,
-			      int n, const char *group, const char *where,
+			      int n, int n_required, const char *group, const char *where,
 			      incise_row_taker take, void *user, uint64_t *left_out,
 			      struct incise_error *err)
 {
-	struct sink sink = {columns, n, group, where, take, user, 0, 0};
+	struct sink sink = {columns, n, n_required, group, where, take, user, 0, 0};
 	int rc;
 
 	if (n < 1 || n > FIELDS_MAX) {
@@ -719,7 +731,7 @@ struct incise_dataset *incise_dataset_from_arrow(struct ArrowArrayStream *stream
 						 struct incise_error *err)
 {
 	struct incise_dataset *data = new_dataset("Arrow stream", n, err);
-	struct sink sink = {columns, n, group, where, keep_row, data, 0, 0};
+	struct sink sink = {columns, n, n, group, where, keep_row, data, 0, 0};
 	int rc = -EINVAL;
 
 	if (data)

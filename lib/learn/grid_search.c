@@ -161,8 +161,8 @@ static const struct grid_search_grid *winner(const struct race *race)
 	chosen = best;
 	for (int i = 0; i < race->n; i++) {
 		const struct grid_search_grid *grid = &race->visited[i];
-		double spread =
-			incise_crossval_spread(&race->folds, grid->error, best->error);
+		double spread = incise_crossval_spread(race->folds.n_units, grid->error,
+						       best->error);
 
 		if (grid->total - best->total <= fmax(spread, ALIKE * best->total) &&
 		    (grid->rules < chosen->rules ||

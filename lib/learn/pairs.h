@@ -25,14 +25,16 @@ typedef int (*incise_row_taker)(void *user, const double *row, const char *group
 
 /*
  * Read rows one by one, in memory of one row, as incise_dataset_read_where() and
- * incise_dataset_from_arrow() do. 0, their negative errno, or what the taker returned; left_out (or
- * NULL) is set to the number of omitted rows.
+ * incise_dataset_from_arrow() do; columns behind the first n_required are NaN where they have no finite
+ * number. 0, their negative errno, or what the taker returned; left_out (or NULL) is set to the number
+ * of omitted rows.
  */
 int incise_dataset_each(const char *path, const char *const *columns, int n,
-			const char *group, const char *where, incise_row_taker take,
-			void *user, uint64_t *left_out, struct incise_error *err);
+			int n_required, const char *group, const char *where,
+			incise_row_taker take, void *user, uint64_t *left_out,
+			struct incise_error *err);
 int incise_dataset_each_arrow(struct ArrowArrayStream *stream, const char *const *columns,
-			      int n, const char *group, const char *where,
+			      int n, int n_required, const char *group, const char *where,
 			      incise_row_taker take, void *user, uint64_t *left_out,
 			      struct incise_error *err);
 

@@ -99,15 +99,15 @@ static int each_row(struct incise_reader *source, incise_row_taker take, void *t
 
 	if (given->path)
 		return incise_dataset_each(given->path, reading->columns,
-					   reading->n_columns, group_column(source),
-					   reading->where, take, taker,
-					   &source->corpus.left_out, err);
+					   reading->n_columns, reading->n_required,
+					   group_column(source), reading->where, take,
+					   taker, &source->corpus.left_out, err);
 	rc = given->stream(given, &stream, err);
 	return rc ? rc
 		  : incise_dataset_each_arrow(&stream, reading->columns,
-					      reading->n_columns, group_column(source),
-					      reading->where, take, taker,
-					      &source->corpus.left_out, err);
+					      reading->n_columns, reading->n_required,
+					      group_column(source), reading->where, take,
+					      taker, &source->corpus.left_out, err);
 }
 
 static int read_rows(void *user, incise_row_taker take, void *taker,

@@ -8,9 +8,9 @@
 
 /* The columns and rows that are read. */
 struct incise_reading {
-	const char *const *columns; /* inputs, output, uncertainties */
-	int n_columns;
-	const char *group; /* recording, rig, or a column; NULL: none */
+	const char *const *columns; /* inputs, output, uncertainties, further inputs */
+	int n_columns, n_required;  /* further inputs are NaN where there are none */
+	const char *group;	    /* recording, rig, or a column; NULL: none */
 	const char *where; /* column that is 0 in rows to leave out; NULL: none */
 	double cost;	   /* operations for a row */
 	struct incise_watch *watch;

@@ -245,7 +245,10 @@ static int choose_ridge(struct learner *l)
 	l->report->crossval_plane = unit * sqrt(choice.plane);
 	l->report->crossval_mean = unit * sqrt(choice.mean);
 	l->report->crossval_quadratic = unit * sqrt(choice.quadratic);
-	free(choice.error);
+	if (l->sums && l->sums->choice)
+		*l->sums->choice = choice;
+	else
+		free(choice.error);
 	return rc;
 }
 
@@ -263,6 +266,8 @@ static int train_default(struct learner *l)
 {
 	int rc = choose_ridge(l);
 
+	if (!rc && l->sums && !l->sums->find)
+		return -EALREADY;
 	if (!rc && l->sums && l->sums->weighted)
 		rc = solve_sample(l);
 	if (!rc)

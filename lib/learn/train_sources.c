@@ -36,6 +36,7 @@ struct training {
 	struct incise_progress *progress;	/* or NULL */
 	struct incise_propagation *propagation; /* or NULL */
 	struct incise_factor *check;		/* or NULL */
+	struct incise_choice errors;		/* of the search */
 	struct incise_watch watch;
 	struct incise_error err;
 	bool named; /* the error of a search names what it is of */
@@ -358,6 +359,7 @@ static int survey_sources(struct training *t)
 		sample > INCISE_CORPUS_SAMPLE ? sample : INCISE_CORPUS_SAMPLE);
 	if (!trained->corpus)
 		return no_train_sources_memory(t);
+	incise_corpus_keep(trained->corpus, t->reading.n_required, options->n_further);
 	first = resume_surveys(t);
 	if (first < 0)
 		return first;
@@ -368,6 +370,7 @@ static int survey_sources(struct training *t)
 	for (int i = first; i < t->n && !rc && !t->watch.stopped; i++)
 		if (is_mine(t, i))
 			rc = survey_source(t, i);
+	t->reading.n_columns = t->reading.n_required;
 	rc = agree_on_error(t, rc);
 	if (!rc && t->ranks)
 		rc = share_surveys(t);
@@ -539,7 +542,8 @@ static int search_premises(struct training *t)
 	const struct incise_corpus_side *check = incise_corpus_side(corpus, true);
 	struct incise_variable ranges[INCISE_MODEL_INPUTS_MAX + 1];
 	double min[INCISE_MODEL_INPUTS_MAX + 1], max[INCISE_MODEL_INPUTS_MAX + 1];
-	struct incise_train_sums sums = {find_sums, t, t->options->n_parts > 0};
+	struct incise_train_sums sums = {find_sums, t, &t->errors,
+					 t->options->n_parts > 0};
 	struct incise_train_options options = t->options->train;
 	int n_mfs[INCISE_MODEL_INPUTS_MAX];
 	struct incise_trained *trained = t->trained;
@@ -779,6 +783,79 @@ static int judge_model(struct training *t)
 	return trained->notes ? 0 : no_train_sources_memory(t);
 }
 
+/* --- further inputs ------------------------------------------------------------------ */
+
+/* An error that is smaller by less does not pay for an input. */
+#define WORTH 0.95
+
+/*
+ * Whether a gain is beyond chance: few groups with large errors decide its sum, so the number of groups
+ * that gain counts, too.
+ */
+static bool is_clear(const struct incise_choice *base, const struct incise_choice *with)
+{
+	int n = base->n_units, gaining = 0;
+
+	for (int u = 0; u < n; u++)
+		gaining += with->error[u] < base->error[u];
+	return gaining > 0.5 * n + sqrt(n) &&
+	       with->total < fmin(WORTH * WORTH * base->total,
+				  base->total - incise_crossval_spread(n, with->error,
+								       base->error));
+}
+
+/* Find the held-out errors of both inputs and further one i, on the same pairs and folds. */
+static int judge_further(struct training *t, int i, struct incise_choice *choice)
+{
+	const struct incise_train_side *fit =
+		&incise_corpus_side(t->trained->corpus, false)->sample;
+	const char *const *columns = t->options->columns;
+	const char *names[] = {columns[0], columns[1], columns[t->reading.n_required + i],
+			       columns[2]};
+	int n_mfs[] = {INCISE_TRAIN_MFS, INCISE_TRAIN_MFS, INCISE_TRAIN_MFS},
+	    rc = -ENOMEM;
+	struct incise_train_options options = t->options->train;
+	struct incise_train_sums none = {.choice = choice};
+	double *rows = incise_corpus_extend(t->trained->corpus, i);
+	struct incise_pairs pairs = {rows, fit->pairs.n, 3, NULL};
+	struct incise_model *model = NULL;
+
+	options.groups = fit->groups;
+	if (rows)
+		model = incise_train_start(&pairs, names, t->options->type, n_mfs,
+					   &options, NULL);
+	if (model)
+		rc = incise_train_sample(model, &pairs, NULL, &options, &none, NULL,
+					 NULL);
+	incise_model_free(model);
+	free(rows);
+	return rc;
+}
+
+/* Find the best further input; one that cannot be judged is none. */
+static int try_further(struct training *t)
+{
+	struct incise_trained *trained = t->trained;
+	const struct incise_choice *base = &t->errors;
+	double best = base->total;
+	int rc = 0;
+
+	for (int i = 0; i < t->options->n_further && rc != -ECANCELED; i++) {
+		struct incise_choice with = {0};
+
+		rc = judge_further(t, i, &with);
+		if (with.n_units == base->n_units && with.total < best &&
+		    is_clear(base, &with)) {
+			best = with.total;
+			trained->better = t->options->columns[t->reading.n_required + i];
+			trained->better_rmse =
+				trained->report.crossval_rmse * sqrt(best / base->total);
+		}
+		free(with.error);
+	}
+	return rc == -ECANCELED ? rc : 0;
+}
+
 /* --- all of it ----------------------------------------------------------------------- */
 
 static int train_all(struct training *t)
@@ -807,6 +884,8 @@ static int train_all(struct training *t)
 		t->trained->clamped = count_clamped(t);
 	if (!rc && options->end == INCISE_TRAIN_TO_MODEL)
 		rc = judge_model(t);
+	if (!rc && t->trained->group && t->errors.n_units >= CROSSVAL_FOLDS)
+		rc = try_further(t);
 	return rc;
 }
 
@@ -820,7 +899,7 @@ int incise_train_sources(struct incise_train_source *sources, int n,
 		.trained = trained,
 		.n = n,
 		.reading = {.columns = options->columns,
-			    .n_columns = options->n_inputs + 1 + options->n_parts,
+			    .n_required = options->n_inputs + 1 + options->n_parts,
 			    .where = options->all_rows ? NULL : "advancing",
 			    .watch = &t.watch},
 		.watch = incise_watch_of(&options->train),
@@ -828,6 +907,7 @@ int incise_train_sources(struct incise_train_source *sources, int n,
 	int rc;
 
 	*trained = (struct incise_trained){0};
+	t.reading.n_columns = t.reading.n_required + options->n_further;
 	t.sources = incise_readers_new(sources, n, options->group, &t.reading);
 	t.how = describe_options(&t);
 	rc = t.sources && t.how ? 0 : no_train_sources_memory(&t);
@@ -839,6 +919,7 @@ int incise_train_sources(struct incise_train_source *sources, int n,
 	/* A search counts for itself. */
 	if (t.watch.stopped || rc == -ECANCELED)
 		rc = incise_error_set(&t.err, ECANCELED, "training was stopped");
+	free(t.errors.error);
 	incise_progress_close(t.progress, rc == -ECANCELED);
 	incise_propagation_free(t.propagation);
 	incise_factor_free(t.check);

@@ -24,8 +24,7 @@ static double pushed(const struct incise_plan *plan, int i)
 
 /* Inputs that the search's hand does not move, or does not move far enough. */
 static const enum incise_model_input unmoved[] = {INCISE_INPUT_TILT, INCISE_INPUT_TIME,
-						  INCISE_INPUT_MEAN_SPEED,
-						  INCISE_INPUT_DEEPEST};
+						  INCISE_INPUT_MEAN_SPEED};
 #define UNMOVED ((int)(sizeof(unmoved) / sizeof(*unmoved)))
 
 /*
@@ -39,21 +38,25 @@ static int search_check(struct incise_plan *plan,
 {
 	struct incise_rest_trial own = *as_is, *const trial = &own;
 	enum incise_model_input inputs[UNMOVED];
-	double ends[UNMOVED][2];
+	double ends[UNMOVED][2], deepest[2];
+	bool deep;
 	int n = 0, rc;
 
 	for (int i = 0; i < plan->stability.n_axes; i++)
 		trial->gain = fmax(trial->gain, as_is->gain * pushed(plan, i));
 	for (int i = 0; i < UNMOVED; i++)
-		if (incise_plan_kind_range(plan, unmoved[i], ends[n])) {
-			if (unmoved[i] == INCISE_INPUT_DEEPEST)
-				ends[n][0] = ends[n][1];
+		if (incise_plan_kind_range(plan, unmoved[i], ends[n]))
 			inputs[n++] = unmoved[i];
-		}
+	deep = incise_plan_kind_range(plan, INCISE_INPUT_DEEPEST, deepest);
 	rc = incise_plan_rest(plan, tracker, trial, rest);
-	for (int corner = 0; n && corner < 1 << n && !rc && rest->rests; corner++) {
+	for (int corner = 0; (n || deep) && corner < 1 << n && !rc && rest->rests;
+	     corner++) {
 		struct incise_rest here;
 
+		if (deep) {
+			plan->doubles.plan.held[INCISE_FIXED_INPUT_DEEPEST] = deepest[1];
+			plan->doubles.plan.holds |= 1U << INCISE_FIXED_INPUT_DEEPEST;
+		}
 		for (int i = 0; i < n; i++) {
 			plan->doubles.plan.held[inputs[i] + 1] = ends[i][corner >> i & 1];
 			plan->doubles.plan.holds |= 2U << inputs[i];

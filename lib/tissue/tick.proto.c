@@ -304,6 +304,11 @@ void T(stage_contact)(const struct T(plan) *plan, struct T(state) *state,
 {
 	struct T(proxy) *proxy = &state->proxy;
 
+	if (proxy->touching) {
+		state->path = T(input_path)(state->path, tick->speed, state->path_ns,
+					    tick->t_ns);
+		state->path_ns = tick->t_ns;
+	}
 	/* The last force stays, and fades. */
 	if (is_stale_tick(tick))
 		return;
@@ -549,8 +554,6 @@ static num model_force(const struct T(plan) *plan, struct T(state) *state,
 	num share = N(1), cut = 0, skin;
 
 	state->deepest = n_max(state->deepest, state->depth);
-	state->path = T(input_path)(state->path, tick->speed, state->path_ns, tick->t_ns);
-	state->path_ns = tick->t_ns;
 	if (plan->numbers.phases & T_PUNCTURES)
 		share = open_share(&plan->numbers, state);
 	if (n_below(0, share))

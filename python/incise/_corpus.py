@@ -45,7 +45,7 @@ SourceStruct, SourcesOptionsStruct, PropagationReportStruct, TrainedStruct = _li
         const char **columns;
         int n_inputs;
         void *parts;
-        int n_parts;
+        int n_parts, n_further;
         const char *group;
         bool all_rows, averaged;
         double check;
@@ -70,6 +70,8 @@ SourceStruct, SourcesOptionsStruct, PropagationReportStruct, TrainedStruct = _li
         void *initial, *factor, *corpus;
         double noise, coverage, thirds[3], least, end[2], end_bias[2];
         struct incise_propagation_report propagated;
+        const char *better;
+        double better_rmse;
         bool shared;
     };
     """,

@@ -312,3 +312,24 @@ peak_kb() {
 	incise train pairs.csv plain.csv --mf 2,2 -o n.fis --overwrite >out 2>/dev/null
 	run ! grep -q "cuts" out
 }
+
+# bats test_tags=check
+@test "train names a third input that is better on unseen cuts, and the command" {
+	awk 'BEGIN { print "cut,depth_mm,velocity_mm_s,time_in_tissue_s,force_N"
+		for (c = 0; c < 12; c++) for (i = 0; i < 25; i++) {
+			v = 5 + 2 * c; t = i * 0.4 / v
+			print "c" c "," i * 0.4 "," v + (i * 7 + c) % 5 "," t "," \
+				(0.1 * i + 0.02 * v) * exp(-2 * t) + 0.02 * ((i * 31 + c * 17) % 7) } }' >'slow cuts.csv'
+	incise train 'slow cuts.csv' -o m.fis >out 2>/dev/null
+	command=$(sed -n 's/^with time_in_tissue_s the .* less (it may only reflect how the hand moved .*): //p' out)
+	[ "$command" = "incise train 'slow cuts.csv' -o m.fis --inputs depth_mm,velocity_mm_s,time_in_tissue_s --overwrite" ]
+	incise train 'slow cuts.csv' -o n.fis --json >r.json 2>/dev/null
+	[ "$(key r.json better_inputs)" = '["depth_mm","velocity_mm_s","time_in_tissue_s"]' ]
+	cmp <(parameters m.fis) <(parameters n.fis)
+	error=$(key r.json better_inputs_rms_error_N)
+	holds "$error < 0.95 * $(key r.json crossval_rms_error_N)"
+	# the command leads to that error
+	eval "$command --json" >better.json 2>/dev/null
+	holds "($(key better.json crossval_rms_error_N) - $error)^2 < 1e-18"
+	[ -z "$(key better.json better_inputs)" ]
+}

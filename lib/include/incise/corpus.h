@@ -25,6 +25,9 @@ INCISE_BEGIN_DECLS
 /** Rows of a sample that settles premises and ridge. */
 #define INCISE_CORPUS_SAMPLE 20000
 
+/** Membership functions of each input by default, but for two inputs, which have 5 and 4. */
+#define INCISE_TRAIN_MFS 3
+
 struct ArrowArrayStream;
 
 /** A CSV file, or the rows of an Arrow stream: of a recording, of a table. */
@@ -85,11 +88,16 @@ enum incise_train_end {
 
 /** Options of a training from sources; zeroed but for @ref train are the defaults. */
 struct incise_sources_options {
-	/** Columns of the inputs, of the output, then of the uncertainties. */
+	/** Columns of the inputs, of the output, of the uncertainties, then of further inputs. */
 	const char *const *columns;
 	int n_inputs;
 	const struct incise_propagation_part *parts; /**< of the uncertainties */
 	int n_parts;				     /**< 0: all pairs weigh the same */
+	/**
+	 * Each is tried as a third input, one that has a number in all rows. At most 6; 0 with other than
+	 * two inputs, ranks, premises, classic or tuned.
+	 */
+	int n_further;
 	/** recording, rig, none, or a column; NULL: cut if all sources have it, else none. */
 	const char *group;
 	bool all_rows; /**< also rows whose column advancing is 0 */
@@ -145,6 +153,12 @@ struct incise_trained {
 	 */
 	double end[2], end_bias[2];
 	struct incise_propagation_report propagated; /**< with weights */
+	/**
+	 * The further input with the smallest error in cross-validation over groups, if that is smaller
+	 * by 5 % and a standard error, and so in most groups, by two of their number; NULL: none.
+	 */
+	const char *better;
+	double better_rmse; /**< that error */
 	bool shared; /**< of ranks: all know of the failure, or only this one still works */
 };
 

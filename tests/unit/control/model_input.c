@@ -76,8 +76,13 @@ TEST(a_stay_keeps_its_path_and_its_deepest_depth)
 			    0.05 * t_s);
 		assert_true(stay.deepest_mm == fmax(depth_mm, k < 100 ? 0 : 4));
 	}
-	incise_stay_add(&stay, 2100000000, -1, 3);
-	incise_stay_add(&stay, 2200000000, 1, 3);
+	/* Without a speed, or long apart. */
+	incise_stay_add(&stay, 2010000000, 0.1, NAN);
+	assert_true(fabs(stay.path_mm - 10.1) < 0.05);
+	incise_stay_add(&stay, 90000000000, 0.1, 10);
+	assert_true(fabs(stay.path_mm - 50.1) < 0.05);
+	incise_stay_add(&stay, 90100000000, -1, 3);
+	incise_stay_add(&stay, 90200000000, 1, 3);
 	assert_true(stay.deepest_mm == 1);
 	assert_true(fabs(incise_stay_mean_speed_mm_s(&stay) - 3) < 1e-9);
 }

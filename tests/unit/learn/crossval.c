@@ -278,7 +278,8 @@ TEST(test_spread)
 	const double a[] = {3, 5, 4, 8}, b[] = {1, 4, 4, 5};
 
 	/* Differences 2 1 0 3: mean 1.5, Σ(d-1.5)² = 5, times 4/3. */
-	assert_true(fabs(incise_crossval_spread(&folds, a, b) - sqrt(20.0 / 3)) < 1e-15);
-	assert_true(incise_crossval_spread(&folds, a, a) == 0);
+	assert_true(fabs(incise_crossval_spread(folds.n_units, a, b) - sqrt(20.0 / 3)) <
+		    1e-15);
+	assert_true(incise_crossval_spread(folds.n_units, a, a) == 0);
 	assert_true(incise_crossval_total(&folds, a) == 20);
 }

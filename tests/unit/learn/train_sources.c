@@ -8,6 +8,7 @@
 #include <pthread.h>
 #include <sys/stat.h>
 #include <incise/corpus.h>
+#include "../../../lib/base/random.h"
 #include "../cases.h"
 #include "../message.h"
 
@@ -365,4 +366,88 @@ TEST(test_weights_are_of_one_process)
 	options.ranks = &(struct incise_ranks){.size = 2};
 	assert_error(train(&options, &trained, &err), EINVAL, &err, "one process");
 	incise_trained_free(&trained);
+}
+
+/* --- further inputs --- */
+
+/*
+ * Cuts at a speed of their own that wobbles, whose force differs by cut and decays with time; two columns have
+ * no number in all rows, and a third is of chance.
+ */
+static void write_cuts(uint64_t seed, double spread, double decay_s)
+{
+	FILE *out = fopen(names[0], "w");
+
+	assert_non_null(out);
+	fprintf(out, "cut,depth_mm,velocity_mm_s,time,nan,chance,force_N\n");
+	for (int cut = 0; cut < 24; cut++) {
+		double factor = 1 + spread * incise_random_symmetric(&seed), d = 0;
+		double own = 17 + 12 * incise_random_symmetric(&seed);
+		double phase = 3 * incise_random_symmetric(&seed), step_s = 0.4 / own;
+
+		for (int i = 0; i < 30; i++) {
+			double t = i * step_s, v = own * (1 + 0.4 * sin(6 * t + phase));
+			double force = factor * (0.2 * d + 0.01 * d * d + 0.02 * v) *
+				       exp(-t / decay_s);
+
+			fprintf(out, "c%d,%.5f,%.5f,%.5f,%s,%.5f,%.5f\n", cut, d, v, t,
+				i == 7 ? "nan" : "1", incise_random_symmetric(&seed),
+				force + 0.1 * incise_random_symmetric(&seed));
+			d += v * step_s;
+		}
+	}
+	assert_int_equal(fclose(out), 0);
+}
+
+/* The further input that is found. */
+static void check_further(uint64_t seed, double spread, double decay_s,
+			  const char *wanted)
+{
+	static const char *const all[] = {"depth_mm", "velocity_mm_s", "force_N", "nan",
+					  "chance",   "missing",       "time"};
+	struct incise_train_source source = {.name = names[0], .path = names[0]};
+	struct incise_sources_options options = make_options(DEFAULT, NULL);
+	struct incise_trained trained;
+
+	write_cuts(seed, spread, decay_s);
+	options.columns = all;
+	options.n_further = 4;
+	options.n_mfs[0] = 5;
+	options.n_mfs[1] = 4;
+	assert_int_equal(incise_train_sources(&source, 1, &options, &trained, &err), 0);
+	if (wanted) {
+		assert_non_null(trained.better);
+		assert_string_equal(trained.better, wanted);
+		assert_true(trained.better_rmse < 0.95 * trained.report.crossval_rmse);
+	} else {
+		assert_null(trained.better);
+	}
+	incise_trained_free(&trained);
+}
+
+TEST(test_further_input_where_force_has_history)
+{
+	for (uint64_t seed = 1; seed <= 20; seed++) {
+		check_further(seed, 0.1, 0.5, "time");
+		check_further(seed, 0.4, INFINITY, NULL);
+	}
+	write_source(0);
+}
+
+/* Held-out pairs of one cut are no evidence. */
+TEST(test_further_input_needs_groups)
+{
+	struct incise_train_source source = {.name = names[0], .path = names[0]};
+	struct incise_sources_options options = make_options(DEFAULT, NULL);
+	static const char *const all[] = {"depth_mm", "velocity_mm_s", "force_N", "time"};
+	struct incise_trained trained;
+
+	write_cuts(1, 0.1, 0.5);
+	options.columns = all;
+	options.n_further = 1;
+	options.group = "none";
+	assert_int_equal(incise_train_sources(&source, 1, &options, &trained, &err), 0);
+	assert_null(trained.better);
+	incise_trained_free(&trained);
+	write_source(0);
 }

@@ -64,7 +64,10 @@ static void write_model(const enum incise_model_input *inputs, int n, double mas
 	incise_model_free(model);
 }
 
-/* Down into the tissue and along in it, faster and slower, with a scalpel that leans. */
+/*
+ * Down into the tissue and along in it, faster and slower, with a scalpel that leans; with *@own for a while just
+ * above it.
+ */
 static void cut(void *own, double t_s, struct incise_tracker_sample *pose)
 {
 	double s = fmax(t_s - 0.5, 0);
@@ -72,6 +75,10 @@ static void cut(void *own, double t_s, struct incise_tracker_sample *pose)
 	pose->position_mm[0] = 8 * s + 0.9 * sin(6 * s);
 	pose->position_mm[1] = 0.3 * sin(3 * s);
 	pose->position_mm[2] = 2 - 3 * fmin(s, 2) + 0.8 * sin(5 * s);
+	/* The depth of a blade that touches down at once, and hovers from 1 s to 1.5 s. */
+	if (own && *(const bool *)own)
+		pose->position_mm[2] = s < 1 ? 0.08 - 0.6 * pow(sin(M_PI * s), 2)
+					     : 0.08 - 2 * fmax(s - 1.5, 0);
 	fed_attitude(pose->quaternion, 0.4 * sin(2 * s), 0.7 * s);
 }
 
@@ -110,9 +117,10 @@ static int compare(struct incise_plan *plan, const struct incise_model *model,
 		   const enum incise_model_input *inputs, int n)
 {
 	const unsigned int other = INCISE_TICK_STARTING | INCISE_TICK_CLAMPED |
-				   INCISE_TICK_SLEWED | INCISE_TICK_STALE;
+				   INCISE_TICK_SLEWED | INCISE_TICK_STALE |
+				   INCISE_TICK_UNPAID;
 	struct truth truth = {0};
-	bool inside = false;
+	bool inside = false, hovers = inputs[0] == INCISE_INPUT_MEAN_SPEED;
 	int compared = 0;
 
 	incise_predict_init(&truth.predict, &tracker, 0);
@@ -125,10 +133,10 @@ static int compare(struct incise_plan *plan, const struct incise_model *model,
 		unsigned int flags = 0;
 
 		if (t_ns - arrival_ns < 1000000) {
-			cut(NULL, (double)(arrival_ns - FED_LATENCY_NS) * 1e-9, &pose);
+			cut(&hovers, (double)(arrival_ns - FED_LATENCY_NS) * 1e-9, &pose);
 			incise_predict_add(&truth.predict, &pose);
 		}
-		assert_int_equal(fed_tick(plan, t_ns, cut, NULL, &tick), 0);
+		assert_int_equal(fed_tick(plan, t_ns, cut, &hovers, &tick), 0);
 		if (tick.flags & INCISE_TICK_CONTACT && !inside) {
 			truth.touched_ns = t_ns;
 			truth.path_mm = truth.deepest_mm = 0;
@@ -178,7 +186,7 @@ static void forces_are_those_of_the_model(void **state)
 		plan = fed_plan(&folder, &tracker, &scene,
 				"model = \"m.fis\"; arithmetic = \"double\"; tissue = { "
 				"withdrawal = \"paper\"; };");
-		assert_true(compare(plan, model, cases[i].inputs, cases[i].n) > 1500);
+		assert_true(compare(plan, model, cases[i].inputs, cases[i].n) > 1000);
 		incise_plan_free(plan);
 		incise_scene_free(scene);
 		incise_model_free(model);
@@ -192,11 +200,13 @@ static void integers_hold_their_bound(void **state)
 		"", "surface = { kind = \"capsule\"; from_mm = [ 0.0, -50.0, -40.0 ]; "
 		    "to_mm = [ 0.0, 50.0, -40.0 ]; radius_mm = 40.0; };"};
 	const unsigned int other = INCISE_TICK_STARTING | INCISE_TICK_CLAMPED |
-				   INCISE_TICK_SLEWED | INCISE_TICK_STALE;
+				   INCISE_TICK_SLEWED | INCISE_TICK_STALE |
+				   INCISE_TICK_UNPAID;
 
 	for (int i = 0; i < N_CASES; i++) {
 		struct incise_scene *scene[2];
 		struct incise_plan *plan[2];
+		bool hovers = cases[i].inputs[0] == INCISE_INPUT_MEAN_SPEED;
 		double worst_N = 0, bound_N;
 		char text[400];
 		int compared = 0;
@@ -215,8 +225,9 @@ static void integers_hold_their_bound(void **state)
 			struct incise_tick tick[2];
 
 			for (int k = 0; k < 2; k++)
-				assert_int_equal(
-					fed_tick(plan[k], t_ns, cut, NULL, &tick[k]), 0);
+				assert_int_equal(fed_tick(plan[k], t_ns, cut, &hovers,
+							  &tick[k]),
+						 0);
 			if (tick[0].phase != tick[1].phase ||
 			    (tick[0].flags | tick[1].flags) & other)
 				continue;
