@@ -178,7 +178,9 @@ static int add_ratios(struct fits *fits, int f, const struct incise_ridge *ridge
 	int stride;
 	const double *factor = incise_lsq_factor(fits->lsq, ridge, &stride);
 
-	if (!factor || incise_lsq_back(factor, stride, fits->n, fits->n, fits->x))
+	if (!factor)
+		return -errno;
+	if (incise_lsq_back(factor, stride, fits->n, fits->n, fits->x))
 		return -EDOM;
 	for (size_t i = 0;
 	     i < held->n && !incise_watch_count(fits->folds->watch, pow(fits->n, 2));

@@ -1151,7 +1151,7 @@ static int make_uncertainty(struct solver *s, const struct incise_ridge *wanted,
 	ridge.ridge = fmax(ridge.ridge, LEAST_RIDGE);
 	factor = incise_lsq_factor(s->lsq, &ridge, &stride);
 	if (!factor)
-		return -EDOM;
+		return -errno;
 	if (isnan(noise))
 		noise = scale * (isnan(held) ? sqrt(incise_gram_error(s->all, s->mean,
 								      s->scale, s->x) /

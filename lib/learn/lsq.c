@@ -42,6 +42,7 @@ struct incise_lsq {
 	double *a;	      /* BLOCK × stride */
 	double *v;	      /* of the reflection */
 	double *work, *ridge; /* a copy of r, and rows to fold into it */
+	double *penalty;      /* one number for each pair of rules */
 	struct incise_watch *watch;
 };
 
@@ -84,6 +85,7 @@ void incise_lsq_free(struct incise_lsq *lsq)
 	free(lsq->v);
 	free(lsq->work);
 	free(lsq->ridge);
+	free(lsq->penalty);
 	free(lsq);
 }
 
@@ -306,13 +308,20 @@ void incise_lsq_add_weighted(struct incise_lsq *lsq, double target, double weigh
 	incise_lsq_add(lsq, target * root);
 }
 
-/* The penalty of the rules' consequents, one of each rule: upper triangle. Returns their number. */
-static int penalise_rules(const struct incise_ridge *ridge, double *penalty)
+static int count_rules(const struct incise_ridge *ridge)
 {
-	int rules = 1, inner;
+	int rules = 1;
 
 	for (int i = 0; i < INCISE_MODEL_INPUTS_MAX && ridge->n_mfs[i]; i++)
 		rules *= ridge->n_mfs[i];
+	return rules;
+}
+
+/* The penalty of the rules' consequents, one of each rule: upper triangle. */
+static void penalise_rules(const struct incise_ridge *ridge, int rules, double *penalty)
+{
+	int inner;
+
 	for (int k = 0; k < rules * rules; k++)
 		penalty[k] = ridge->mean / rules;
 	inner = rules;
@@ -326,15 +335,15 @@ static int penalise_rules(const struct incise_ridge *ridge, double *penalty)
 			penalty[a * rules + b] -= ridge->ridge;
 		}
 	}
-	return rules;
 }
 
 /* Rows whose squares are the penalty: Cholesky's factor, for each parameter of a rule. */
-static void find_rows(struct incise_lsq *lsq, const struct incise_ridge *ridge,
-		      double *penalty)
+static void find_rows(struct incise_lsq *lsq, const struct incise_ridge *ridge)
 {
-	int rules = penalise_rules(ridge, penalty), width = ridge->n / rules;
+	int rules = count_rules(ridge), width = ridge->n / rules;
+	double *penalty = lsq->penalty;
 
+	penalise_rules(ridge, rules, penalty);
 	for (int j = 0; j < rules; j++) {
 		double *row = penalty + (size_t)j * rules, pivot = sqrt(row[j]);
 
@@ -368,24 +377,32 @@ static void find_bound_rows(struct incise_lsq *lsq, const struct incise_ridge *r
 	}
 }
 
-static bool fold_ridge(struct incise_lsq *lsq, const struct incise_ridge *ridge)
+static void fold_ridge(struct incise_lsq *lsq, const struct incise_ridge *ridge)
 {
-	double *penalty = NULL;
-
 	if (ridge->free) {
 		find_bound_rows(lsq, ridge);
 	} else if (*ridge->n_mfs) {
-		penalty = malloc((size_t)ridge->n * ridge->n * sizeof(*penalty));
-		if (!penalty)
-			return false;
-		find_rows(lsq, ridge, penalty);
+		find_rows(lsq, ridge);
 	} else {
 		for (int i = 0; i < ridge->n; i++)
 			lsq->ridge[(size_t)i * (lsq->stride + 1)] = sqrt(ridge->ridge);
 	}
 	fold(lsq, lsq->work, lsq->ridge, ridge->n, !ridge->free);
-	free(penalty);
-	return true;
+}
+
+/* A ridge needs it, on its first use. */
+static bool allocate_ridge(struct incise_lsq *lsq, const struct incise_ridge *ridge)
+{
+	int rules = count_rules(ridge);
+
+	if (!lsq->work)
+		lsq->work = matrix(lsq->n + 1, lsq->stride);
+	if (!lsq->ridge)
+		lsq->ridge = matrix(lsq->n, lsq->stride);
+	/* The grid of rules of one problem stays the same. */
+	if (!lsq->penalty && *ridge->n_mfs)
+		lsq->penalty = malloc((size_t)rules * rules * sizeof(*lsq->penalty));
+	return lsq->work && lsq->ridge && (lsq->penalty || !*ridge->n_mfs);
 }
 
 const double *incise_lsq_factor(struct incise_lsq *lsq, const struct incise_ridge *ridge,
@@ -396,18 +413,15 @@ const double *incise_lsq_factor(struct incise_lsq *lsq, const struct incise_ridg
 
 	fold_waiting(lsq);
 	*stride = lsq->stride;
+	errno = ENOMEM;
 	if (ridge && ridge->ridge > 0) {
-		if (!lsq->work)
-			lsq->work = matrix(lsq->n + 1, lsq->stride);
-		if (!lsq->ridge)
-			lsq->ridge = matrix(lsq->n, lsq->stride);
-		if (!lsq->work || !lsq->ridge)
+		if (!allocate_ridge(lsq, ridge))
 			return NULL;
 		memcpy(lsq->work, lsq->r, size * sizeof(double));
-		if (!fold_ridge(lsq, ridge))
-			return NULL;
+		fold_ridge(lsq, ridge);
 		factor = lsq->work;
 	}
+	errno = EDOM;
 	if (incise_watch_count(lsq->watch, 0))
 		return NULL;
 	for (int i = 0; i <= lsq->n; i++)
@@ -453,7 +467,7 @@ int incise_lsq_solve(struct incise_lsq *lsq, const struct incise_ridge *ridge, d
 	int stride;
 	const double *factor = incise_lsq_factor(lsq, ridge, &stride);
 
-	return factor ? incise_lsq_back(factor, stride, lsq->n, lsq->n, x) : -EDOM;
+	return factor ? incise_lsq_back(factor, stride, lsq->n, lsq->n, x) : -errno;
 }
 
 /* Upper bidiagonal: d on the diagonal, e above it. */
