@@ -715,6 +715,60 @@ static void print_clamped(const struct incise_trained *trained)
 		       (unsigned long long)trained->clamped, n);
 }
 
+static void print_crossval(const struct incise_train_report *report)
+{
+	const char *const name[] = {"quadratic", "plane", "mean"};
+	const double rmse[] = {report->crossval_quadratic, report->crossval_plane,
+			       report->crossval_mean};
+	const char *separator = ";";
+
+	if (!isfinite(report->crossval_rmse))
+		return;
+	printf("  cross-validated: %.5g", report->crossval_rmse);
+	for (int i = 0; i < 3; i++)
+		if (isfinite(rmse[i])) {
+			printf("%s %s %.5g", separator, name[i], rmse[i]);
+			separator = ",";
+		}
+	printf("\n");
+}
+
+static void print_coverage(const struct incise_trained *trained, const char *unseen)
+{
+	const char *first = incise_model_info(trained->model)->input[0].name;
+	const double *third = trained->thirds;
+	bool thirds = isfinite(third[0] + third[1] + third[2]);
+
+	printf(", holds %.1f %% of the %s", 100 * trained->coverage, unseen);
+	if (thirds)
+		printf(" (%.0f, %.0f and %.0f %% of the thirds by %s", 100 * third[0],
+		       100 * third[1], 100 * third[2], first);
+	if (isfinite(trained->least))
+		printf("%s%.0f %% of the worst %s", thirds ? ", " : " (",
+		       100 * trained->least, trained->group);
+	if (thirds || isfinite(trained->least))
+		printf(")");
+}
+
+static void print_bias(const struct incise_trained *trained)
+{
+	const char *separator = NULL;
+
+	for (int high = 0; high < 2; high++) {
+		if (!isfinite(trained->end_bias[high]))
+			continue;
+		if (!separator)
+			printf("  bias at the ends of %s: ",
+			       incise_model_info(trained->model)->input[0].name);
+		printf("%s%+.2g %%%s %s %.3g", separator ? separator : "",
+		       100 * trained->end_bias[high], separator ? "" : " of the mean",
+		       high ? "above" : "below", trained->end[high]);
+		separator = ", ";
+	}
+	if (separator)
+		printf("\n");
+}
+
 static void report_train_text(const struct train_options *options,
 			      const struct incise_trained *trained)
 {
@@ -754,14 +808,13 @@ static void report_train_text(const struct train_options *options,
 	if (options->how.train.classic)
 		printf("%s (kept %d), ", cli_count(report->epochs, "epoch"),
 		       report->best_epoch);
-	printf("%s %g, condition %.2g\n", name_penalty(options, report), report->ridge,
-	       report->condition);
+	printf("%s %g", name_penalty(options, report), report->ridge);
+	if (isfinite(report->condition))
+		printf(", condition %.2g", report->condition);
+	printf("\n");
 	printf("  %-22s%12s%14s\n", "RMSE", "training", check ? unseen : "");
 	print_row("this model", report->train_rmse, report->check_rmse);
-	if (!isnan(report->crossval_rmse))
-		printf("  cross-validated: %.5g; quadratic %.5g, plane %.5g, mean %.5g\n",
-		       report->crossval_rmse, report->crossval_quadratic,
-		       report->crossval_plane, report->crossval_mean);
+	print_crossval(report);
 	snprintf(knn, sizeof(knn), "%d nearest", baselines->k);
 	print_row("mean", check ? NAN : baselines->mean, check ? baselines->mean : NAN);
 	print_row("linear regression", check ? NAN : baselines->linear,
@@ -775,16 +828,9 @@ static void report_train_text(const struct train_options *options,
 	printf("  95 %% interval: noise %.4g %s", trained->noise,
 	       unit_of_train(options->target));
 	if (check)
-		printf(", holds %.1f %% of the %s (%.0f, %.0f and %.0f %% of the thirds by "
-		       "%s, %.0f %% of the worst one)",
-		       100 * trained->coverage, unseen, 100 * trained->thirds[0],
-		       100 * trained->thirds[1], 100 * trained->thirds[2],
-		       incise_model_info(model)->input[0].name, 100 * trained->least);
+		print_coverage(trained, unseen);
 	printf("\n");
-	printf("  bias at the ends of %s: %+.2g %% of the mean below %.3g, %+.2g %% above "
-	       "%.3g\n",
-	       incise_model_info(model)->input[0].name, 100 * trained->end_bias[0],
-	       trained->end[0], 100 * trained->end_bias[1], trained->end[1]);
+	print_bias(trained);
 	if (options->how.n_parts)
 		printf("  uncertainties: own parts %.3g %s; calibrations %.3g %s on the "
 		       "model, %.3g %s of another rig\n",

@@ -1129,6 +1129,11 @@ static void fill_report(struct solver *s, const struct incise_ridge *ridge, doub
 		.check_rmse = NAN,
 		.check_r2 = NAN,
 		.crossval_rmse = held * s->scaling.scale[design->basis.n_inputs],
+		.crossval_plane = NAN,
+		.crossval_mean = NAN,
+		.crossval_quadratic = NAN,
+		.epochs = 1,
+		.best_epoch = 1,
 	};
 	for (int r = 0; r < design->basis.n_rules; r++) {
 		report->unfired[r] = design->largest[r] < DESIGN_UNFIRED;
