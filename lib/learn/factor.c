@@ -21,8 +21,9 @@
 #include "design.h"
 #include "factor.h"
 #include "crossval.h"
+#include "interval.h"
 
-#define FORM 2 /* of the file */
+#define FORM 3 /* of the file */
 #define FOLDS INCISE_FACTOR_FOLDS
 #define SOURCES_MAX 1000000
 
@@ -936,12 +937,14 @@ static struct incise_factor *decode_factor(struct decoder *in, size_t size)
 		damaged_factor(in, "expected 'incise factor'");
 		return NULL;
 	}
-	if (form == 1)
+	if (form == 1 || form == 2)
 		return INCISE_ERROR_NULL(
 			in->err, ENOTSUP,
-			"%s: is of form 1, whose small parts reveal their pairs: "
-			"delete it, and write it again by incise train -o FILE.fac",
-			in->name);
+			"%s: is of form %llu, whose %s: delete it, and train again by "
+			"incise train -o FILE.fac",
+			in->name, (unsigned long long)form,
+			form == 1 ? "small parts reveal their pairs"
+				  : "sums have pairs outside the ranges as they were");
 	if (form != FORM)
 		return INCISE_ERROR_NULL(
 			in->err, ENOTSUP,
@@ -1143,7 +1146,7 @@ static void fill_report(struct solver *s, const struct incise_ridge *ridge, doub
 	incise_lsq_condition(s->lsq, &report->condition);
 }
 
-/* Groups are few: Student's factor for them widens what their errors say. */
+/* The errors of sums have no quantile, and no share that pairs of a group have in common. */
 static int make_uncertainty(struct solver *s, const struct incise_ridge *wanted,
 			    double noise, double held, const struct incise_model *model,
 			    struct incise_uncertainty **uncertainty)
@@ -1158,10 +1161,11 @@ static int make_uncertainty(struct solver *s, const struct incise_ridge *wanted,
 	if (!factor)
 		return -errno;
 	if (isnan(noise))
-		noise = scale * (isnan(held) ? sqrt(incise_gram_error(s->all, s->mean,
-								      s->scale, s->x) /
-						    incise_gram_rows(s->all))
-					     : held);
+		noise = scale * incise_interval_widening(sum_of(s->factor->groups)) *
+			(isnan(held) ? sqrt(incise_gram_error(s->all, s->mean, s->scale,
+							      s->x) /
+					    incise_gram_rows(s->all))
+				     : held);
 	*uncertainty = incise_uncertainty_new(model, noise, factor, stride, NULL);
 	return *uncertainty ? 0 : errno == ENOMEM ? -ENOMEM : -EDOM;
 }

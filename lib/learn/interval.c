@@ -39,6 +39,14 @@ double incise_student(int freedom)
 /* Units are partly alike, so what holds 95 % of a new one is between this share and (n+1)/n of it. */
 #define LEVEL(units) fmin(0.95 * (1 + 0.75 / (units)), 0.99)
 
+double incise_interval_widening(uint64_t units)
+{
+	if (!units || units >= UNITS_MANY)
+		return 1;
+	return incise_student(units > 1 ? (int)units - 1 : 1) /
+	       incise_student(UNITS_MANY - 1);
+}
+
 /* The held-out pairs, fold by fold. */
 struct held {
 	const struct incise_folds *folds;
@@ -214,9 +222,7 @@ static int fit_interval(struct held *h, struct incise_interval *interval)
 	shape->offset = -product_of(shape->slope, mean, h->d) - log(square);
 	interval->noise =
 		find_quantile(h, share, LEVEL(units)) * square / INCISE_INTERVAL95;
-	if (units < UNITS_MANY)
-		interval->noise *=
-			incise_student(units - 1) / incise_student(UNITS_MANY - 1);
+	interval->noise *= incise_interval_widening((uint64_t)units);
 	return find_shared(h, shape->slope, &shape->shared);
 }
 

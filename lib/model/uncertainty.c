@@ -97,6 +97,7 @@ static struct incise_uncertainty *make(const struct incise_model *model)
 	u->n = (int)n;
 	u->n_inputs = model->info.n_inputs;
 	u->checksum = checksum(model);
+	u->shape.shared = NAN;
 	u->factor = malloc(n * (n + 1) / 2 * sizeof(*u->factor));
 	if (!u->factor) {
 		free(u);
@@ -220,7 +221,7 @@ int incise_uncertainty_set_shape(struct incise_uncertainty *u,
 				 struct incise_error *err)
 {
 	bool good =
-		isfinite(shape->offset) && isfinite(shape->shared) && shape->shared >= 0;
+		isfinite(shape->offset) && !isinf(shape->shared) && !(shape->shared < 0);
 
 	for (int i = 0; i < u->n_inputs; i++)
 		good = good && isfinite(shape->slope[i]) && isfinite(shape->low[i]) &&
@@ -344,8 +345,11 @@ void incise_uncertainty_parts(const struct incise_uncertainty *u,
 		.model = bounded(noise * sqrt(model_square)),
 		.calibration = bounded(sqrt(common)),
 		.rig = bounded(sqrt(rig)),
-		.mean = bounded(
-			sqrt(noise * noise * (u->shape.shared + model_square) + common)),
+		.mean = isnan(u->shape.shared)
+				? NAN
+				: bounded(sqrt(noise * noise *
+						       (u->shape.shared + model_square) +
+					       common)),
 	};
 }
 
@@ -461,6 +465,21 @@ static int read_row(struct incise_lines *in, double *to, int n)
 	return rc;
 }
 
+/* A number, or unknown. */
+static int read_shared(struct incise_lines *in, double *shared)
+{
+	char *at = value_of(in, "shared");
+	int rc = at ? 0 : -errno;
+
+	*shared = NAN;
+	if (at && strcmp(at, "unknown")) {
+		rc = numbers(in, &at, shared, 1);
+		if (!rc && *at)
+			return fail(in, EINVAL, "shared: expected a number, or unknown");
+	}
+	return rc;
+}
+
 static int read_noise(struct incise_lines *in, struct incise_uncertainty *u)
 {
 	struct incise_uncertainty_shape shape = {0};
@@ -469,7 +488,7 @@ static int read_noise(struct incise_lines *in, struct incise_uncertainty *u)
 	if (!rc && u->noise < 0)
 		return fail(in, EINVAL, "noise: expected a number that is not negative");
 	if (!rc)
-		rc = numbers_of(in, "shared", &shape.shared, 1);
+		rc = read_shared(in, &shape.shared);
 	if (!rc)
 		rc = numbers_of(in, "offset", &shape.offset, 1);
 	for (int i = 0; i < u->n_inputs && !rc; i++) {
@@ -600,9 +619,13 @@ int incise_uncertainty_save(const struct incise_uncertainty *uncertainty,
 	out = incise_outfile_stream(file);
 	fprintf(out,
 		"incise-sd %d\nmodel %016" PRIx64 "\nunknowns %d\nnoise %.17g\n"
-		"shared %.17g\noffset %.17g\n",
-		VERSION, uncertainty->checksum, uncertainty->n, uncertainty->noise,
-		shape->shared, shape->offset);
+		"shared ",
+		VERSION, uncertainty->checksum, uncertainty->n, uncertainty->noise);
+	if (isnan(shape->shared))
+		fputs("unknown", out);
+	else
+		fprintf(out, "%.17g", shape->shared);
+	fprintf(out, "\noffset %.17g\n", shape->offset);
 	for (int i = 0; i < uncertainty->n_inputs; i++)
 		fprintf(out, "slope %.17g %.17g %.17g\n", shape->slope[i], shape->low[i],
 			shape->high[i]);
