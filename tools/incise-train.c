@@ -715,60 +715,6 @@ static void print_clamped(const struct incise_trained *trained)
 		       (unsigned long long)trained->clamped, n);
 }
 
-static void print_crossval(const struct incise_train_report *report)
-{
-	const char *const name[] = {"quadratic", "plane", "mean"};
-	const double rmse[] = {report->crossval_quadratic, report->crossval_plane,
-			       report->crossval_mean};
-	const char *separator = ";";
-
-	if (!isfinite(report->crossval_rmse))
-		return;
-	printf("  cross-validated: %.5g", report->crossval_rmse);
-	for (int i = 0; i < 3; i++)
-		if (isfinite(rmse[i])) {
-			printf("%s %s %.5g", separator, name[i], rmse[i]);
-			separator = ",";
-		}
-	printf("\n");
-}
-
-static void print_coverage(const struct incise_trained *trained, const char *unseen)
-{
-	const char *first = incise_model_info(trained->model)->input[0].name;
-	const double *third = trained->thirds;
-	bool thirds = isfinite(third[0] + third[1] + third[2]);
-
-	printf(", holds %.1f %% of the %s", 100 * trained->coverage, unseen);
-	if (thirds)
-		printf(" (%.0f, %.0f and %.0f %% of the thirds by %s", 100 * third[0],
-		       100 * third[1], 100 * third[2], first);
-	if (isfinite(trained->least))
-		printf("%s%.0f %% of the worst %s", thirds ? ", " : " (",
-		       100 * trained->least, trained->group);
-	if (thirds || isfinite(trained->least))
-		printf(")");
-}
-
-static void print_bias(const struct incise_trained *trained)
-{
-	const char *separator = NULL;
-
-	for (int high = 0; high < 2; high++) {
-		if (!isfinite(trained->end_bias[high]))
-			continue;
-		if (!separator)
-			printf("  bias at the ends of %s: ",
-			       incise_model_info(trained->model)->input[0].name);
-		printf("%s%+.2g %%%s %s %.3g", separator ? separator : "",
-		       100 * trained->end_bias[high], separator ? "" : " of the mean",
-		       high ? "above" : "below", trained->end[high]);
-		separator = ", ";
-	}
-	if (separator)
-		printf("\n");
-}
-
 static void report_train_text(const struct train_options *options,
 			      const struct incise_trained *trained)
 {
@@ -777,6 +723,8 @@ static void report_train_text(const struct train_options *options,
 	const struct incise_corpus_side *held = incise_corpus_side(trained->corpus, true);
 	const struct incise_train_report *report = &trained->report;
 	const struct incise_baselines *baselines = &trained->baselines;
+	const char *first = incise_model_info(model)->input[0].name;
+	const double *third = trained->thirds;
 	bool check = options->how.check > 0;
 	bool cuts = trained->group && !strcmp(trained->group, "cut");
 	const char *group = cuts ? "cut" : "group";
@@ -814,23 +762,38 @@ static void report_train_text(const struct train_options *options,
 	printf("\n");
 	printf("  %-22s%12s%14s\n", "RMSE", "training", check ? unseen : "");
 	print_row("this model", report->train_rmse, report->check_rmse);
-	print_crossval(report);
+	if (isfinite(report->crossval_rmse))
+		printf("  cross-validated: %.5g", report->crossval_rmse);
+	if (isfinite(report->crossval_quadratic))
+		printf(", quadratic %.5g", report->crossval_quadratic);
+	if (isfinite(report->crossval_plane))
+		printf(", plane %.5g, mean %.5g", report->crossval_plane,
+		       report->crossval_mean);
+	if (isfinite(report->crossval_rmse))
+		printf("\n");
 	snprintf(knn, sizeof(knn), "%d nearest", baselines->k);
 	print_row("mean", check ? NAN : baselines->mean, check ? baselines->mean : NAN);
 	print_row("linear regression", check ? NAN : baselines->linear,
 		  check ? baselines->linear : NAN);
 	print_row(knn, check ? NAN : baselines->knn, check ? baselines->knn : NAN);
-	printf("  %-22s%12.5g", "MSE of this model",
-	       report->train_rmse * report->train_rmse);
-	check ? printf("%14.5g\n", report->check_rmse * report->check_rmse)
-	      : printf("\n");
+	print_row("MSE of this model", pow(report->train_rmse, 2),
+		  pow(report->check_rmse, 2));
 	print_row("R² of this model", report->train_r2, report->check_r2);
 	printf("  95 %% interval: noise %.4g %s", trained->noise,
 	       unit_of_train(options->target));
 	if (check)
-		print_coverage(trained, unseen);
+		printf(", holds %.1f %% of the %s", 100 * trained->coverage, unseen);
+	if (check && isfinite(third[0] + third[1] + third[2]))
+		printf(" (%.0f, %.0f and %.0f %% of the thirds by %s)", 100 * third[0],
+		       100 * third[1], 100 * third[2], first);
+	if (check && isfinite(trained->least))
+		printf(", %.0f %% of the worst %s", 100 * trained->least, trained->group);
 	printf("\n");
-	print_bias(trained);
+	for (int high = 0; high < 2; high++)
+		if (isfinite(trained->end_bias[high]))
+			printf("  bias where %s is %s %.3g: %+.2g %% of the mean\n",
+			       first, high ? "above" : "below", trained->end[high],
+			       100 * trained->end_bias[high]);
 	if (options->how.n_parts)
 		printf("  uncertainties: own parts %.3g %s; calibrations %.3g %s on the "
 		       "model, %.3g %s of another rig\n",

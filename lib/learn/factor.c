@@ -937,14 +937,12 @@ static struct incise_factor *decode_factor(struct decoder *in, size_t size)
 		damaged_factor(in, "expected 'incise factor'");
 		return NULL;
 	}
-	if (form == 1 || form == 2)
+	if (form < FORM)
 		return INCISE_ERROR_NULL(
 			in->err, ENOTSUP,
-			"%s: is of form %llu, whose %s: delete it, and train again by "
+			"%s: is of the older form %llu: delete it, and train again by "
 			"incise train -o FILE.fac",
-			in->name, (unsigned long long)form,
-			form == 1 ? "small parts reveal their pairs"
-				  : "sums have pairs outside the ranges as they were");
+			in->name, (unsigned long long)form);
 	if (form != FORM)
 		return INCISE_ERROR_NULL(
 			in->err, ENOTSUP,
@@ -1132,12 +1130,9 @@ static void fill_report(struct solver *s, const struct incise_ridge *ridge, doub
 		.check_rmse = NAN,
 		.check_r2 = NAN,
 		.crossval_rmse = held * s->scaling.scale[design->basis.n_inputs],
-		.crossval_plane = NAN,
-		.crossval_mean = NAN,
-		.crossval_quadratic = NAN,
-		.epochs = 1,
-		.best_epoch = 1,
 	};
+	report->crossval_plane = report->crossval_mean = report->crossval_quadratic = NAN;
+	report->epochs = report->best_epoch = 1;
 	for (int r = 0; r < design->basis.n_rules; r++) {
 		report->unfired[r] = design->largest[r] < DESIGN_UNFIRED;
 		report->rules_unfired += report->unfired[r];
@@ -1160,12 +1155,12 @@ static int make_uncertainty(struct solver *s, const struct incise_ridge *wanted,
 	factor = incise_lsq_factor(s->lsq, &ridge, &stride);
 	if (!factor)
 		return -errno;
+	if (isnan(held))
+		held = sqrt(incise_gram_error(s->all, s->mean, s->scale, s->x) /
+			    incise_gram_rows(s->all));
 	if (isnan(noise))
-		noise = scale * incise_interval_widening(sum_of(s->factor->groups)) *
-			(isnan(held) ? sqrt(incise_gram_error(s->all, s->mean, s->scale,
-							      s->x) /
-					    incise_gram_rows(s->all))
-				     : held);
+		noise = held * scale *
+			incise_interval_widening(sum_of(s->factor->groups));
 	*uncertainty = incise_uncertainty_new(model, noise, factor, stride, NULL);
 	return *uncertainty ? 0 : errno == ENOMEM ? -ENOMEM : -EDOM;
 }

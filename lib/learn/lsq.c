@@ -308,15 +308,6 @@ void incise_lsq_add_weighted(struct incise_lsq *lsq, double target, double weigh
 	incise_lsq_add(lsq, target * root);
 }
 
-static int count_rules(const struct incise_ridge *ridge)
-{
-	int rules = 1;
-
-	for (int i = 0; i < INCISE_MODEL_INPUTS_MAX && ridge->n_mfs[i]; i++)
-		rules *= ridge->n_mfs[i];
-	return rules;
-}
-
 /* The penalty of the rules' consequents, one of each rule: upper triangle. */
 static void penalise_rules(const struct incise_ridge *ridge, int rules, double *penalty)
 {
@@ -338,11 +329,20 @@ static void penalise_rules(const struct incise_ridge *ridge, int rules, double *
 }
 
 /* Rows whose squares are the penalty: Cholesky's factor, for each parameter of a rule. */
-static void find_rows(struct incise_lsq *lsq, const struct incise_ridge *ridge)
+static bool find_rows(struct incise_lsq *lsq, const struct incise_ridge *ridge)
 {
-	int rules = count_rules(ridge), width = ridge->n / rules;
-	double *penalty = lsq->penalty;
+	int rules = 1, width;
+	double *penalty;
 
+	for (int i = 0; i < INCISE_MODEL_INPUTS_MAX && ridge->n_mfs[i]; i++)
+		rules *= ridge->n_mfs[i];
+	width = ridge->n / rules;
+	/* The rules of one problem stay the same. */
+	if (!lsq->penalty)
+		lsq->penalty = malloc((size_t)rules * rules * sizeof(*penalty));
+	penalty = lsq->penalty;
+	if (!penalty)
+		return false;
 	penalise_rules(ridge, rules, penalty);
 	for (int j = 0; j < rules; j++) {
 		double *row = penalty + (size_t)j * rules, pivot = sqrt(row[j]);
@@ -357,6 +357,7 @@ static void find_rows(struct incise_lsq *lsq, const struct incise_ridge *ridge)
 				lsq->ridge[(size_t)(j * width + c) * lsq->stride +
 					   k * width + c] = row[k];
 	}
+	return true;
 }
 
 /* Rows of √ridge·(p - q), without what is along the free rows. */
@@ -377,32 +378,19 @@ static void find_bound_rows(struct incise_lsq *lsq, const struct incise_ridge *r
 	}
 }
 
-static void fold_ridge(struct incise_lsq *lsq, const struct incise_ridge *ridge)
+static bool fold_ridge(struct incise_lsq *lsq, const struct incise_ridge *ridge)
 {
 	if (ridge->free) {
 		find_bound_rows(lsq, ridge);
 	} else if (*ridge->n_mfs) {
-		find_rows(lsq, ridge);
+		if (!find_rows(lsq, ridge))
+			return false;
 	} else {
 		for (int i = 0; i < ridge->n; i++)
 			lsq->ridge[(size_t)i * (lsq->stride + 1)] = sqrt(ridge->ridge);
 	}
 	fold(lsq, lsq->work, lsq->ridge, ridge->n, !ridge->free);
-}
-
-/* A ridge needs it, on its first use. */
-static bool allocate_ridge(struct incise_lsq *lsq, const struct incise_ridge *ridge)
-{
-	int rules = count_rules(ridge);
-
-	if (!lsq->work)
-		lsq->work = matrix(lsq->n + 1, lsq->stride);
-	if (!lsq->ridge)
-		lsq->ridge = matrix(lsq->n, lsq->stride);
-	/* The grid of rules of one problem stays the same. */
-	if (!lsq->penalty && *ridge->n_mfs)
-		lsq->penalty = malloc((size_t)rules * rules * sizeof(*lsq->penalty));
-	return lsq->work && lsq->ridge && (lsq->penalty || !*ridge->n_mfs);
+	return true;
 }
 
 const double *incise_lsq_factor(struct incise_lsq *lsq, const struct incise_ridge *ridge,
@@ -415,10 +403,15 @@ const double *incise_lsq_factor(struct incise_lsq *lsq, const struct incise_ridg
 	*stride = lsq->stride;
 	errno = ENOMEM;
 	if (ridge && ridge->ridge > 0) {
-		if (!allocate_ridge(lsq, ridge))
+		if (!lsq->work)
+			lsq->work = matrix(lsq->n + 1, lsq->stride);
+		if (!lsq->ridge)
+			lsq->ridge = matrix(lsq->n, lsq->stride);
+		if (!lsq->work || !lsq->ridge)
 			return NULL;
 		memcpy(lsq->work, lsq->r, size * sizeof(double));
-		fold_ridge(lsq, ridge);
+		if (!fold_ridge(lsq, ridge))
+			return NULL;
 		factor = lsq->work;
 	}
 	errno = EDOM;

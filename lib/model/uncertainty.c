@@ -17,6 +17,7 @@
 #include "model.h"
 
 #define VERSION 3
+#define UNKNOWN -1.0 /* share that is not known, in a file */
 
 #define UNKNOWNS_MAX (INCISE_MODEL_RULES_MAX * (INCISE_MODEL_INPUTS_MAX + 1))
 
@@ -332,24 +333,21 @@ void incise_uncertainty_parts(const struct incise_uncertainty *u,
 			      const struct incise_model *model, const double *x,
 			      struct incise_uncertainty_parts *parts)
 {
-	double phi[UNKNOWNS_MAX], common, rig, model_square;
-	double noise = noise_at(u, model, x);
+	double phi[UNKNOWNS_MAX], common, rig, model_square, mean_square;
+	double noise = noise_at(u, model, x), shared = u->shape.shared;
 
 	incise_uncertainty_row(model, x, phi);
 	common = square(u, phi, 0, u->n_common);
 	rig = square(u, phi, u->n_common, u->n_rig);
 	model_square = leverage(u, phi);
+	mean_square = noise * noise * (shared + model_square) + common;
 	*parts = (struct incise_uncertainty_parts){
 		.total = bounded(sqrt(noise * noise * (1 + model_square) + common + rig)),
 		.data = noise,
 		.model = bounded(noise * sqrt(model_square)),
 		.calibration = bounded(sqrt(common)),
 		.rig = bounded(sqrt(rig)),
-		.mean = isnan(u->shape.shared)
-				? NAN
-				: bounded(sqrt(noise * noise *
-						       (u->shape.shared + model_square) +
-					       common)),
+		.mean = isnan(shared) ? NAN : bounded(sqrt(mean_square)),
 	};
 }
 
@@ -465,21 +463,6 @@ static int read_row(struct incise_lines *in, double *to, int n)
 	return rc;
 }
 
-/* A number, or unknown. */
-static int read_shared(struct incise_lines *in, double *shared)
-{
-	char *at = value_of(in, "shared");
-	int rc = at ? 0 : -errno;
-
-	*shared = NAN;
-	if (at && strcmp(at, "unknown")) {
-		rc = numbers(in, &at, shared, 1);
-		if (!rc && *at)
-			return fail(in, EINVAL, "shared: expected a number, or unknown");
-	}
-	return rc;
-}
-
 static int read_noise(struct incise_lines *in, struct incise_uncertainty *u)
 {
 	struct incise_uncertainty_shape shape = {0};
@@ -488,7 +471,9 @@ static int read_noise(struct incise_lines *in, struct incise_uncertainty *u)
 	if (!rc && u->noise < 0)
 		return fail(in, EINVAL, "noise: expected a number that is not negative");
 	if (!rc)
-		rc = read_shared(in, &shape.shared);
+		rc = numbers_of(in, "shared", &shape.shared, 1);
+	if (shape.shared == UNKNOWN)
+		shape.shared = NAN;
 	if (!rc)
 		rc = numbers_of(in, "offset", &shape.offset, 1);
 	for (int i = 0; i < u->n_inputs && !rc; i++) {
@@ -502,7 +487,7 @@ static int read_noise(struct incise_lines *in, struct incise_uncertainty *u)
 	if (!rc && incise_uncertainty_set_shape(u, &shape, NULL))
 		return fail(
 			in, EINVAL,
-			"expected shared of at least 0 and slopes over rising ranges");
+			"expected shared of at least 0, or -1, and slopes over rising ranges");
 	return rc;
 }
 
@@ -619,13 +604,9 @@ int incise_uncertainty_save(const struct incise_uncertainty *uncertainty,
 	out = incise_outfile_stream(file);
 	fprintf(out,
 		"incise-sd %d\nmodel %016" PRIx64 "\nunknowns %d\nnoise %.17g\n"
-		"shared ",
-		VERSION, uncertainty->checksum, uncertainty->n, uncertainty->noise);
-	if (isnan(shape->shared))
-		fputs("unknown", out);
-	else
-		fprintf(out, "%.17g", shape->shared);
-	fprintf(out, "\noffset %.17g\n", shape->offset);
+		"shared %.17g\noffset %.17g\n",
+		VERSION, uncertainty->checksum, uncertainty->n, uncertainty->noise,
+		isnan(shape->shared) ? UNKNOWN : shape->shared, shape->offset);
 	for (int i = 0; i < uncertainty->n_inputs; i++)
 		fprintf(out, "slope %.17g %.17g %.17g\n", shape->slope[i], shape->low[i],
 			shape->high[i]);

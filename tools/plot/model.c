@@ -199,6 +199,10 @@ static bool write_band(const struct incise_model *model,
 	return !isnan(u.mean);
 }
 
+static const char mean_band[] =
+	"'' using 1:($2-$4):($2+$4) with filledcurves lc rgb blue fs transparent solid 0.4 "
+	"noborder title 'the mean of all cuts', \\\n  ";
+
 /* Over one of the inputs; the others are at the middle of their support. @mean: it has a band. */
 static void put_band(struct model_grid *grid, const struct model_surface *surface,
 		     int input, int columns, bool mean)
@@ -212,14 +216,9 @@ static void put_band(struct model_grid *grid, const struct model_surface *surfac
 	plot_put_label(grid->script, surface->output.name);
 	fprintf(grid->script,
 		"\nplot '%s' using 1:($2-$3):($2+$3) with filledcurves lc rgb blue fs "
-		"transparent solid 0.2 noborder title 'a new cut on a new rig', \\\n  ",
-		grid->bands[input]);
-	if (mean)
-		fputs("'' using 1:($2-$4):($2+$4) with filledcurves lc rgb blue fs "
-		      "transparent solid 0.4 noborder title 'the mean of all cuts', "
-		      "\\\n  ",
-		      grid->script);
-	fputs("'' using 1:2 with lines lc rgb ink title 'output'\n", grid->script);
+		"transparent solid 0.2 noborder title 'a new cut on a new rig', \\\n  "
+		"%s'' using 1:2 with lines lc rgb ink title 'output'\n",
+		grid->bands[input], mean ? mean_band : "");
 }
 
 /* --- the figure -------------------------------------------------------------------------- */

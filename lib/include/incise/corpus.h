@@ -141,8 +141,7 @@ struct incise_trained {
 	double least; /**< the same of the group of which the fewest are; NAN without groups */
 	/**
 	 * Lowest and highest 5 % of the first input in the sample held out, else in the sample: where
-	 * they end, and the mean error of the model there, as a share of the mean output there.
-	 * Not finite where that mean is 0.
+	 * they end, and the mean error of the model there, as a share of the mean output there, if it is not 0.
 	 */
 	double end[2], end_bias[2];
 	struct incise_propagation_report propagated; /**< with weights */
