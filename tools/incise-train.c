@@ -788,6 +788,8 @@ static void report_train_text(const struct train_options *options,
 	const struct incise_corpus_side *held = incise_corpus_side(trained->corpus, true);
 	const struct incise_train_report *report = &trained->report;
 	const struct incise_baselines *baselines = &trained->baselines;
+	const char *first = incise_model_info(model)->input[0].name;
+	const double *third = trained->thirds;
 	bool check = options->how.check > 0;
 	bool cuts = trained->group && !strcmp(trained->group, "cut");
 	const char *group = cuts ? "cut" : "group";
@@ -819,14 +821,21 @@ static void report_train_text(const struct train_options *options,
 	if (options->how.train.classic)
 		printf("%s (kept %d), ", cli_count(report->epochs, "epoch"),
 		       report->best_epoch);
-	printf("%s %g, condition %.2g\n", name_penalty(options, report), report->ridge,
-	       report->condition);
+	printf("%s %g", name_penalty(options, report), report->ridge);
+	if (isfinite(report->condition))
+		printf(", condition %.2g", report->condition);
+	printf("\n");
 	printf("  %-22s%12s%14s\n", "RMSE", "training", check ? unseen : "");
 	print_row("this model", report->train_rmse, report->check_rmse);
-	if (!isnan(report->crossval_rmse))
-		printf("  cross-validated: %.5g; quadratic %.5g, plane %.5g, mean %.5g\n",
-		       report->crossval_rmse, report->crossval_quadratic,
-		       report->crossval_plane, report->crossval_mean);
+	if (isfinite(report->crossval_rmse))
+		printf("  cross-validated: %.5g", report->crossval_rmse);
+	if (isfinite(report->crossval_quadratic))
+		printf(", quadratic %.5g", report->crossval_quadratic);
+	if (isfinite(report->crossval_plane))
+		printf(", plane %.5g, mean %.5g", report->crossval_plane,
+		       report->crossval_mean);
+	if (isfinite(report->crossval_rmse))
+		printf("\n");
 	snprintf(knn, sizeof(knn), "%d nearest", baselines->k);
 	print_row("mean", check ? NAN : baselines->mean, check ? baselines->mean : NAN);
 	print_row("linear regression", check ? NAN : baselines->linear,
@@ -838,16 +847,18 @@ static void report_train_text(const struct train_options *options,
 	printf("  95 %% interval: noise %.4g %s", trained->noise,
 	       unit_of_train(options->target));
 	if (check)
-		printf(", holds %.1f %% of the %s (%.0f, %.0f and %.0f %% of the thirds by "
-		       "%s, %.0f %% of the worst one)",
-		       100 * trained->coverage, unseen, 100 * trained->thirds[0],
-		       100 * trained->thirds[1], 100 * trained->thirds[2],
-		       incise_model_info(model)->input[0].name, 100 * trained->least);
+		printf(", holds %.1f %% of the %s", 100 * trained->coverage, unseen);
+	if (check && isfinite(third[0] + third[1] + third[2]))
+		printf(" (%.0f, %.0f and %.0f %% of the thirds by %s)", 100 * third[0],
+		       100 * third[1], 100 * third[2], first);
+	if (check && isfinite(trained->least))
+		printf(", %.0f %% of the worst %s", 100 * trained->least, trained->group);
 	printf("\n");
-	printf("  bias at the ends of %s: %+.2g %% of the mean below %.3g, %+.2g %% above "
-	       "%.3g\n",
-	       incise_model_info(model)->input[0].name, 100 * trained->end_bias[0],
-	       trained->end[0], 100 * trained->end_bias[1], trained->end[1]);
+	for (int high = 0; high < 2; high++)
+		if (isfinite(trained->end_bias[high]))
+			printf("  bias where %s is %s %.3g: %+.2g %% of the mean\n",
+			       first, high ? "above" : "below", trained->end[high],
+			       100 * trained->end_bias[high]);
 	if (options->how.n_parts)
 		printf("  uncertainties: own parts %.3g %s; calibrations %.3g %s on the "
 		       "model, %.3g %s of another rig\n",

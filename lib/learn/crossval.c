@@ -175,11 +175,12 @@ static int add_ratios(struct fits *fits, int f, const struct incise_ridge *ridge
 {
 	const struct incise_pairs *held = &fits->folds->held[f];
 	double w[INCISE_MODEL_RULES_MAX];
-	int stride;
+	int stride, rc;
 	const double *factor = incise_lsq_factor(fits->lsq, ridge, &stride);
 
-	if (!factor || incise_lsq_back(factor, stride, fits->n, fits->n, fits->x))
-		return -EDOM;
+	rc = factor ? incise_lsq_back(factor, stride, fits->n, fits->n, fits->x) : -errno;
+	if (rc)
+		return rc;
 	for (size_t i = 0;
 	     i < held->n && !incise_watch_count(fits->folds->watch, pow(fits->n, 2));
 	     i++) {

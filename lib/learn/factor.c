@@ -21,8 +21,9 @@
 #include "design.h"
 #include "factor.h"
 #include "crossval.h"
+#include "interval.h"
 
-#define FORM 2 /* of the file */
+#define FORM 3 /* of the file */
 #define FOLDS INCISE_FACTOR_FOLDS
 #define SOURCES_MAX 1000000
 
@@ -936,12 +937,12 @@ static struct incise_factor *decode_factor(struct decoder *in, size_t size)
 		damaged_factor(in, "expected 'incise factor'");
 		return NULL;
 	}
-	if (form == 1)
+	if (form < FORM)
 		return INCISE_ERROR_NULL(
 			in->err, ENOTSUP,
-			"%s: is of form 1, whose small parts reveal their pairs: "
-			"delete it, and write it again by incise train -o FILE.fac",
-			in->name);
+			"%s: is of the older form %llu: delete it, and train again by "
+			"incise train -o FILE.fac",
+			in->name, (unsigned long long)form);
 	if (form != FORM)
 		return INCISE_ERROR_NULL(
 			in->err, ENOTSUP,
@@ -1130,6 +1131,8 @@ static void fill_report(struct solver *s, const struct incise_ridge *ridge, doub
 		.check_r2 = NAN,
 		.crossval_rmse = held * s->scaling.scale[design->basis.n_inputs],
 	};
+	report->crossval_plane = report->crossval_mean = report->crossval_quadratic = NAN;
+	report->epochs = report->best_epoch = 1;
 	for (int r = 0; r < design->basis.n_rules; r++) {
 		report->unfired[r] = design->largest[r] < DESIGN_UNFIRED;
 		report->rules_unfired += report->unfired[r];
@@ -1138,7 +1141,7 @@ static void fill_report(struct solver *s, const struct incise_ridge *ridge, doub
 	incise_lsq_condition(s->lsq, &report->condition);
 }
 
-/* Groups are few: Student's factor for them widens what their errors say. */
+/* The errors of sums have no quantile, and no share that pairs of a group have in common. */
 static int make_uncertainty(struct solver *s, const struct incise_ridge *wanted,
 			    double noise, double held, const struct incise_model *model,
 			    struct incise_uncertainty **uncertainty)
@@ -1151,12 +1154,13 @@ static int make_uncertainty(struct solver *s, const struct incise_ridge *wanted,
 	ridge.ridge = fmax(ridge.ridge, LEAST_RIDGE);
 	factor = incise_lsq_factor(s->lsq, &ridge, &stride);
 	if (!factor)
-		return -EDOM;
+		return -errno;
+	if (isnan(held))
+		held = sqrt(incise_gram_error(s->all, s->mean, s->scale, s->x) /
+			    incise_gram_rows(s->all));
 	if (isnan(noise))
-		noise = scale * (isnan(held) ? sqrt(incise_gram_error(s->all, s->mean,
-								      s->scale, s->x) /
-						    incise_gram_rows(s->all))
-					     : held);
+		noise = held * scale *
+			incise_interval_widening(sum_of(s->factor->groups));
 	*uncertainty = incise_uncertainty_new(model, noise, factor, stride, NULL);
 	return *uncertainty ? 0 : errno == ENOMEM ? -ENOMEM : -EDOM;
 }

@@ -9,13 +9,14 @@
 #include "../base/ascending.h"
 #include "interval.h"
 
-double incise_student(int freedom)
+/* The 97.5 % quantile of Student's t for 1 … degrees of freedom, to 0.1 %. */
+static double find_student(double n)
 {
 	static const double few[] = {12.706, 4.303, 3.182, 2.776, 2.571};
-	const double z = INCISE_INTERVAL95, n = freedom;
+	const double z = INCISE_INTERVAL95;
 
-	if (freedom <= 5)
-		return few[freedom - 1];
+	if (n <= 5)
+		return few[(int)n - 1];
 	/* Cornish and Fisher's expansion. */
 	return z + (pow(z, 3) + z) / (4 * n) +
 	       (5 * pow(z, 5) + 16 * pow(z, 3) + 3 * z) / (96 * n * n);
@@ -38,6 +39,13 @@ double incise_student(int freedom)
 
 /* Units are partly alike, so what holds 95 % of a new one is between this share and (n+1)/n of it. */
 #define LEVEL(units) fmin(0.95 * (1 + 0.75 / (units)), 0.99)
+
+double incise_interval_widening(uint64_t units)
+{
+	if (!units || units >= UNITS_MANY)
+		return 1;
+	return find_student(fmax(units - 1, 1)) / find_student(UNITS_MANY - 1);
+}
 
 /* The held-out pairs, fold by fold. */
 struct held {
@@ -214,9 +222,7 @@ static int fit_interval(struct held *h, struct incise_interval *interval)
 	shape->offset = -product_of(shape->slope, mean, h->d) - log(square);
 	interval->noise =
 		find_quantile(h, share, LEVEL(units)) * square / INCISE_INTERVAL95;
-	if (units < UNITS_MANY)
-		interval->noise *=
-			incise_student(units - 1) / incise_student(UNITS_MANY - 1);
+	interval->noise *= incise_interval_widening((uint64_t)units);
 	return find_shared(h, shape->slope, &shape->shared);
 }
 

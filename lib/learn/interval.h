@@ -28,7 +28,7 @@ int incise_interval_noise(const struct incise_basis *basis,
 int incise_interval_fit(const struct incise_folds *folds, const double *ratios,
 			struct incise_interval *interval);
 
-/* The 97.5 % quantile of Student's t for 1 … degrees of freedom, to 0.1 %. */
-double incise_student(int freedom);
+/* Student's t widens the noise by this factor where units are few; 0: their number is not known. */
+double incise_interval_widening(uint64_t units);
 
 #endif

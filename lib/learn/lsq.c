@@ -42,6 +42,7 @@ struct incise_lsq {
 	double *a;	      /* BLOCK × stride */
 	double *v;	      /* of the reflection */
 	double *work, *ridge; /* a copy of r, and rows to fold into it */
+	double *penalty;      /* one number for each pair of rules */
 	struct incise_watch *watch;
 };
 
@@ -84,6 +85,7 @@ void incise_lsq_free(struct incise_lsq *lsq)
 	free(lsq->v);
 	free(lsq->work);
 	free(lsq->ridge);
+	free(lsq->penalty);
 	free(lsq);
 }
 
@@ -306,13 +308,11 @@ void incise_lsq_add_weighted(struct incise_lsq *lsq, double target, double weigh
 	incise_lsq_add(lsq, target * root);
 }
 
-/* The penalty of the rules' consequents, one of each rule: upper triangle. Returns their number. */
-static int penalise_rules(const struct incise_ridge *ridge, double *penalty)
+/* The penalty of the rules' consequents, one of each rule: upper triangle. */
+static void penalise_rules(const struct incise_ridge *ridge, int rules, double *penalty)
 {
-	int rules = 1, inner;
+	int inner;
 
-	for (int i = 0; i < INCISE_MODEL_INPUTS_MAX && ridge->n_mfs[i]; i++)
-		rules *= ridge->n_mfs[i];
 	for (int k = 0; k < rules * rules; k++)
 		penalty[k] = ridge->mean / rules;
 	inner = rules;
@@ -326,15 +326,24 @@ static int penalise_rules(const struct incise_ridge *ridge, double *penalty)
 			penalty[a * rules + b] -= ridge->ridge;
 		}
 	}
-	return rules;
 }
 
 /* Rows whose squares are the penalty: Cholesky's factor, for each parameter of a rule. */
-static void find_rows(struct incise_lsq *lsq, const struct incise_ridge *ridge,
-		      double *penalty)
+static bool find_rows(struct incise_lsq *lsq, const struct incise_ridge *ridge)
 {
-	int rules = penalise_rules(ridge, penalty), width = ridge->n / rules;
+	int rules = 1, width;
+	double *penalty;
 
+	for (int i = 0; i < INCISE_MODEL_INPUTS_MAX && ridge->n_mfs[i]; i++)
+		rules *= ridge->n_mfs[i];
+	width = ridge->n / rules;
+	/* The rules of one problem stay the same. */
+	if (!lsq->penalty)
+		lsq->penalty = malloc((size_t)rules * rules * sizeof(*penalty));
+	penalty = lsq->penalty;
+	if (!penalty)
+		return false;
+	penalise_rules(ridge, rules, penalty);
 	for (int j = 0; j < rules; j++) {
 		double *row = penalty + (size_t)j * rules, pivot = sqrt(row[j]);
 
@@ -348,6 +357,7 @@ static void find_rows(struct incise_lsq *lsq, const struct incise_ridge *ridge,
 				lsq->ridge[(size_t)(j * width + c) * lsq->stride +
 					   k * width + c] = row[k];
 	}
+	return true;
 }
 
 /* Rows of √ridge·(p - q), without what is along the free rows. */
@@ -374,21 +384,16 @@ static void find_bound_rows(struct incise_lsq *lsq, const struct incise_ridge *r
 
 static bool fold_ridge(struct incise_lsq *lsq, const struct incise_ridge *ridge)
 {
-	double *penalty = NULL;
-
 	if (ridge->free) {
 		find_bound_rows(lsq, ridge);
 	} else if (*ridge->n_mfs) {
-		penalty = malloc((size_t)ridge->n * ridge->n * sizeof(*penalty));
-		if (!penalty)
+		if (!find_rows(lsq, ridge))
 			return false;
-		find_rows(lsq, ridge, penalty);
 	} else {
 		for (int i = 0; i < ridge->n; i++)
 			lsq->ridge[(size_t)i * (lsq->stride + 1)] = sqrt(ridge->ridge);
 	}
 	fold(lsq, lsq->work, lsq->ridge, ridge->n, !ridge->free);
-	free(penalty);
 	return true;
 }
 
@@ -400,6 +405,7 @@ const double *incise_lsq_factor(struct incise_lsq *lsq, const struct incise_ridg
 
 	fold_waiting(lsq);
 	*stride = lsq->stride;
+	errno = ENOMEM;
 	if (ridge && ridge->ridge > 0) {
 		if (!lsq->work)
 			lsq->work = matrix(lsq->n + 1, lsq->stride);
@@ -412,6 +418,7 @@ const double *incise_lsq_factor(struct incise_lsq *lsq, const struct incise_ridg
 			return NULL;
 		factor = lsq->work;
 	}
+	errno = EDOM;
 	if (incise_watch_count(lsq->watch, 0))
 		return NULL;
 	for (int i = 0; i <= lsq->n; i++)
@@ -457,7 +464,7 @@ int incise_lsq_solve(struct incise_lsq *lsq, const struct incise_ridge *ridge, d
 	int stride;
 	const double *factor = incise_lsq_factor(lsq, ridge, &stride);
 
-	return factor ? incise_lsq_back(factor, stride, lsq->n, lsq->n, x) : -EDOM;
+	return factor ? incise_lsq_back(factor, stride, lsq->n, lsq->n, x) : -errno;
 }
 
 /* Upper bidiagonal: d on the diagonal, e above it. */

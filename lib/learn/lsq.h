@@ -63,12 +63,12 @@ void incise_lsq_add_weighted(struct incise_lsq *lsq, double target, double weigh
 /*
  * The factor [R z; 0 ρ] of all rows and of a ridge (or NULL): row i of its n+1 starts at
  * i·*stride. Only the upper triangle has a meaning. It belongs to the lsq and is good until
- * its next use. NULL where the rows overflow.
+ * its next use. NULL with errno EDOM where the rows overflow, or ENOMEM.
  */
 const double *incise_lsq_factor(struct incise_lsq *lsq, const struct incise_ridge *ridge,
 				int *stride);
 
-/* Minimise |A x - t|² and the ridge, or NULL. Returns 0 or -EDOM (singular, overflow). */
+/* Minimise |A x - t|² and the ridge, or NULL. Returns 0, -EDOM (singular, overflow) or -ENOMEM. */
 int incise_lsq_solve(struct incise_lsq *lsq, const struct incise_ridge *ridge, double *x);
 
 /* Solve R x = z for the first n unknowns of a factor whose column `right` is z. */

@@ -295,7 +295,7 @@ static int find_uncertainty(struct learner *l)
 		return rc;
 	factor = incise_lsq_factor(l->lsq, &ridge, &stride);
 	if (!factor)
-		return -EDOM;
+		return -errno;
 	*l->options->uncertainty = incise_uncertainty_new(
 		l->model, interval.noise * l->scaling.scale[l->basis.n_inputs], factor,
 		stride, NULL);

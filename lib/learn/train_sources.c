@@ -659,8 +659,9 @@ static int find_coverage(struct training *t)
 		all.inside += third[k].inside;
 		all.n += third[k].n;
 	}
-	trained->coverage = trained->least = all.inside / all.n;
-	for (size_t g = 0; g <= most && group; g++)
+	trained->coverage = all.inside / all.n;
+	trained->least = NAN;
+	for (size_t g = 0; g <= most && group && side->groups; g++)
 		if (group[g].n > 0)
 			trained->least =
 				fmin(trained->least, group[g].inside / group[g].n);

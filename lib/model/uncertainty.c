@@ -17,6 +17,7 @@
 #include "model.h"
 
 #define VERSION 3
+#define UNKNOWN -1.0 /* share that is not known, in a file */
 
 #define UNKNOWNS_MAX (INCISE_MODEL_RULES_MAX * (INCISE_MODEL_INPUTS_MAX + 1))
 
@@ -97,6 +98,7 @@ static struct incise_uncertainty *make(const struct incise_model *model)
 	u->n = (int)n;
 	u->n_inputs = model->info.n_inputs;
 	u->checksum = checksum(model);
+	u->shape.shared = NAN;
 	u->factor = malloc(n * (n + 1) / 2 * sizeof(*u->factor));
 	if (!u->factor) {
 		free(u);
@@ -220,7 +222,7 @@ int incise_uncertainty_set_shape(struct incise_uncertainty *u,
 				 struct incise_error *err)
 {
 	bool good =
-		isfinite(shape->offset) && isfinite(shape->shared) && shape->shared >= 0;
+		isfinite(shape->offset) && !isinf(shape->shared) && !(shape->shared < 0);
 
 	for (int i = 0; i < u->n_inputs; i++)
 		good = good && isfinite(shape->slope[i]) && isfinite(shape->low[i]) &&
@@ -331,21 +333,21 @@ void incise_uncertainty_parts(const struct incise_uncertainty *u,
 			      const struct incise_model *model, const double *x,
 			      struct incise_uncertainty_parts *parts)
 {
-	double phi[UNKNOWNS_MAX], common, rig, model_square;
-	double noise = noise_at(u, model, x);
+	double phi[UNKNOWNS_MAX], common, rig, model_square, mean_square;
+	double noise = noise_at(u, model, x), shared = u->shape.shared;
 
 	incise_uncertainty_row(model, x, phi);
 	common = square(u, phi, 0, u->n_common);
 	rig = square(u, phi, u->n_common, u->n_rig);
 	model_square = leverage(u, phi);
+	mean_square = noise * noise * (shared + model_square) + common;
 	*parts = (struct incise_uncertainty_parts){
 		.total = bounded(sqrt(noise * noise * (1 + model_square) + common + rig)),
 		.data = noise,
 		.model = bounded(noise * sqrt(model_square)),
 		.calibration = bounded(sqrt(common)),
 		.rig = bounded(sqrt(rig)),
-		.mean = bounded(
-			sqrt(noise * noise * (u->shape.shared + model_square) + common)),
+		.mean = isnan(shared) ? NAN : bounded(sqrt(mean_square)),
 	};
 }
 
@@ -470,6 +472,8 @@ static int read_noise(struct incise_lines *in, struct incise_uncertainty *u)
 		return fail(in, EINVAL, "noise: expected a number that is not negative");
 	if (!rc)
 		rc = numbers_of(in, "shared", &shape.shared, 1);
+	if (shape.shared == UNKNOWN)
+		shape.shared = NAN;
 	if (!rc)
 		rc = numbers_of(in, "offset", &shape.offset, 1);
 	for (int i = 0; i < u->n_inputs && !rc; i++) {
@@ -483,7 +487,7 @@ static int read_noise(struct incise_lines *in, struct incise_uncertainty *u)
 	if (!rc && incise_uncertainty_set_shape(u, &shape, NULL))
 		return fail(
 			in, EINVAL,
-			"expected shared of at least 0 and slopes over rising ranges");
+			"expected shared of at least 0, or -1, and slopes over rising ranges");
 	return rc;
 }
 
@@ -602,7 +606,7 @@ int incise_uncertainty_save(const struct incise_uncertainty *uncertainty,
 		"incise-sd %d\nmodel %016" PRIx64 "\nunknowns %d\nnoise %.17g\n"
 		"shared %.17g\noffset %.17g\n",
 		VERSION, uncertainty->checksum, uncertainty->n, uncertainty->noise,
-		shape->shared, shape->offset);
+		isnan(shape->shared) ? UNKNOWN : shape->shared, shape->offset);
 	for (int i = 0; i < uncertainty->n_inputs; i++)
 		fprintf(out, "slope %.17g %.17g %.17g\n", shape->slope[i], shape->low[i],
 			shape->high[i]);

@@ -573,7 +573,7 @@ class Model:
 
         With parts=True too (output, standard deviation, parts): in the last dimension of the parts
         data, model, calibration and rig, whose squares add up to that of the standard deviation, and
-        mean, that of the mean of all cuts.
+        mean, that of the mean of all cuts, NaN where it is not known.
         """
         if parts and not sd:
             raise Invalid(errno.EINVAL, "parts are those of the standard deviation; give sd=True")

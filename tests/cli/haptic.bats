@@ -188,7 +188,7 @@ beside_the_model() {
 		tr -d ' ' | sed 's/,,/,/' >one.csv
 	incise train one.csv --inputs depth_m -o one.fis 2>/dev/null
 	printf 'model = "one.fis";\n' >bad.scene
-	refuses bad.scene "'depth_m', which a loop does not have; did you mean depth_mm: expected depth_mm, "
+	refuses bad.scene "'depth_m', which a loop does not have; did you mean depth_mm: expected some of depth_mm, "
 }
 
 # bats test_tags=check

@@ -282,6 +282,13 @@ train_killed_soon() {
 	# of the premises, not of the default
 	incise train s1.csv --premises start.fis -o m.fis --overwrite --json >r.json 2>/dev/null
 	[ "$(key r.json 'mf[0]') $(key r.json 'mf[1]')" = "3 2" ]
+	# no penalty was selected among others, and the mean of all cuts is not known
+	[ "$(key r.json epochs) $(key r.json crossval_mean_rms_error_N)" = "1 " ]
+	incise train s1.csv --premises start.fis -o m.fis --overwrite >text 2>/dev/null
+	grep -qE "^  cross-validated: [0-9.]+$" text
+	[ "$(incise eval m.fis --uncertainty parts <<<'5 20' | cut -d' ' -f6)" = nan ]
+	incise eval m.fis --uncertainty parts --json <<<'5 20' >r.json
+	[ -z "$(key r.json 'rows[0].sd_mean_N')" ]
 	incise train <(cat s1.csv) <(cat s2.csv) -o m.fis --overwrite >/dev/null 2>&1
 	run --separate-stderr incise train <(cat s1.csv) <(cat s1.csv) -o m.fis --overwrite
 	failed_with "the same content"

@@ -84,6 +84,10 @@ train() {
 	for text in "95 % intervals" "a new cut on a new rig" "the mean of all cuts" output; do
 		grep -q ">\(<!\[CDATA\[\)\?$text" m.svg || complain "no '$text'"
 	done
+	incise train a.csv b.csv c.csv --premises m.fis -o sums.fis >/dev/null 2>&1
+	incise plot sums.fis -o sums.svg
+	grep -q "a new cut on a new rig" sums.svg
+	run ! grep -q "the mean of all cuts" sums.svg
 	rm m.fis.sd
 	incise plot m.fis -o plain.svg
 	run ! grep -q "95 % intervals" plain.svg

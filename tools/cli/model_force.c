@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "cli.h"
+#include "json.h"
 #include "model_force.h"
 
 /* Depth and speed in the order of the model's inputs; false: it has others. */
@@ -60,19 +61,22 @@ void model_force_print(FILE *out, const struct model_force *force)
 
 	fprintf(out,
 		"%.3f N at %.1f mm and %.3g mm/s, u = %.2g N of a new cut (data %.2g, model "
-		"%.2g, calibration %.2g), %.2g N of the mean of all cuts\n",
+		"%.2g, calibration %.2g)",
 		force->force_N, force->depth_mm, force->velocity_mm_s, u->total, u->data,
-		u->model, hypot(u->calibration, u->rig), u->mean);
+		u->model, hypot(u->calibration, u->rig));
+	if (!isnan(u->mean))
+		fprintf(out, ", %.2g N of the mean of all cuts", u->mean);
+	fputc('\n', out);
 }
 
 json_t *model_force_json(const struct model_force *force)
 {
 	if (!force)
 		return json_null();
-	return json_pack("{sf sf sf sf sf sf sf sf}", "depth_mm", force->depth_mm,
+	return json_pack("{sf sf sf sf sf sf sf so}", "depth_mm", force->depth_mm,
 			 "velocity_mm_s", force->velocity_mm_s, "force_N", force->force_N,
 			 "sd_N", force->u.total, "sd_data_N", force->u.data, "sd_model_N",
 			 force->u.model, "sd_calibration_N",
 			 hypot(force->u.calibration, force->u.rig), "sd_mean_N",
-			 force->u.mean);
+			 json_number(force->u.mean));
 }

@@ -174,20 +174,20 @@ static struct incise_uncertainty *uncertainty_of(const char *path,
 	return uncertainty;
 }
 
-/* Input, output, half the 95 % interval of a new cut and of the mean of all cuts. */
-static void write_band(const struct incise_model *model,
+/* Input, output, half the 95 % interval of a new cut and of the mean of all cuts; false: it has none. */
+static bool write_band(const struct incise_model *model,
 		       const struct incise_uncertainty *uncertainty, int input,
 		       const char *folder, const char *name)
 {
 	const struct incise_model_info *info = incise_model_info(model);
 	FILE *data = plot_data(folder, name);
+	struct incise_uncertainty_parts u;
 	double x[INCISE_MODEL_INPUTS_MAX];
 
 	for (int i = 0; i < info->n_inputs; i++)
 		x[i] = info->input[i].min + (info->input[i].max - info->input[i].min) / 2;
 	for (int k = 0; k <= BAND_POINTS; k++) {
 		const struct incise_variable *v = &info->input[input];
-		struct incise_uncertainty_parts u;
 
 		x[input] = v->min + (v->max - v->min) * k / BAND_POINTS;
 		incise_uncertainty_parts(uncertainty, model, x, &u);
@@ -196,11 +196,16 @@ static void write_band(const struct incise_model *model,
 			INCISE_INTERVAL95 * u.mean);
 	}
 	plot_data_end(data, folder);
+	return !isnan(u.mean);
 }
 
-/* Over one of the inputs; the others are at the middle of their support. */
+static const char mean_band[] =
+	"'' using 1:($2-$4):($2+$4) with filledcurves lc rgb blue fs transparent solid 0.4 "
+	"noborder title 'the mean of all cuts', \\\n  ";
+
+/* Over one of the inputs; the others are at the middle of their support. @mean: it has a band. */
 static void put_band(struct model_grid *grid, const struct model_surface *surface,
-		     int input, int columns)
+		     int input, int columns, bool mean)
 {
 	place_model_plot(grid, input, columns, BAND_HEIGHT);
 	fputs("set key inside top left\nset xrange [*:*]\nset yrange [*:*]\n"
@@ -212,10 +217,8 @@ static void put_band(struct model_grid *grid, const struct model_surface *surfac
 	fprintf(grid->script,
 		"\nplot '%s' using 1:($2-$3):($2+$3) with filledcurves lc rgb blue fs "
 		"transparent solid 0.2 noborder title 'a new cut on a new rig', \\\n  "
-		"'' using 1:($2-$4):($2+$4) with filledcurves lc rgb blue fs transparent "
-		"solid 0.4 noborder title 'the mean of all cuts', \\\n  "
-		"'' using 1:2 with lines lc rgb ink title 'output'\n",
-		grid->bands[input]);
+		"%s'' using 1:2 with lines lc rgb ink title 'output'\n",
+		grid->bands[input], mean ? mean_band : "");
 }
 
 /* --- the figure -------------------------------------------------------------------------- */
@@ -249,6 +252,7 @@ static FILE *draw_model(const struct figure *figure, const struct model_surface 
 	int n = model ? surface->n_inputs : 0, columns = n > 1 ? 2 : 1;
 	int rows = (n + columns - 1) / columns;
 	int bands = uncertainty ? columns : 0;
+	bool mean = false;
 	struct residuals residuals = {0};
 	struct model_grid grid = {
 		.height = rows * FUNCTIONS_HEIGHT + SURFACE_HEIGHT +
@@ -271,7 +275,7 @@ static FILE *draw_model(const struct figure *figure, const struct model_surface 
 		model_plot_write_functions(model, figure->folder, grid.functions);
 	model_plot_write_surface(surface, figure->folder, grid.surface);
 	for (int i = 0; i < bands; i++)
-		write_band(model, uncertainty, i, figure->folder, grid.bands[i]);
+		mean = write_band(model, uncertainty, i, figure->folder, grid.bands[i]);
 	grid.script = plot_begin(figure->folder, figure->name, FIGURE_WIDTH, grid.height);
 	fputs("set multiplot\nset key outside right center\n", grid.script);
 	for (int i = 0; i < n; i++) {
@@ -282,7 +286,7 @@ static FILE *draw_model(const struct figure *figure, const struct model_surface 
 		grid.top += FUNCTIONS_HEIGHT;
 	put_surface(&grid, surface);
 	for (int i = 0; i < bands; i++)
-		put_band(&grid, surface, i, bands);
+		put_band(&grid, surface, i, bands, mean);
 	if (figure->data)
 		put_residuals(&grid, surface, &residuals);
 	fputs("unset multiplot\n", grid.script);

@@ -146,10 +146,10 @@ struct incise_trained {
 	double noise; /**< of @ref uncertainty */
 	double coverage; /**< share of the held-out sample in the 95 % interval; NaN without */
 	double thirds[3]; /**< the same of the thirds of its pairs by the first input */
-	double least;	  /**< the same of the group of which the fewest are */
+	double least; /**< the same of the group of which the fewest are; NAN without groups */
 	/**
 	 * Lowest and highest 5 % of the first input in the sample held out, else in the sample: where
-	 * they end, and the mean error of the model there, as a share of the mean output there.
+	 * they end, and the mean error of the model there, as a share of the mean output there, if it is not 0.
 	 */
 	double end[2], end_bias[2];
 	struct incise_propagation_report propagated; /**< with weights */

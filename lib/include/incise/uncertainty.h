@@ -79,14 +79,14 @@ struct incise_uncertainty_shape {
 	double offset;
 	double slope[INCISE_MODEL_INPUTS_MAX];
 	double low[INCISE_MODEL_INPUTS_MAX], high[INCISE_MODEL_INPUTS_MAX];
-	/** Variance of the mean tissue that few cuts leave, as a part of that of the noise, ≥ 0. */
+	/** Variance of the mean tissue that few cuts leave, as a part of that of the noise, ≥ 0; NaN: not known. */
 	double shared;
 };
 
 /**
- * Set that; a new uncertainty has none.
+ * Set that; a new uncertainty has none, and its shared is not known.
  *
- * @return 0; -EINVAL (a number is not finite, shared below 0, a slope with high not above low): then
+ * @return 0; -EINVAL (a number but shared is not finite, shared is infinite or below 0, a slope with high not above low): then
  *         nothing is changed
  */
 INCISE_API int incise_uncertainty_set_shape(struct incise_uncertainty *uncertainty,
@@ -114,7 +114,7 @@ struct incise_uncertainty_parts {
 	double model; /**< of a fit to limited data; it grows where they are sparse */
 	double calibration; /**< of the rigs that the model was trained on; 0: not stated */
 	double rig; /**< of another rig as well calibrated, that measures; 0: not stated */
-	double mean; /**< of the mean of all cuts, not of a new one: no part of the total */
+	double mean; /**< of the mean of all cuts, not of a new one: no part of the total; NaN: not known */
 };
 
 /**

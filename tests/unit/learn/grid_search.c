@@ -97,12 +97,11 @@ TEST(test_a_glitch)
 	struct incise_train_options options;
 	int n_mfs[2] = {5, 4};
 	double centre[2], max[2];
+	struct incise_model *model;
 
 	choose(4, 0.1, 400, (int[2]){0}, 0);
 	incise_train_options_init(&options);
 	for (int glitch = 0; glitch < 2; glitch++) {
-		struct incise_model *model;
-
 		if (glitch)
 			rows[3 * 7] = 60;
 		model = incise_train_start(&pairs, names, INCISE_MF_GAUSS, n_mfs,
@@ -115,6 +114,7 @@ TEST(test_a_glitch)
 	assert_true(fabs(centre[1] - centre[0]) < 0.05 && max[0] <= 1 && max[1] <= 1);
 	/* The even grid of classic has all pairs in its range. */
 	options.classic = true;
-	incise_model_free(incise_train_start(&pairs, names, INCISE_MF_GAUSS, n_mfs,
-					     &options, &err));
+	model = incise_train_start(&pairs, names, INCISE_MF_GAUSS, n_mfs, &options, &err);
+	assert_true(incise_model_info(model)->input[0].max == 60);
+	incise_model_free(model);
 }

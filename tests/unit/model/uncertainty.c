@@ -120,7 +120,7 @@ TEST(test_noise_by_the_inputs, begin, end)
 	bad.high[1] = 0;
 	assert_int_equal(incise_uncertainty_set_shape(u, &bad, NULL), -EINVAL);
 	bad = shape;
-	bad.shared = NAN;
+	bad.shared = -0.1;
 	assert_int_equal(incise_uncertainty_set_shape(u, &bad, NULL), -EINVAL);
 }
 
@@ -162,8 +162,15 @@ TEST(test_round_trip)
 {
 	struct incise_model *model = paper_model(INCISE_MF_GBELL, 1, 1e-9);
 	struct incise_uncertainty *a = make(model), *b;
+	struct incise_uncertainty_parts parts;
 	uint64_t seed = 8;
 
+	assert_int_equal(incise_uncertainty_save(a, path, &err), 0);
+	b = incise_uncertainty_load(path, model, &err);
+	assert_non_null(b);
+	incise_uncertainty_parts(b, model, (double[]){3, 20}, &parts);
+	assert_true(isnan(parts.mean) && isfinite(parts.total));
+	incise_uncertainty_free(b);
 	assert_int_equal(incise_uncertainty_set_shape(a, &shape, NULL), 0);
 	assert_int_equal(incise_uncertainty_save(a, path, &err), 0);
 	b = incise_uncertainty_load(path, model, &err);
@@ -270,7 +277,9 @@ TEST(test_damage_is_refused, begin, end)
 		{"noise 0.25", "noise nan"},
 		{"noise 0.25", "noise 0.25 1"},
 		{"noise 0.25", "noise 1e999"},
-		{"shared 0", "shared -1"},
+		{"shared -1", "shared -2"},
+		{"shared -1", "shared nan"},
+		{"shared -1", "shared 1 2"},
 		{"offset 0", "offset inf"},
 		{"slope 0 0 0", "slope 0 0"},
 		{"slope 0 0 0", "slope 0 0 0 0"},
