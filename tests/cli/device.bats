@@ -234,7 +234,7 @@ signal.pause()" >device.out 3>&- &
 	kill $device
 	wait $device || :
 	wait $using && false
-	grep -q "/dev/shm/incise-$id: its owner has died; start it again" notes
+	grep -q "/dev/shm/incise-$id: nobody holds its lock of byte 0: its owner has died, .*; start it again" notes
 	rm "/dev/shm/incise-$id"
 }
 
