@@ -292,7 +292,7 @@ static void add_haptic(struct doctor *doctor, struct incise_rig *rig)
 		return;
 	}
 	protocol_measure(protocol, &handle, doctor->asked);
-	if (doctor->asked && handle.info.peak_N > 0)
+	if (doctor->asked)
 		protocol->limit_N_mm =
 			protocol_limit(rig, handle.info.peak_N, &doctor->err);
 	doctor->haptic_measured = true;

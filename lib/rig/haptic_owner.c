@@ -25,7 +25,6 @@ struct incise_haptic_owner {
 	struct incise_haptic_page_owner half;
 	struct haptic_gate gate;
 	uint32_t flags; /* of the last sample */
-	bool cut;	/* the force that the user asks for is taken away */
 	int64_t period_ns, next_ns;
 	int64_t look_ns, used_ns; /* next look for a user; when there was one last */
 	double wait_s;		  /* for a user */
@@ -113,16 +112,16 @@ static const char *find_end(struct incise_haptic_owner *owner, int64_t now_ns)
 		       : NULL;
 }
 
-/* A user that has not begun, or asks for none, loses no force. */
-static void count_cut(struct incise_haptic_owner *owner, const char *off)
+/* @before: the share at the last tick. A user that asks for no force loses none. */
+static void count_cut(struct incise_haptic_owner *owner, double before, const char *off)
 {
-	bool cut = *off && strcmp(off, "none") && strcmp(off, "off");
+	const struct incise_haptic_page_user *last = &owner->gate.last;
 
-	if (cut && !owner->cut) {
-		owner->half.cuts++;
-		snprintf(owner->half.cut, sizeof(owner->half.cut), "%s", off);
-	}
-	owner->cut = cut;
+	if (!*off || !(before > 0) || owner->gate.share > 0 ||
+	    last->wants != INCISE_HAPTIC_PAGE_FORCE || !(v3_length(last->force_N) > 0))
+		return;
+	owner->half.cuts++;
+	snprintf(owner->half.cut, sizeof(owner->half.cut), "%s", off);
 }
 
 static int give_force(struct incise_haptic_owner *owner,
@@ -130,13 +129,14 @@ static int give_force(struct incise_haptic_owner *owner,
 {
 	struct incise_haptic_page_user half;
 	bool whole = haptic_page_read(&owner->page.map->user, &half, sizeof(half));
+	double before = owner->gate.share;
 	const char *off;
 
 	tick->t_ns = incise_clock_now(owner->clock);
 	off = incise_haptic_gate(&owner->gate, whole ? &half : NULL, tick->t_ns,
 				 tick->force_N, tick->torque_N_mm);
 	tick->off = off ? off : "";
-	count_cut(owner, tick->off);
+	count_cut(owner, before, tick->off);
 	tick->period_ns = owner->gate.last.period_ns;
 	tick->age_ns = tick->period_ns ? tick->t_ns - owner->gate.last.heartbeat_ns : -1;
 	if (owner->gate.last.wants == INCISE_HAPTIC_PAGE_END)

@@ -4,7 +4,6 @@
  */
 #include <errno.h>
 #include <fcntl.h>
-#include <signal.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/mman.h>
@@ -113,14 +112,12 @@ static int report_page(const struct haptic_page *page, int rc, const char *busy,
 		       const char *where, struct incise_error *err)
 {
 	return incise_error_set(
-		err, rc == -ENOLCK || rc == -EOWNERDEAD ? ENOENT : -rc, "%s: %s: %s",
-		where, page->path,
-		rc == -EBUSY	    ? busy
-		: rc == -ENOENT	    ? "no process serves this device; start it"
-		: rc == -EOWNERDEAD ? "its owner has died; start it again"
-		: rc == -ENOLCK
-			? "a process serves it without a lock of byte 0; let that process "
-			  "hold one, by F_OFD_SETLK"
+		err, rc == -EOWNERDEAD ? ENOENT : -rc, "%s: %s: %s", where, page->path,
+		rc == -EBUSY	? busy
+		: rc == -ENOENT ? "no process serves this device; start it"
+		: rc == -EOWNERDEAD
+			? "nobody holds its lock of byte 0: its owner has died, or holds "
+			  "none (F_OFD_SETLK); start it again"
 		: rc == -EACCES ? "another user's; run as that user"
 		: rc == -EPROTO ? "not a page of version 1 of incise/haptic_page.h; "
 				  "build the device's process for it"
@@ -177,7 +174,7 @@ int incise_haptic_page_new(struct haptic_page *page, const char *device,
 
 /* --- the user's ------------------------------------------------------------------------- */
 
-/* 0; -EAGAIN: its owner has not finished it; -ENOLCK: no lock, but its process lives; -EOWNERDEAD. */
+/* 0; -EAGAIN: its owner has not finished it; -EOWNERDEAD: nobody holds its lock; -EPROTO. */
 static int look_at_head(const struct haptic_page *page)
 {
 	struct incise_haptic_page own;
@@ -190,10 +187,7 @@ static int look_at_head(const struct haptic_page *page)
 
 	incise_haptic_page_publish(&own, 0);
 	if (!incise_haptic_page_held(page, INCISE_HAPTIC_PAGE_OWNER_BYTE))
-		return whole && (pid_t)head.pid > 0 &&
-				       (!kill((pid_t)head.pid, 0) || errno == EPERM)
-			       ? -ENOLCK
-			       : -EOWNERDEAD;
+		return -EOWNERDEAD;
 	if (!whole)
 		return -EAGAIN;
 	if (memcmp(head.magic, own.head.magic, sizeof(own.head.magic)) ||

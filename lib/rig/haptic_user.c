@@ -67,7 +67,7 @@ static INCISE_REALTIME const char *judge_owner(
 		return "its owner's heartbeat is of another time; use CLOCK_MONOTONIC of this "
 		       "machine";
 	if ((int32_t)(owner->seq - before->seq) < 0 || owner->samples < before->samples ||
-	    owner->lost < before->lost)
+	    owner->lost < before->lost || owner->cuts < before->cuts)
 		return "its owner's counts went back; start the owner again";
 	return NULL;
 }

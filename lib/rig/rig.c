@@ -241,9 +241,10 @@ static struct incise_rig *rig_new(const struct incise_rig_plan *plan, const char
 		if (!rig->sim)
 			goto close;
 	}
-	rc = rig_devices(rig, plan, err);
-	if (!rc && plan->haptic_device)
-		rc = rig_haptic(rig, plan, err);
+	/* First: a program that waits for its owner opens nothing else. */
+	rc = plan->haptic_device ? rig_haptic(rig, plan, err) : 0;
+	if (!rc)
+		rc = rig_devices(rig, plan, err);
 	if (!rc)
 		return rig;
 	errno = -rc;

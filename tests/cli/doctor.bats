@@ -205,6 +205,27 @@ group() {
 }
 
 # bats test_tags=check
+@test "doctor gives a force after an Enter behind its request only" {
+	export INCISE_MODULE_PATH=$INCISE_BUILD/tests/haptic
+	python3 - "spring:doctor-$$" >out <<-'END'
+		import os, pty, subprocess, sys
+		ours, theirs = pty.openpty()
+		doctor = subprocess.Popen(["incise", "doctor", "--rig", sys.argv[1], "--protocol"],
+		                          stdin=theirs, stderr=subprocess.PIPE, text=True)
+		os.close(theirs)
+		for line in doctor.stderr:
+		    if "lay the handle down" in line:
+		        os.write(ours, b"\n" * 9)  # eight too many
+		    elif "lean steadily" in line:
+		        print("asked", flush=True)
+		        os.write(ours, b"\4")  # its end
+		doctor.wait()
+	END
+	[ "$(grep -c asked out)" = 1 ]
+	grep -q "problem .* walls .* the input ended; press Enter at each request" out || complain "$(cat out)"
+}
+
+# bats test_tags=check
 @test "the report hides whole words of the host's name in free text only" {
 	unshare -ru sh -c 'echo noise.lab >/proc/sys/kernel/hostname' 2>/dev/null || skip "no user namespaces"
 	cat >rig.conf <<-'END'

@@ -82,7 +82,7 @@ setup() {
 		[ -x "$INCISE_BUILD/bin/incise-$verb" ] || continue
 		[ ! -x "$INCISE_BUILD/bin/incise-$verb-$word" ] || verb=$verb-$word
 		"incise-$verb" --help >help
-		for option in $(grep -oE -- '--[a-z][a-z-]*' <<<"$line"); do
+		for option in $(grep -oE -- '--[a-z][a-z0-9-]*' <<<"$line"); do
 			grep -qE -- "$option([ =,]|$)" help || complain "incise-$verb has no $option: $line"
 		done
 	done <lines

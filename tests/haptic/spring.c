@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * haptic = "spring:[no|dies=N|flag=N]": a module for tests. A handle on a spring of 1 N/mm, which is where
- * the force puts it. "no" cannot be opened; "dies" fails after N reads; "flag" is not ready from read N on.
+ * haptic = "spring:[no|dies=N|flag=N|leans=FILE]": a module for tests. A handle on a spring of 1 N/mm, which
+ * is where the force puts it. "no" cannot be opened; "dies" fails after N reads; "flag" is not ready from
+ * read N on; "leans" is 40 mm lower while there is that file.
  */
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 #include <incise/backend.h>
 
 struct spring {
@@ -15,6 +17,7 @@ struct spring {
 	double force_N[3];
 	uint64_t reads;
 	uint64_t dies, flag; /* 0: never */
+	char leans[100];
 };
 
 static int read_spring(struct incise_haptic *haptic, struct incise_haptic_sample *samples,
@@ -34,6 +37,8 @@ static int read_spring(struct incise_haptic *haptic, struct incise_haptic_sample
 	if (spring->flag && spring->reads > spring->flag)
 		samples[0].flags = INCISE_HAPTIC_NOT_READY;
 	memcpy(samples[0].position_mm, spring->force_N, sizeof(spring->force_N));
+	if (*spring->leans && !access(spring->leans, F_OK))
+		samples[0].position_mm[2] -= 40;
 	return 1;
 }
 
@@ -111,6 +116,7 @@ static void *open_spring(const struct incise_backend_request *request,
 	spring->clock = request->clock;
 	sscanf(request->arguments, "dies=%lu", &spring->dies);
 	sscanf(request->arguments, "flag=%lu", &spring->flag);
+	sscanf(request->arguments, "leans=%99s", spring->leans);
 	return spring;
 }
 

@@ -30,7 +30,8 @@
 #define OPTIONS_MAX 40
 #define KEYS_MAX 16
 #define OWNER_S 30 /* in which the owner of a haptic device gets ready */
-#define LONG 256   /* first of the numbers of long options */
+#define OWNER_LOOK_NS 200000000
+#define LONG 256 /* first of the numbers of long options */
 
 static const struct cli_command *current;
 static bool status_line, verbose;
@@ -814,18 +815,20 @@ const char *cli_rig(const char *given)
 
 struct incise_rig *cli_open_rig(const char *given, unsigned int devices)
 {
-	const struct timespec pause = {.tv_nsec = 10000000};
+	const struct timespec pause = {.tv_nsec = OWNER_LOOK_NS};
+	int64_t end_ns = cli_now_ns() + OWNER_S * INCISE_NS_PER_S;
 	const char *spec = cli_rig(given);
 	struct incise_error err = {0};
 	struct incise_rig *rig = incise_rig_open(spec, devices, &err);
-	int looks = OWNER_S * 100;
 
 	if (!rig && err.code == EAGAIN)
 		cli_warn("%s; waiting for it, at most %d s", err.text, OWNER_S);
-	while (!rig && err.code == EAGAIN && looks-- && !cli_stop) {
+	while (!rig && err.code == EAGAIN && !cli_stop && cli_now_ns() < end_ns) {
 		nanosleep(&pause, NULL);
 		rig = incise_rig_open(spec, devices, &err);
 	}
+	if (!rig && err.code == EAGAIN && !cli_stop)
+		cli_fail("%s; it was not ready after %d s", err.text, OWNER_S);
 	return cli_require(rig, &err);
 }
 

@@ -42,7 +42,8 @@ double protocol_limit(struct incise_rig *rig, double peak_N, struct incise_error
 
 /*
  * Measure walls and weight, by runs of incise haptic: the device is free. Asks for each on a terminal, but for a
- * simulated device. 0; -ECHILD: a run failed; -EDOM: nothing leant on the wall.
+ * simulated device. 0; -ECHILD: a run failed; -EDOM: nothing leant on the wall; -ECANCELED: the input
+ * ended.
  */
 int protocol_force(struct protocol *protocol, struct incise_error *err);
 

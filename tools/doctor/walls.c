@@ -10,6 +10,8 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <termios.h>
+#include <unistd.h>
 #include <incise/plan.h>
 #include "../cli/child.h"
 #include "../cli/cli.h"
@@ -53,6 +55,12 @@ double protocol_limit(struct incise_rig *rig, double peak_N, struct incise_error
 	const char *advice;
 	double gain = GAIN_MOST;
 
+	if (!(peak_N > 0)) {
+		incise_error_set(
+			err, ENODATA,
+			"its largest force is not known; set haptic_setup.peak_N");
+		return 0;
+	}
 	write_wall(&file, GAIN_MOST * REACTION_N_MM, peak_N);
 	scene = incise_scene_load(file.path, NULL, err);
 	plan = scene ? incise_plan_new(scene, rig, err) : NULL;
@@ -144,19 +152,24 @@ static int run_wall(const struct protocol *protocol, double N_mm, const char *ha
 	return rc;
 }
 
-/* A simulated device's hand needs no request. */
-static void ask(const struct protocol *protocol, const char *what, double N_mm)
+/* A simulated device's hand needs no request. A key from before the request is no consent to it. */
+static int ask_for_hand(const struct protocol *protocol, const char *what, double N_mm,
+			struct incise_error *err)
 {
 	int c = 0;
 
 	if (protocol->simulated)
-		return;
+		return 0;
+	tcflush(STDIN_FILENO, TCIFLUSH);
 	fprintf(stderr,
 		"%s on the surface of %.3g N/mm below the handle, from %g s on until the "
 		"%s are over; press Enter to begin\n",
 		what, N_mm, FROM_S, RUN);
 	while (c != '\n' && c != EOF)
 		c = getchar();
+	return c == EOF ? incise_error_set(err, ECANCELED,
+					   "the input ended; press Enter at each request")
+			: 0;
 }
 
 int protocol_force(struct protocol *protocol, struct incise_error *err)
@@ -167,14 +180,16 @@ int protocol_force(struct protocol *protocol, struct incise_error *err)
 	for (int i = 0; i < PROTOCOL_WALLS; i++) {
 		double N_mm = shares[i] * protocol->limit_N_mm;
 
-		ask(protocol, "keep the device's switch at hand, and lean steadily",
-		    N_mm);
-		if (run_wall(protocol, N_mm, LEANS, &log, err))
+		if (ask_for_hand(protocol,
+				 "keep the device's switch at hand, and lean steadily",
+				 N_mm, err) ||
+		    run_wall(protocol, N_mm, LEANS, &log, err))
 			return -err->code;
 		protocol->value[SWINGS + i] = log.turns / 2.0 / (UNTIL_S - FROM_S);
 	}
-	ask(protocol, "hang 100 g on the handle, and let it rest", weight_N_mm);
-	if (run_wall(protocol, weight_N_mm, HANGS, &log, err))
+	if (ask_for_hand(protocol, "hang 100 g on the handle, and let it rest",
+			 weight_N_mm, err) ||
+	    run_wall(protocol, weight_N_mm, HANGS, &log, err))
 		return -err->code;
 	protocol->value[WEIGHT] = 100 * fabs(log.sum_N / log.ticks / WEIGHT_N - 1);
 	return 0;

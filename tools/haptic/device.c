@@ -133,10 +133,12 @@ void haptic_device_line(const struct haptic *haptic)
 	incise_haptic_info(incise_rig_haptic(haptic->rig), &info);
 	incise_rig_haptic_ages(haptic->rig, &ages);
 	printf("device     %s: poses %.2f ms old in the mean, jitter %.2f, at most %.2f "
-	       "(assumed %.2f); %llu lost; %llu gaps of the loop; force cut %s by its "
-	       "owner%s%s\n",
+	       "(assumed %.2f); %llu lost; %llu gaps of the loop",
 	       info.name, ages.mean_ms, ages.jitter_ms, ages.most_ms, ages.assumed_ms,
-	       (unsigned long long)ages.lost, (unsigned long long)haptic->stats->overruns,
-	       cli_count(ages.cuts, "time"), *ages.last_cut ? ", last: " : "",
-	       ages.last_cut);
+	       (unsigned long long)ages.lost,
+	       (unsigned long long)haptic->stats->overruns);
+	if (ages.cuts)
+		printf("; force cut %s by its owner, last: %s",
+		       cli_count(ages.cuts, "time"), ages.last_cut);
+	putchar('\n');
 }

@@ -11,10 +11,10 @@
  *     push()          force                          force
  *
  * A state is as young as its message, or younger. No message follows one that has no answer yet: the
- * service holds its force so long. Behind a late answer
+ * device keeps its force so long, or goes idle. Only the message behind a late answer is scaled:
  *
  *     late by periods     0 ─────── 2 ─────── 3 ───────▶ deadman
- *     force               all of it   fades to 0      0   not ready
+ *     force of the next   all of it   fades to 0      0   not ready
  *
  * beyond the latency, and it returns by the ramp of each owner.
  *

@@ -11,7 +11,6 @@
  * motor that does not answer end all torques for good.
  */
 #include <errno.h>
-#include <net/if.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -20,7 +19,6 @@
 #include "../../rig/axes.h"
 #include "../../rig/backends.h"
 #include "../../rig/haptic_backend.h"
-#include "../can/bus/socketcan_netlink.h"
 #include "moteus.h"
 
 #define MOTORS INCISE_HAPTIC_MOTORS_MAX
@@ -568,34 +566,19 @@ int moteus_scan_on(const struct can_transport *transport, const char *interface,
 	return rc;
 }
 
-/* By netlink first: a socket of CAN would load modules of the kernel. */
-static bool is_can(const char *interface)
-{
-	struct can_netlink link;
-
-	return !can_netlink_query(interface, &link) && link.is_can && link.is_up;
-}
-
-/* Without arguments each interface that takes CAN FD, and that no other program has. */
+/* Only on a named bus: others may use one, and the search transmits. */
 static int scan_moteus(const char *arguments, incise_scan_found *found, void *context,
 		       struct incise_error *err)
 {
-	struct if_nameindex *all = *arguments ? NULL : if_nameindex();
 	char interface[INTERFACE];
-	int rc = 0;
 
 	snprintf(interface, sizeof(interface), "%.*s", (int)strcspn(arguments, ":"),
 		 arguments);
-	if (*arguments)
-		return moteus_scan_on(&can_transport_socketcan, interface, found, context,
-				      err);
-	for (int i = 0; all && all[i].if_index && rc <= 0; i++)
-		if (is_can(all[i].if_name))
-			rc = moteus_scan_on(&can_transport_socketcan, all[i].if_name,
-					    found, context, NULL);
-	if (all)
-		if_freenameindex(all);
-	return rc > 0 ? rc : 0;
+	return *interface ? moteus_scan_on(&can_transport_socketcan, interface, found,
+					   context, err)
+			  : incise_error_set(err, EINVAL,
+					     "moteus: expected an interface, for example "
+					     "moteus:can0; correct it");
 }
 
 INCISE_BACKEND(incise_haptic_moteus, "haptic", "moteus", .open = open_moteus,

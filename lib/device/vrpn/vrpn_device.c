@@ -316,6 +316,8 @@ static void take_pose(struct vrpn_device *device, const uint8_t *payload, int64_
 	pose.sound = place_pose(&pose.sample, payload);
 	if (pose.sound) {
 		device->sound_ns = device->arrival_ns;
+		if (device->broken_ns && !device->force_error)
+			*device->haptic.cause = '\0';
 		device->broken_ns = 0;
 		for (int i = 0; i < 3; i++)
 			device->origin_m[i] = pose.sample.position_mm[i] / 1000;
