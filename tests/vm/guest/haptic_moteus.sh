@@ -84,7 +84,7 @@ check "no motor" has "no answer of motor 1"
 
 drive_start --can vcan0 --ids 1,2
 check "the drives are there" [ "$drive" = moteus:vcan0:1,2 ] || exit 0
-out=$("$INCISE_BUILD/bin/incise" info devices moteus:vcan0 2>&1 7>&-)
+out=$("$INCISE_BUILD/bin/incise" info moteus:vcan0 2>&1 7>&-)
 check "a search finds both" has "moteus:vcan0:2"
 device vcan0:1,2 300 0.5
 check "each cycle has a sample" is samples ">= 298"
