@@ -548,6 +548,8 @@ TEST(a_connection_that_breaks_is_made_again_without_force)
 	for (seq = sample.seq; sample.seq < seq + 10; sample = read_sample(haptic))
 		assert_int_equal(sample.flags, 0);
 	assert_int_equal(seq, 2);
+	/* The cause ends with its fault. */
+	assert_string_equal(haptic->cause, "");
 	incise_haptic_push(haptic, some_N, NULL);
 	incise_haptic_push(haptic, none_N, NULL);
 	incise_haptic_push(haptic, some_N, NULL);
