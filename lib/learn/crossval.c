@@ -192,7 +192,7 @@ static int add_ratios(struct fits *fits, int f, const struct incise_ridge *ridge
 			incise_basis_error(fits->basis, x, fits->x) /
 			sqrt(1 + incise_lsq_leverage(factor, stride, fits->n, fits->phi));
 	}
-	return 0;
+	return incise_watch_count(fits->folds->watch, 0) ? -ECANCELED : 0;
 }
 
 int incise_crossval_ratios(const struct incise_basis *basis,
