@@ -300,7 +300,7 @@ TEST(test_solution)
 	struct incise_model *model = premises(), *solved;
 	struct incise_factor *factor = incise_factor_new(model, NULL);
 	struct incise_factor_ridge ridge = {1e-3, NAN};
-	struct incise_ridge same_ridge = {1e-3, 60};
+	struct incise_ridge same_ridge = {.ridge = 1e-3, .n = 60};
 	struct incise_train_report report;
 	struct incise_lsq *qr = incise_lsq_new(60, NULL);
 	struct incise_design design;

@@ -182,8 +182,11 @@ TEST(test_ridge_of_a_grid)
 		    rules = cases[i].n_mfs[0] * m, n = 2 * rules;
 		struct incise_lsq *a = incise_lsq_new(n, NULL),
 				  *b = incise_lsq_new(n, NULL);
-		struct incise_ridge ridge = {
-			0.7, n, cases[i].mean, {cases[i].n_mfs[0], cases[i].n_mfs[1]}};
+		struct incise_ridge ridge = {.ridge = 0.7,
+					     .n = n,
+					     .mean = cases[i].mean,
+					     .n_mfs = {cases[i].n_mfs[0],
+						       cases[i].n_mfs[1]}};
 		double x[12], y[12];
 
 		seed = i;
