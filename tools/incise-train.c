@@ -20,7 +20,7 @@
 struct train_options {
 	char **paths;
 	int n_paths;
-	char *typed;	  /* the command and its arguments */
+	char *typed;	  /* the arguments, or NULL */
 	const char *data; /* for messages: the path, or the number of sources */
 	const char *model, *initial, *history, *premises, *factor;
 	struct recording_rows rows;
@@ -228,19 +228,42 @@ static const char *default_model(const struct train_options *options)
 	return path;
 }
 
-/* The command as a shell reads it: free(3). */
-static char *spell_command(char **argv)
+/* Put a word as a shell reads it. */
+static void put_word(FILE *out, const char *word)
 {
-	char *text = cli_text("incise train");
+	static const char plain[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
+				    "0123456789_./:=,@%+-";
 
-	while (*++argv) {
-		bool plain = !strpbrk(*argv, " \t\n\"$`\\&|;<>()*?[#~!{}");
-		char *more = cli_text(plain ? "%s %s" : "%s '%s'", text, *argv);
-
-		free(text);
-		text = more;
+	if (*word && !word[strspn(word, plain)]) {
+		fprintf(out, " %s", word);
+		return;
 	}
-	return text;
+	fputs(" '", out);
+	for (; *word; word++)
+		fputs(*word == '\'' ? "'\\''" : (char[]){*word, '\0'}, out);
+	putc('\'', out);
+}
+
+/* The arguments as a shell reads them, to be freed with free(3). NULL: they cannot be typed again. */
+static char *spell_arguments(char **argv)
+{
+	char *text = NULL;
+	size_t size;
+	FILE *out = open_memstream(&text, &size);
+	bool again = out;
+
+	while (out && *++argv) {
+		again &= strcmp(*argv, "-") != 0;
+		for (const char *c = *argv; *c; c++)
+			again &= (unsigned char)*c >= ' ' && *c != 0x7f;
+		put_word(out, *argv);
+	}
+	if (out && fclose(out))
+		again = false;
+	if (again)
+		return text;
+	free(text);
+	return NULL;
 }
 
 static void parse_train(struct train_options *options, int argc, char **argv)
@@ -248,7 +271,7 @@ static void parse_train(struct train_options *options, int argc, char **argv)
 	char *sd;
 
 	*options = (struct train_options){
-		.typed = spell_command(argv),
+		.typed = spell_arguments(argv),
 		.inputs = {"depth_mm", "velocity_mm_s"},
 		.how.n_inputs = 2,
 		.target = "force_N",
@@ -762,12 +785,14 @@ static void print_better(const struct train_options *options,
 	for (int i = HISTORY; i < FURTHER; i++)
 		history &= trained->better != further[i];
 	printf("with %s the cross-validated error is %.4g %s, %.0f %% less%s: "
-	       "%s --inputs %s,%s,%s%s\n",
+	       "%s --inputs %s,%s,%s%s%s\n",
 	       trained->better, trained->better_rmse, unit_of_train(options->target),
 	       100 * (1 - trained->better_rmse / trained->report.crossval_rmse),
 	       history ? " (it may only reflect how the hand moved in these cuts)" : "",
-	       options->typed, options->inputs[0], options->inputs[1], trained->better,
-	       cli_overwrite() ? "" : " --overwrite");
+	       options->typed ? "incise train" : "give", options->inputs[0],
+	       options->inputs[1], trained->better,
+	       cli_overwrite() || !options->typed ? "" : " --overwrite",
+	       options->typed ? options->typed : "");
 }
 
 static void print_clamped(const struct incise_trained *trained)

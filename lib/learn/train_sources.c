@@ -908,6 +908,13 @@ int incise_train_sources(struct incise_train_source *sources, int n,
 	int rc;
 
 	*trained = (struct incise_trained){0};
+	if (options->n_further < 0 || options->n_further > INCISE_TRAIN_FURTHER_MAX ||
+	    (options->n_further && options->n_inputs != 2))
+		return incise_error_set(
+			err, EINVAL,
+			"%d further inputs beside %d: expected at most %d "
+			"beside 2",
+			options->n_further, options->n_inputs, INCISE_TRAIN_FURTHER_MAX);
 	t.reading.n_columns = t.reading.n_required + options->n_further;
 	t.sources = incise_readers_new(sources, n, options->group, &t.reading);
 	t.how = describe_options(&t);

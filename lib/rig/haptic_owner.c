@@ -118,7 +118,8 @@ static void count_cut(struct incise_haptic_owner *owner, double before, const ch
 	const struct incise_haptic_page_user *last = &owner->gate.last;
 
 	if (!*off || !(before > 0) || owner->gate.share > 0 ||
-	    last->wants != INCISE_HAPTIC_PAGE_FORCE || !(v3_length(last->force_N) > 0))
+	    last->wants != INCISE_HAPTIC_PAGE_FORCE ||
+	    !(v3_length(last->force_N) > 0 || v3_length(last->torque_N_mm) > 0))
 		return;
 	owner->half.cuts++;
 	snprintf(owner->half.cut, sizeof(owner->half.cut), "%s", off);

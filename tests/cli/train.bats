@@ -315,15 +315,17 @@ peak_kb() {
 
 # bats test_tags=check
 @test "train names a third input that is better on unseen cuts, and the command" {
+	local name="it's slow.csv"
 	awk 'BEGIN { print "cut,depth_mm,velocity_mm_s,time_in_tissue_s,force_N"
 		for (c = 0; c < 12; c++) for (i = 0; i < 25; i++) {
 			v = 5 + 2 * c; t = i * 0.4 / v
 			print "c" c "," i * 0.4 "," v + (i * 7 + c) % 5 "," t "," \
-				(0.1 * i + 0.02 * v) * exp(-2 * t) + 0.02 * ((i * 31 + c * 17) % 7) } }' >'slow cuts.csv'
-	incise train 'slow cuts.csv' -o m.fis >out 2>/dev/null
+				(0.1 * i + 0.02 * v) * exp(-2 * t) + 0.02 * ((i * 31 + c * 17) % 7) } }' >"$name"
+	incise train "$name" -o m.fis >out 2>/dev/null
 	command=$(sed -n 's/^with time_in_tissue_s the .* less (it may only reflect how the hand moved .*): //p' out)
-	[ "$command" = "incise train 'slow cuts.csv' -o m.fis --inputs depth_mm,velocity_mm_s,time_in_tissue_s --overwrite" ]
-	incise train 'slow cuts.csv' -o n.fis --json >r.json 2>/dev/null
+	[ "$command" = "incise train --inputs depth_mm,velocity_mm_s,time_in_tissue_s --overwrite 'it'\\''s slow.csv' -o m.fis" ]
+	incise train - -o p.fis <"$name" 2>/dev/null | grep -q ': give --inputs depth_mm,velocity_mm_s,time_in_tissue_s$'
+	incise train "$name" -o n.fis --json >r.json 2>/dev/null
 	[ "$(key r.json better_inputs)" = '["depth_mm","velocity_mm_s","time_in_tissue_s"]' ]
 	cmp <(parameters m.fis) <(parameters n.fis)
 	error=$(key r.json better_inputs_rms_error_N)

@@ -111,13 +111,19 @@ static void read_log(FILE *file, struct log *log)
 /* The last line that a failed program said. */
 static int report_failure(FILE *said, struct incise_error *err)
 {
-	char line[400] = "incise haptic ended without a reason";
+	char *line = NULL;
+	size_t size = 0;
+	bool any = false;
 
 	rewind(said);
-	while (fgets(line, sizeof(line), said))
-		;
-	line[strcspn(line, "\n")] = '\0';
-	return incise_error_set(err, ECHILD, "%s", line);
+	while (getline(&line, &size, said) > 0)
+		any = true;
+	if (any)
+		line[strcspn(line, "\n")] = '\0';
+	incise_error_set(err, ECHILD, "%s",
+			 any ? line : "incise haptic ended without a reason");
+	free(line);
+	return -ECHILD;
 }
 
 static int run_wall(const struct protocol *protocol, double N_mm, const char *hand,

@@ -86,6 +86,9 @@ enum incise_train_end {
 	INCISE_TRAIN_TO_CORPUS, /**< the survey */
 };
 
+/** Further inputs that a training tries, at most. */
+#define INCISE_TRAIN_FURTHER_MAX 6
+
 /** Options of a training from sources; zeroed but for @ref train are the defaults. */
 struct incise_sources_options {
 	/** Columns of the inputs, of the output, of the uncertainties, then of further inputs. */
@@ -94,8 +97,8 @@ struct incise_sources_options {
 	const struct incise_propagation_part *parts; /**< of the uncertainties */
 	int n_parts;				     /**< 0: all pairs weigh the same */
 	/**
-	 * Each is tried as a third input, one that has a number in all rows. At most 6; 0 with other than
-	 * two inputs, ranks, premises, classic or tuned.
+	 * Each is tried as a third input, one that has a number in all rows. At most
+	 * INCISE_TRAIN_FURTHER_MAX, else EINVAL; 0 with other than two inputs, ranks, premises, classic or tuned.
 	 */
 	int n_further;
 	/** recording, rig, none, or a column; NULL: cut if all sources have it, else none. */
