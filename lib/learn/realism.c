@@ -8,6 +8,7 @@
 #include <string.h>
 #include "../base/ascending.h"
 #include "../base/grow.h"
+#include "../base/random.h"
 #include "realism.h"
 
 #define WINDOW 32 /* cells; windows overlap by half */
@@ -271,4 +272,130 @@ double incise_look_drops(const struct incise_look *a, const struct incise_look *
 					     (double)j / (double)b->n_events));
 	}
 	return largest;
+}
+
+/* --- realism --- */
+
+#define DRAWS 8	   /* seeds of each way to render */
+#define WHITE 1024 /* numbers of white noise behind a knot of the coloured one */
+
+/* τ of a cut; see lib/fixed/texture.h. */
+static double tau_at(const struct incise_fixed_texture *texture, int cut, double way)
+{
+	double knot = texture->start[cut % INCISE_TEXTURE_CUTS] +
+		      way * 65536 / (double)(1 << texture->step_shift);
+	size_t at = (size_t)fmin(fmax(knot, 0), 1e15);
+	double a = texture->knot[at % INCISE_TEXTURE_KNOTS],
+	       b = texture->knot[(at + 1) % INCISE_TEXTURE_KNOTS];
+
+	return (a + (b - a) * (knot - floor(knot))) / INCISE_TEXTURE_ONE;
+}
+
+/* Replace knots by normal noise of the same spectrum: white noise, each number drawing all of them. */
+static void make_noise(struct incise_fixed_texture *texture, uint64_t key)
+{
+	static const int n = INCISE_TEXTURE_KNOTS;
+	int16_t old[INCISE_TEXTURE_KNOTS];
+	double white[WHITE];
+
+	memcpy(old, texture->knot, sizeof(old));
+	for (int i = 0; i < WHITE; i++)
+		white[i] = incise_random_normal(key, (uint64_t)i) / sqrt(WHITE);
+	for (int i = 0; i < n; i++) {
+		double sum = 0;
+
+		for (int k = 0; k < WHITE; k++)
+			sum += white[k] * old[(i + k) % n];
+		texture->knot[i] = (int16_t)lrint(
+			fmax(-INCISE_TEXTURE_MOST, fmin(sum, INCISE_TEXTURE_MOST)));
+	}
+}
+
+/* The force of each cut as its sensor would have measured it; returns the sum over the sum of the model's. */
+static double render_cuts(const struct incise_fixed_texture *texture,
+			  const struct incise_texture_cut *cuts, int n, double noise,
+			  uint64_t key, double *const *force)
+{
+	double sum = 0, model = 0;
+	uint64_t at = 0;
+
+	for (int i = 0; i < n; i++)
+		for (size_t k = 0; k < cuts[i].n; k++) {
+			double f = fmax(cuts[i].model[k], 0);
+
+			model += f;
+			f *= 1 + tau_at(texture, i, cuts[i].way[k] - cuts[i].way[0]);
+			sum += f;
+			force[i][k] = f + noise * incise_random_normal(key, at++);
+		}
+	return model > 0 ? sum / model : 1;
+}
+
+/* Add one draw of one kind to its row. */
+static int add_draw(const struct incise_texture *texture, enum incise_realism_kind kind,
+		    uint64_t seed, const struct incise_texture_cut *cuts, int n,
+		    const struct incise_look *recorded, double *const *force,
+		    struct incise_realism_row *row)
+{
+	struct incise_look look = {.step = recorded->step, .noise = recorded->noise};
+	struct incise_fixed_texture knots;
+	double mean;
+	int rc;
+
+	incise_texture_fill(kind == INCISE_REALISM_NONE ? NULL : texture, 0, seed,
+			    &knots);
+	if (kind == INCISE_REALISM_NOISE)
+		make_noise(&knots, incise_random_mix(seed + 1));
+	mean = render_cuts(&knots, cuts, n, look.noise, incise_random_mix(~seed), force);
+	rc = incise_look_at(&look, cuts, n, force);
+	if (!rc) {
+		row->rate += look.rate / recorded->rate / DRAWS;
+		row->drops += incise_look_drops(&look, recorded) / DRAWS;
+		row->spectrum_dB += incise_look_distance(&look, recorded) / DRAWS;
+		row->rms += look.rms / recorded->rms / DRAWS;
+		row->skewness += look.skewness / DRAWS;
+		row->mean_force += (mean - 1) / DRAWS;
+	}
+	free(look.drop);
+	return rc;
+}
+
+/* The interval of Poisson of so many events, relative to them; Breslow and Day (1987), after Byar. */
+static void find_rates(struct incise_realism *realism)
+{
+	double n = realism->events, m = n + 1;
+
+	realism->rate_low = n > 0 ? pow(1 - 1 / (9 * n) - 1.96 / (3 * sqrt(n)), 3) : 0;
+	realism->rate_high =
+		n > 0 ? m / n * pow(1 - 1 / (9 * m) + 1.96 / (3 * sqrt(m)), 3) : 0;
+}
+
+int incise_realism_of(const struct incise_texture *texture,
+		      const struct incise_texture_cut *cuts, int n, uint64_t seed,
+		      struct incise_realism *realism)
+{
+	size_t rows = rows_of_cuts(cuts, n);
+	double *numbers = malloc((rows + 1) * sizeof(*numbers));
+	double **force = malloc((size_t)(n + 1) * sizeof(*force));
+	struct incise_look recorded = {0};
+	int rc = numbers && force ? incise_look_at(&recorded, cuts, n, NULL) : -ENOMEM;
+
+	*realism = (struct incise_realism){.cuts = n,
+					   .length = recorded.length,
+					   .step = recorded.step,
+					   .up_to_cycles = 0.5 / recorded.step,
+					   .noise = recorded.noise,
+					   .events = (int)recorded.n_events,
+					   .rms = recorded.rms,
+					   .skewness = recorded.skewness};
+	find_rates(realism);
+	for (size_t i = 0, at = 0; (int)i < n && !rc; at += cuts[i++].n)
+		force[i] = numbers + at;
+	for (int i = 0; i < INCISE_REALISM_KINDS * DRAWS && !rc; i++)
+		rc = add_draw(texture, i / DRAWS, seed + (uint64_t)(i % DRAWS), cuts, n,
+			      &recorded, force, &realism->kind[i / DRAWS]);
+	free(recorded.drop);
+	free(numbers);
+	free(force);
+	return rc;
 }

@@ -12,6 +12,7 @@
 #ifndef INCISE_LEARN_REALISM_H
 #define INCISE_LEARN_REALISM_H
 
+#include <incise/realism.h>
 #include "texture.h"
 
 #define INCISE_LOOK_OCTAVES 4
@@ -34,6 +35,13 @@ struct incise_look {
  */
 int incise_look_at(struct incise_look *look, const struct incise_texture_cut *cuts, int n,
 		   double *const *rendered);
+
+/*
+ * Compare cuts, rendered in each way, with what was recorded. All is 0 without cuts. 0 or -ENOMEM.
+ */
+int incise_realism_of(const struct incise_texture *texture,
+		      const struct incise_texture_cut *cuts, int n, uint64_t seed,
+		      struct incise_realism *realism);
 
 /* Mean distance of the octaves of two looks, dB. */
 double incise_look_distance(const struct incise_look *a, const struct incise_look *b);
