@@ -989,15 +989,15 @@ static void save_factor(const struct train_options *options,
 /* Learn the texture, if one is asked for. */
 static struct incise_texture *train_texture(const struct train_options *options,
 					    struct incise_train_source *sources,
-					    const struct incise_model *model)
+					    const struct incise_trained *trained)
 {
 	struct incise_texture *texture;
 	struct incise_error err = {0};
 
 	if (!options->texture)
 		return NULL;
-	texture = incise_train_texture(sources, options->n_paths, model,
-				       &options->how.train, &err);
+	texture = incise_train_texture(sources, options->n_paths, trained,
+				       &options->how.train, NULL, &err);
 	cli_progress_end();
 	return cli_require(texture, &err);
 }
@@ -1078,7 +1078,7 @@ int main(int argc, char **argv)
 	if (options.factor && trained.factor && (!job || !job->rank)) {
 		save_factor(&options, &trained);
 	} else if (trained.model) {
-		texture = train_texture(&options, sources, trained.model);
+		texture = train_texture(&options, sources, &trained);
 		save_model(&options, &trained, texture, history);
 		report_model(&options, &trained, texture);
 	}

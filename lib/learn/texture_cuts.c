@@ -11,10 +11,11 @@
 #include <stdlib.h>
 #include <string.h>
 #include <incise/corpus.h>
+#include "../base/grow.h"
 #include "../model/companion.h"
 #include "interval.h"
 #include "reader.h"
-#include "texture.h"
+#include "realism.h"
 
 /* More rows tell no more of a texture; the cut with the last of them is the last one. */
 #define ROWS_MOST 4000000
@@ -28,14 +29,21 @@
 /* Columns behind those of the model. */
 enum further { WAY, TIME, COUNT, FURTHER };
 
+struct named_cut {
+	char *name;
+	size_t start; /* of its rows; they end where those of the next one start */
+	bool held;    /* it is for checking */
+};
+
 struct cuts {
+	const struct incise_trained *trained;
+	const struct incise_corpus_source *source; /* the present one */
 	const struct incise_model *model;
 	int n_inputs, depth;	    /* number of the input */
 	double *way, *force, *mean; /* of all rows */
 	size_t n, capacity;
-	size_t *start; /* of each cut, and the end of the last one */
-	char **name;
-	int n_cuts, first; /* the latter of the present source */
+	struct named_cut *cut;
+	size_t n_cuts, first, most; /* first of the present source; capacity */
 	double deepest, t_s;
 };
 
@@ -44,24 +52,41 @@ static int no_cuts_memory(struct incise_error *err)
 	return incise_error_set(err, ENOMEM, "no memory to learn a texture");
 }
 
+/* Whether the training has held out the pairs of a cut: alone, or with all of its source. */
+static bool is_held(const struct cuts *cuts, const char *name)
+{
+	const struct incise_corpus_source *source = cuts->source;
+	uint64_t key = incise_group_key(source->own_groups ? source->hash : "", name);
+	const struct incise_corpus *corpus = cuts->trained->corpus;
+
+	for (int i = 0; i < incise_corpus_sources(corpus); i++) {
+		const struct incise_corpus_survey *survey =
+			incise_corpus_source(corpus, i);
+
+		for (int g = 0;
+		     g < survey->n_groups && !strcmp(survey->hash, source->hash); g++)
+			if (survey->groups[g].check &&
+			    (*survey->group || survey->groups[g].key == key))
+				return true;
+	}
+	return false;
+}
+
 static int begin_cut(struct cuts *cuts, const char *name, struct incise_error *err)
 {
-	size_t n = (size_t)cuts->n_cuts + 2;
-	size_t *start = realloc(cuts->start, n * sizeof(*start));
-	char **names = start ? realloc(cuts->name, n * sizeof(*names)) : NULL;
+	struct named_cut cut = {.start = cuts->n, .held = is_held(cuts, name)};
 
-	cuts->start = start ? start : cuts->start;
-	cuts->name = names ? names : cuts->name;
-	if (!names || !(names[cuts->n_cuts] = strdup(name)))
-		return no_cuts_memory(err);
-	for (int i = cuts->first; i < cuts->n_cuts; i++)
-		if (!strcmp(names[i], name))
+	for (size_t i = cuts->first; i < cuts->n_cuts; i++)
+		if (!strcmp(cuts->cut[i].name, name))
 			return incise_error_set(
 				err, EINVAL,
 				"the rows of cut %s are not together; a texture needs "
 				"them in their order, as incise export writes them",
 				name);
-	start[cuts->n_cuts++] = cuts->n;
+	if (!grow_array(&cuts->cut, cuts->n_cuts, &cuts->most, 64, sizeof(*cuts->cut)) ||
+	    !(cut.name = strdup(name)))
+		return no_cuts_memory(err);
+	cuts->cut[cuts->n_cuts++] = cut;
 	cuts->deepest = cuts->t_s = -INFINITY;
 	return 0;
 }
@@ -89,7 +114,8 @@ static int take_cut_row(void *user, const double *row, const char *group,
 {
 	struct cuts *cuts = user;
 	const double *more = row + cuts->n_inputs + 1;
-	const char *name = cuts->n_cuts > cuts->first ? cuts->name[cuts->n_cuts - 1] : "";
+	const char *name =
+		cuts->n_cuts > cuts->first ? cuts->cut[cuts->n_cuts - 1].name : "";
 	double way;
 	int rc = 0;
 
@@ -164,32 +190,53 @@ static double find_variation(const struct incise_texture_cut *cuts, int n)
 	return n > 1 ? fmin(sqrt(square * n / (n - 1)), 1) : 0;
 }
 
-/* The rows of the sources as cuts, and the texture of these. */
+/* The cuts that are held out, or the others; returns their number. */
+static int list_cuts(const struct cuts *cuts, bool held, struct incise_texture_cut *list)
+{
+	int n = 0;
+
+	for (size_t i = 0; i < cuts->n_cuts; i++) {
+		size_t at = cuts->cut[i].start;
+		size_t end = i + 1 < cuts->n_cuts ? cuts->cut[i + 1].start : cuts->n;
+
+		if (cuts->cut[i].held == held)
+			list[n++] =
+				(struct incise_texture_cut){cuts->way + at,
+							    cuts->force + at,
+							    cuts->mean + at, end - at};
+	}
+	return n;
+}
+
+/* The rows of the sources as cuts, the texture of these, and of those held out how alike it is. */
 static struct incise_texture *learn_cuts(const struct cuts *cuts, uint64_t seed,
+					 struct incise_realism *realism,
 					 struct incise_watch *watch,
 					 struct incise_error *err)
 {
-	size_t n = (size_t)cuts->n_cuts;
-	struct incise_texture_cut *list = calloc(n + 1, sizeof(*list));
+	struct incise_texture_cut *list = calloc(cuts->n_cuts + 1, sizeof(*list));
 	struct incise_texture *texture = NULL;
 	double length = 0;
+	int n;
 
 	if (!list)
 		return no_cuts_memory(err), NULL;
-	for (size_t i = 0; i < n; i++) {
-		size_t at = cuts->start[i],
-		       end = i + 1 < n ? cuts->start[i + 1] : cuts->n;
-
-		list[i] = (struct incise_texture_cut){cuts->way + at, cuts->force + at,
-						      cuts->mean + at, end - at};
-		if (end > at)
-			length += cuts->way[end - 1] - cuts->way[at];
-	}
-	texture = incise_texture_learn(list, (int)n, seed, watch, err);
+	n = list_cuts(cuts, false, list);
+	for (int i = 0; i < n; i++)
+		if (list[i].n)
+			length += list[i].way[list[i].n - 1] - list[i].way[0];
+	texture = incise_texture_learn(list, n, seed, watch, err);
 	if (texture) {
 		texture->checksum = incise_model_checksum(cuts->model);
 		texture->info.length = length;
-		texture->info.variation = find_variation(list, (int)n);
+		texture->info.variation = find_variation(list, n);
+	}
+	if (texture && realism &&
+	    incise_realism_of(texture, list, list_cuts(cuts, true, list), seed,
+			      realism)) {
+		incise_texture_free(texture);
+		texture = NULL;
+		no_cuts_memory(err);
 	}
 	free(list);
 	return texture;
@@ -205,6 +252,7 @@ static int read_cuts(struct cuts *cuts, struct incise_reader *sources, int n,
 
 		watch->step.source = i;
 		cuts->first = cuts->n_cuts;
+		cuts->source = source;
 		rc = source->read(source->user, take_cut_row, cuts, err);
 	}
 	return rc;
@@ -224,11 +272,12 @@ static const char *find_depth(struct cuts *cuts, struct incise_error *err)
 }
 
 struct incise_texture *incise_train_texture(struct incise_train_source *sources, int n,
-					    const struct incise_model *model,
+					    const struct incise_trained *trained,
 					    const struct incise_train_options *options,
+					    struct incise_realism *realism,
 					    struct incise_error *err)
 {
-	const struct incise_model_info *info = incise_model_info(model);
+	const struct incise_model_info *info = incise_model_info(trained->model);
 	struct incise_watch watch = incise_watch_of(options);
 	const char *columns[INCISE_MODEL_INPUTS_MAX + 1 + FURTHER];
 	struct incise_reading reading = {.columns = columns,
@@ -237,7 +286,8 @@ struct incise_texture *incise_train_texture(struct incise_train_source *sources,
 					 .where = "advancing",
 					 .cost = 5e3,
 					 .watch = &watch};
-	struct cuts cuts = {.model = model, .n_inputs = info->n_inputs};
+	struct cuts cuts = {
+		.trained = trained, .model = trained->model, .n_inputs = info->n_inputs};
 	const char *unit = find_depth(&cuts, err);
 	struct incise_texture *texture = NULL;
 	struct incise_reader *readers;
@@ -256,16 +306,15 @@ struct incise_texture *incise_train_texture(struct incise_train_source *sources,
 	readers = incise_readers_new(sources, n, "cut", &reading);
 	rc = readers ? read_cuts(&cuts, readers, n, &watch, err) : no_cuts_memory(err);
 	if (!rc)
-		texture = learn_cuts(&cuts, options->seed, &watch, err);
+		texture = learn_cuts(&cuts, options->seed, realism, &watch, err);
 	if (texture)
 		snprintf(texture->unit, sizeof(texture->unit), "%.15s", unit);
 	if (watch.stopped)
 		incise_error_set(err, ECANCELED, "training was stopped");
 	rc = texture ? 0 : errno;
-	for (int i = 0; i < cuts.n_cuts; i++)
-		free(cuts.name[i]);
-	free(cuts.name);
-	free(cuts.start);
+	while (cuts.n_cuts)
+		free(cuts.cut[--cuts.n_cuts].name);
+	free(cuts.cut);
 	free(cuts.way);
 	free(cuts.force);
 	free(cuts.mean);

@@ -1,0 +1,52 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * The look of cuts: metrics of the texture of a force over the way of the front, by which rendered cuts
+ * are compared with recorded ones.
+ *
+ *   force   means over cells of one step of the way
+ *   event   a fall of at least 6 sd of the sensor's noise and 2 % of the cut's largest force
+ *   octave  mean power of the force's differences, in windows of 32 cells; 0 is the highest, the one
+ *           up to half a cycle per step
+ *   rms     of the force in these windows about its line there, relative to its mean
+ */
+#ifndef INCISE_LEARN_REALISM_H
+#define INCISE_LEARN_REALISM_H
+
+#include <incise/realism.h>
+#include "texture.h"
+
+#define INCISE_LOOK_OCTAVES 4
+
+struct incise_look {
+	double step;   /* of the way; 0: that of the rows, the median by length */
+	double noise;  /* sd of the sensor's; 0: that of the rows' second differences */
+	double length; /* of the way */
+	double rate;   /* events per unit of the way */
+	double rms, skewness, octave[INCISE_LOOK_OCTAVES];
+	/* Falls of the events, relative to the force before each, ascending: free(3). */
+	double *drop;
+	size_t n_events, capacity;
+};
+
+/*
+ * Look at cuts as they were recorded, or with the forces of @rendered, one array for each cut, in place of
+ * the recorded ones; a fall is compared with the largest recorded force in any case. @look: {0}, or with
+ * step and noise of another one. 0 or -ENOMEM; the look is freed with free(look->drop) in any case.
+ */
+int incise_look_at(struct incise_look *look, const struct incise_texture_cut *cuts, int n,
+		   double *const *rendered);
+
+/*
+ * Compare cuts, rendered in each way, with what was recorded. All is 0 without cuts. 0 or -ENOMEM.
+ */
+int incise_realism_of(const struct incise_texture *texture,
+		      const struct incise_texture_cut *cuts, int n, uint64_t seed,
+		      struct incise_realism *realism);
+
+/* Mean distance of the octaves of two looks, dB. */
+double incise_look_distance(const struct incise_look *a, const struct incise_look *b);
+
+/* Largest distance of the distributions of their drops (Kolmogorov and Smirnov); 1 without events. */
+double incise_look_drops(const struct incise_look *a, const struct incise_look *b);
+
+#endif
