@@ -15,6 +15,7 @@
 #include "cli/file.h"
 #include "cli/json.h"
 #include "cli/recording.h"
+#include "cli/texture_report.h"
 #include "train/sources.h"
 
 struct train_options {
@@ -31,7 +32,7 @@ struct train_options {
 	char *inputs[INCISE_MODEL_INPUTS_MAX];
 	const char *target;
 	int n_mfs;
-	bool auto_mfs, json, mpi, wanted; /* the latter of the inputs */
+	bool auto_mfs, json, mpi, texture, wanted; /* the latter of the inputs */
 	enum uncertainties_wanted uncertainty;
 	struct incise_sources_options how;
 };
@@ -189,6 +190,10 @@ static const struct cli_option option_table[] = {
 	 "use share I of N of the sources, from 1, for the tasks of a job array, "
 	 "with -o FILE.fac; or share the sources among the processes of mpirun",
 	 CLI_PARSED_BY(parse_share)},
+	{0, "texture", NULL,
+	 "also learn the saw-tooth of cutting and the variation from cut to cut, "
+	 "into MODEL.fis.tex",
+	 CLI_FLAG(struct train_options, texture)},
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct train_options, json)},
 	{0},
 };
@@ -268,8 +273,6 @@ static char *spell_arguments(char **argv)
 
 static void parse_train(struct train_options *options, int argc, char **argv)
 {
-	char *sd;
-
 	*options = (struct train_options){
 		.typed = spell_arguments(argv),
 		.inputs = {"depth_mm", "velocity_mm_s"},
@@ -323,6 +326,12 @@ static void parse_train(struct train_options *options, int argc, char **argv)
 	if (options->factor && options->json)
 		cli_usage("--json reports a model; leave it out with -o %s",
 			  options->factor);
+	if (options->texture && (options->factor || options->mpi))
+		cli_usage("--texture needs a model and all sources in one process; leave "
+			  "out %s",
+			  options->factor ? "-o FILE.fac" : "--share mpi");
+	if (options->texture && options->rows.rate_hz > 0)
+		cli_usage("--texture needs each sample; leave out --rate");
 	if (options->factor) {
 		options->how.end = INCISE_TRAIN_TO_FACTOR;
 		return;
@@ -339,10 +348,16 @@ static void parse_train(struct train_options *options, int argc, char **argv)
 			  options->model);
 	if (options->json && !strcmp(options->model, "-"))
 		cli_usage("--json and -o - would both write to standard output");
-	sd = path_beside(options->model, ".sd");
-	if (sd)
-		cli_output_once(sd);
-	free(sd);
+	for (int i = 0; i <= options->texture; i++) {
+		char *beside = path_beside(options->model, i ? ".tex" : ".sd");
+
+		if (beside)
+			cli_output_once(beside);
+		else if (i)
+			cli_usage("--texture needs -o MODEL.fis, next to which it is "
+				  "written");
+		free(beside);
+	}
 	if (options->n_mfs && options->n_mfs != options->how.n_inputs)
 		cli_usage("--mf: expected %d counts, one for each of --inputs, found %d",
 			  options->how.n_inputs, options->n_mfs);
@@ -678,7 +693,8 @@ static json_t *propagated_json(const struct train_options *options,
 }
 
 static void report_train_json(const struct train_options *options,
-			      const struct incise_trained *trained, json_t *warned)
+			      const struct incise_trained *trained,
+			      const struct incise_texture *texture, json_t *warned)
 {
 	const struct incise_model *model = trained->model;
 	const struct incise_train_report *report = &trained->report;
@@ -749,6 +765,7 @@ static void report_train_json(const struct train_options *options,
 	json_set_number(object, "high_end_bias", trained->end_bias[1]);
 	json_object_set_new(object, "uncertainty",
 			    propagated_json(options, &trained->propagated));
+	json_object_set_new(object, "texture", texture_json(texture));
 	json_object_set_new(object, "warnings", warned);
 	json_object_set_new(object, "model", json_string(options->model));
 	json_print(object);
@@ -806,7 +823,8 @@ static void print_clamped(const struct incise_trained *trained)
 }
 
 static void report_train_text(const struct train_options *options,
-			      const struct incise_trained *trained)
+			      const struct incise_trained *trained,
+			      const struct incise_texture *texture)
 {
 	const struct incise_model *model = trained->model;
 	const struct incise_corpus_side *fit = incise_corpus_side(trained->corpus, false);
@@ -894,6 +912,8 @@ static void report_train_text(const struct train_options *options,
 		printf("  penalty from a random %zu of the pairs, consequents from all\n",
 		       report->pairs_tuned);
 	print_better(options, trained);
+	if (texture)
+		texture_print(texture);
 	cli_written();
 }
 
@@ -966,11 +986,29 @@ static void save_factor(const struct train_options *options,
 	cli_written();
 }
 
+/* Learn the texture, if one is asked for. */
+static struct incise_texture *train_texture(const struct train_options *options,
+					    struct incise_train_source *sources,
+					    const struct incise_model *model)
+{
+	struct incise_texture *texture;
+	struct incise_error err = {0};
+
+	if (!options->texture)
+		return NULL;
+	texture = incise_train_texture(sources, options->n_paths, model,
+				       &options->how.train, &err);
+	cli_progress_end();
+	return cli_require(texture, &err);
+}
+
 static void save_model(const struct train_options *options,
 		       const struct incise_trained *trained,
+		       const struct incise_texture *texture,
 		       struct incise_outfile *history)
 {
 	char *sd = path_beside(options->model, ".sd");
+	char *tex = texture ? path_beside(options->model, ".tex") : NULL;
 	struct incise_error err = {0};
 
 	hold_signals(SIG_BLOCK);
@@ -978,22 +1016,25 @@ static void save_model(const struct train_options *options,
 	     incise_model_save(trained->initial, options->initial, &err)) ||
 	    incise_model_save_notes(trained->model, options->model, trained->notes,
 				    &err) ||
-	    (sd && incise_uncertainty_save(trained->uncertainty, sd, &err)))
+	    (sd && incise_uncertainty_save(trained->uncertainty, sd, &err)) ||
+	    (tex && incise_texture_save(texture, tex, &err)))
 		cli_fail_with(&err);
 	whole_file_end(history);
 	hold_signals(SIG_UNBLOCK);
 	free(sd);
+	free(tex);
 }
 
 static void report_model(const struct train_options *options,
-			 const struct incise_trained *trained)
+			 const struct incise_trained *trained,
+			 const struct incise_texture *texture)
 {
 	json_t *warned = warnings(options, trained);
 
 	if (options->json)
-		report_train_json(options, trained, warned);
+		report_train_json(options, trained, texture, warned);
 	else if (strcmp(options->model, "-"))
-		report_train_text(options, trained);
+		report_train_text(options, trained, texture);
 	if (!options->json)
 		json_decref(warned);
 }
@@ -1003,6 +1044,7 @@ int main(int argc, char **argv)
 	const char *columns[INCISE_MODEL_INPUTS_MAX + 1 + INCISE_BUDGET_PARTS + FURTHER];
 	struct incise_model *premises = NULL;
 	struct incise_train_source *sources;
+	struct incise_texture *texture = NULL;
 	struct incise_outfile *history = NULL;
 	struct uncertainties uncertainties;
 	struct incise_trained trained;
@@ -1036,10 +1078,12 @@ int main(int argc, char **argv)
 	if (options.factor && trained.factor && (!job || !job->rank)) {
 		save_factor(&options, &trained);
 	} else if (trained.model) {
-		save_model(&options, &trained, history);
-		report_model(&options, &trained);
+		texture = train_texture(&options, sources, trained.model);
+		save_model(&options, &trained, texture, history);
+		report_model(&options, &trained, texture);
 	}
 	cli_finish();
+	incise_texture_free(texture);
 	incise_trained_free(&trained);
 	incise_model_free(premises);
 	sources_free(sources, options.n_paths);

@@ -1,0 +1,221 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/* A texture and its file; see incise/texture.h and incise-tex(5). */
+#include <errno.h>
+#include <inttypes.h>
+#include <limits.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <incise/outfile.h>
+#include "../base/c_locale.h"
+#include "companion.h"
+#include "texture.h"
+
+#define VERSION 1
+#define KIND "incise-tex"
+
+#define fail incise_lines_error
+
+/* Lines of numbers, in their order, each within its range. */
+#define INFO(key, member, n, least, most)                                         \
+	{                                                                         \
+		key, offsetof(struct incise_texture_info, member), n, least, most \
+	}
+#define LOOK(key, of)                                                               \
+	INFO(key "-rate", of.rate, 1, 0, 1e9), INFO(key "-rms", of.rms, 1, 0, 1e9), \
+		INFO(key "-drops", of.drop, INCISE_TEXTURE_DECILES, 0, 1e9),        \
+		INFO(key "-octaves", of.octave, INCISE_TEXTURE_OCTAVES, -1e3, 1e3)
+
+static const struct {
+	const char *key;
+	size_t at; /* in the info */
+	int n;
+	double least, most;
+} fields[] = {
+	INFO("most", most, 1, 0, (double)INCISE_TEXTURE_MOST / INCISE_TEXTURE_ONE),
+	INFO("variation", variation, 1, 0, 1),
+	INFO("cycles", up_to_cycles, 1, 0, 1e9),
+	INFO("length", length, 1, 0, 1e12),
+	INFO("error", error, 2, 0, 1e3),
+	LOOK("recorded", recorded),
+	LOOK("rendered", rendered),
+};
+
+#define FIELDS (sizeof(fields) / sizeof(*fields))
+
+static int read_fields(struct incise_lines *in, struct incise_texture *texture)
+{
+	for (size_t i = 0; i < FIELDS; i++) {
+		double *to = (double *)((char *)&texture->info + fields[i].at);
+		int rc = incise_companion_numbers(in, fields[i].key, to, fields[i].n);
+
+		for (int k = 0; k < fields[i].n && !rc; k++)
+			if (to[k] < fields[i].least || to[k] > fields[i].most)
+				rc = fail(in, EINVAL, "%s: expected %g to %g, found %g",
+					  fields[i].key, fields[i].least, fields[i].most,
+					  to[k]);
+		if (rc)
+			return rc;
+	}
+	return 0;
+}
+
+/* Read the curves into room for so many points, of which as many are left. */
+static int read_curves(struct incise_lines *in, struct incise_texture *texture, int left)
+{
+	double *to = texture->point, most = texture->info.most;
+	long n;
+	int rc = 0;
+
+	for (int i = 0; i < texture->n_curves && !rc; i++) {
+		rc = incise_companion_whole(in, "curve", 2, left, &n);
+		if (!rc)
+			rc = incise_companion_row(in, to, (int)n);
+		for (int k = 0; k < n && !rc; k++)
+			if (fabs(to[k]) > most)
+				rc = fail(in, EINVAL, "%g is beyond the most, %g", to[k],
+					  most);
+		texture->n[i] = (int)n;
+		to += n;
+		left -= (int)n;
+	}
+	return !rc && left
+		       ? fail(in, EINVAL, "points: %d more than the curves have", left)
+		       : rc;
+}
+
+/* The line "KEY N" into an int. */
+static int read_count(struct incise_lines *in, const char *key, long least, long most,
+		      int *to)
+{
+	long value = 0;
+	int rc = incise_companion_whole(in, key, least, most, &value);
+
+	*to = (int)value;
+	return rc;
+}
+
+static int read_texture_file(struct incise_lines *in, struct incise_texture *texture)
+{
+	struct incise_texture_info *info = &texture->info;
+	int rc = incise_companion_head(in, KIND, VERSION, &texture->checksum), points;
+	char *unit = rc ? NULL : incise_companion_value(in, "way");
+	long seed = 0;
+
+	if (!unit)
+		return rc ? rc : -errno;
+	if (strlen(unit) >= sizeof(texture->unit) ||
+	    unit[strspn(unit, "abcdefghijklmnopqrstuvwxyz")])
+		return fail(in, EINVAL, "way: '%.20s' is not a unit", unit);
+	strcpy(texture->unit, unit);
+	rc = incise_companion_whole(in, "seed", 0, LONG_MAX, &seed);
+	info->seed = (uint64_t)seed;
+	if (!rc)
+		rc = read_count(in, "cuts", 1, INT_MAX, &info->n_cuts);
+	if (!rc)
+		rc = read_count(in, "events", 0, INT_MAX, &info->n_events);
+	if (!rc)
+		rc = read_count(in, "octaves", 0, INCISE_TEXTURE_OCTAVES,
+				&info->n_octaves);
+	if (!rc)
+		rc = read_fields(in, texture);
+	if (!rc)
+		rc = incise_companion_numbers(in, "step", &texture->step, 1);
+	if (!rc && !(texture->step > 0))
+		rc = fail(in, EINVAL, "step: expected a number above 0");
+	if (!rc)
+		rc = read_count(in, "curves", 1, INCISE_TEXTURE_CURVES,
+				&texture->n_curves);
+	if (!rc)
+		rc = read_count(in, "points", 2, INCISE_TEXTURE_POINTS, &points);
+	if (rc)
+		return rc;
+	texture->n = calloc((size_t)texture->n_curves, sizeof(*texture->n));
+	texture->point = calloc((size_t)points, sizeof(*texture->point));
+	if (!texture->n || !texture->point)
+		return fail(in, ENOMEM, "no memory to read it");
+	rc = read_curves(in, texture, points);
+	return rc ? rc : incise_companion_end(in);
+}
+
+struct incise_texture *incise_texture_load(const char *path,
+					   const struct incise_model *model,
+					   struct incise_error *err)
+{
+	static const struct incise_infile_kind tex = {
+		.name = "a .tex file",
+		.advice = "'incise train --texture' writes it next to a model",
+		.size_max = 16 << 20,
+	};
+	struct incise_texture *texture = calloc(1, sizeof(*texture));
+	struct incise_lines in;
+	int rc;
+
+	if (!texture)
+		return INCISE_ERROR_NULL(err, ENOMEM, "%s: no memory to read it", path);
+	texture->checksum = model ? incise_model_checksum(model) : 0;
+	rc = incise_lines_open(&in, path, &tex, err);
+	if (!rc) {
+		rc = read_texture_file(&in, texture);
+		incise_lines_close(&in);
+	}
+	if (!rc)
+		return texture;
+	incise_texture_free(texture);
+	errno = -rc;
+	return NULL;
+}
+
+int incise_texture_save(const struct incise_texture *texture, const char *path,
+			struct incise_error *err)
+{
+	const struct incise_texture_info *info = &texture->info;
+	struct incise_outfile *file = incise_outfile_open(path, err);
+	const double *point = texture->point;
+	struct incise_c_locale locale;
+	int points = 0;
+	FILE *out;
+
+	if (!file)
+		return -errno;
+	locale = incise_c_locale_begin();
+	out = incise_outfile_stream(file);
+	fprintf(out,
+		KIND " %d\nmodel %016" PRIx64 "\nway %s\nseed %" PRIu64
+		     "\ncuts %d\nevents %d\noctaves %d\n",
+		VERSION, texture->checksum, texture->unit, info->seed, info->n_cuts,
+		info->n_events, info->n_octaves);
+	for (size_t i = 0; i < FIELDS; i++) {
+		const double *from = (const double *)((const char *)info + fields[i].at);
+
+		fprintf(out, "%s ", fields[i].key);
+		incise_companion_write_row(out, from, fields[i].n);
+	}
+	for (int i = 0; i < texture->n_curves; i++)
+		points += texture->n[i];
+	fprintf(out, "step %.17g\ncurves %d\npoints %d\n", texture->step,
+		texture->n_curves, points);
+	for (int i = 0; i < texture->n_curves; point += texture->n[i++]) {
+		fprintf(out, "curve %d\n", texture->n[i]);
+		incise_companion_write_row(out, point, texture->n[i]);
+	}
+	incise_c_locale_end(locale);
+	return incise_outfile_commit(file, err);
+}
+
+void incise_texture_free(struct incise_texture *texture)
+{
+	if (!texture)
+		return;
+	free(texture->n);
+	free(texture->point);
+	free(texture);
+}
+
+void incise_texture_info(const struct incise_texture *texture,
+			 struct incise_texture_info *info)
+{
+	*info = texture->info;
+	info->unit = texture->unit;
+}
