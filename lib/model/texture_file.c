@@ -116,9 +116,6 @@ static int read_texture_file(struct incise_lines *in, struct incise_texture *tex
 	if (!rc)
 		rc = read_count(in, "events", 0, INT_MAX, &info->n_events);
 	if (!rc)
-		rc = read_count(in, "octaves", 0, INCISE_TEXTURE_OCTAVES,
-				&info->n_octaves);
-	if (!rc)
 		rc = read_fields(in, texture);
 	if (!rc)
 		rc = incise_companion_numbers(in, "step", &texture->step, 1);
@@ -183,9 +180,9 @@ int incise_texture_save(const struct incise_texture *texture, const char *path,
 	out = incise_outfile_stream(file);
 	fprintf(out,
 		KIND " %d\nmodel %016" PRIx64 "\nway %s\nseed %" PRIu64
-		     "\ncuts %d\nevents %d\noctaves %d\n",
+		     "\ncuts %d\nevents %d\n",
 		VERSION, texture->checksum, texture->unit, info->seed, info->n_cuts,
-		info->n_events, info->n_octaves);
+		info->n_events);
 	for (size_t i = 0; i < FIELDS; i++) {
 		const double *from = (const double *)((const char *)info + fields[i].at);
 
@@ -218,4 +215,16 @@ void incise_texture_info(const struct incise_texture *texture,
 {
 	*info = texture->info;
 	info->unit = texture->unit;
+}
+
+double incise_texture_tape(const struct incise_texture *texture, uint64_t seed,
+			   double tau[INCISE_TEXTURE_TAPE])
+{
+	struct incise_fixed_texture tape;
+
+	_Static_assert(INCISE_TEXTURE_TAPE == INCISE_TEXTURE_KNOTS, "a point is a knot");
+	incise_texture_fill(texture, 0, seed, &tape);
+	for (int i = 0; i < INCISE_TEXTURE_TAPE; i++)
+		tau[i] = (double)tape.knot[i] / INCISE_TEXTURE_ONE;
+	return ldexp(1, tape.step_shift - 16);
 }

@@ -25,11 +25,12 @@ void texture_print(const struct incise_texture *texture)
 	       100 * info.most, 100 * info.variation);
 }
 
-static json_t *look_json(const struct incise_texture_look *look, int n_octaves)
+static json_t *look_json(const struct incise_texture_look *look)
 {
 	return json_pack("{sf sf so so}", "rate", look->rate, "rms", look->rms,
 			 "drop_deciles", json_numbers(look->drop, INCISE_TEXTURE_DECILES),
-			 "octaves_dB", json_numbers(look->octave, n_octaves));
+			 "octaves_dB",
+			 json_numbers(look->octave, INCISE_TEXTURE_OCTAVES));
 }
 
 json_t *texture_json(const struct incise_texture *texture)
@@ -44,7 +45,6 @@ json_t *texture_json(const struct incise_texture *texture)
 			 info.n_events, "length", info.length, "most", info.most,
 			 "variation", info.variation, "up_to_cycles", info.up_to_cycles,
 			 "spectrum_error_dB", info.error[1], "without_texture_error_dB",
-			 info.error[0], "recorded",
-			 look_json(&info.recorded, info.n_octaves), "rendered",
-			 look_json(&info.rendered, info.n_octaves));
+			 info.error[0], "recorded", look_json(&info.recorded), "rendered",
+			 look_json(&info.rendered));
 }

@@ -22,9 +22,12 @@ INCISE_BEGIN_DECLS
 
 struct incise_texture;
 
-/** Octaves of a spectrum, and deciles of drops, at most. */
-#define INCISE_TEXTURE_OCTAVES 12
+/** Octaves of a spectrum, and deciles of drops. */
+#define INCISE_TEXTURE_OCTAVES 4
 #define INCISE_TEXTURE_DECILES 9
+
+/** Points of a tape. */
+#define INCISE_TEXTURE_TAPE 8192
 
 /** Cuts by the metrics of their texture. */
 struct incise_texture_look {
@@ -46,7 +49,6 @@ struct incise_texture_info {
 	int n_cuts, n_events; /**< that it was learned from */
 	double length;	      /**< of their way, all together */
 	double error[2]; /**< cross-validated distance of spectra in dB: without, with texture */
-	int n_octaves;
 	/** The same cuts, as recorded, and rendered by a texture of other cuts. */
 	struct incise_texture_look recorded, rendered;
 };
@@ -77,6 +79,16 @@ INCISE_API void incise_texture_free(struct incise_texture *texture);
 
 INCISE_API void incise_texture_info(const struct incise_texture *texture,
 				    struct incise_texture_info *info);
+
+/**
+ * The tape that ticks read: τ at multiples of a step, from which each cut starts at another place. It begins
+ * again at its end.
+ *
+ * @param seed of a scene: tissue.seed
+ * @return the step, in the unit of the way
+ */
+INCISE_API double incise_texture_tape(const struct incise_texture *texture, uint64_t seed,
+				      double tau[INCISE_TEXTURE_TAPE]);
 
 INCISE_END_DECLS
 #endif
