@@ -43,9 +43,10 @@ double incise_felt_share(const struct incise_felt *felt)
 }
 
 void incise_plan_feel(struct incise_plan *plan, const struct incise_tick *tick,
-		      const double force_N[3], double texture_N)
+		      const double force_N[3], double size_N, double texture)
 {
 	double all_N = v3_dot(force_N, tick->normal), acting_N[3];
+	double texture_N = size_N * texture / (1 + texture);
 
 	v3_copy(acting_N, plan->last_N);
 	if (plan->axes.n)

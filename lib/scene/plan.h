@@ -103,6 +103,7 @@ struct incise_plan_kernel {
 /* Sums of 1, a mean force, its texture and the force that acts, times each other. */
 struct incise_felt {
 	double sum[4][4];
+	double way_mm; /* of the front when the last one was added */
 };
 
 struct incise_plan {
@@ -207,9 +208,13 @@ double incise_plan_texture_most(const struct incise_plan *plan);
 /* Fill in the plan in double, by all that was found of the scene. */
 void incise_plan_set_numbers(struct incise_plan *plan);
 
-/* Take a tick of new tissue in, with its force and the part of it along the normal that is texture. */
+/*
+ * Take a tick of new tissue in: its force, the size of its model's part, and @texture, τ. incise_plan_texture_felt() has
+ * the result.
+ */
 void incise_plan_feel(struct incise_plan *plan, const struct incise_tick *tick,
-		      const double force_N[3], double texture_N) INCISE_REALTIME;
+		      const double force_N[3], double size_N,
+		      double texture) INCISE_REALTIME;
 
 /* Add a tick; the share of the texture that acts, NaN: not known. */
 void incise_felt_add(struct incise_felt *felt, double mean_N, double texture_N,
