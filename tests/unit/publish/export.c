@@ -451,7 +451,8 @@ TEST(raw_rows_are_the_samples)
 	text = rest = export_liver(&how, &report);
 	assert_string_equal(
 		next_line(&rest),
-		"cut,t_s,depth_mm,velocity_mm_s,force_N,clipped,advancing," INPUTS ",way_mm");
+		"cut,t_s,depth_mm,velocity_mm_s,force_N,clipped,advancing," INPUTS
+		",way_mm");
 	for (; *(line = next_line(&rest)); n++) {
 		const struct truth_sample *s = &truth.samples[n];
 		double t, depth, velocity, force;
