@@ -3,6 +3,7 @@
  * incise train SOURCE... -o MODEL.fis: learn a fuzzy force model from recordings and CSV files,
  * and compare it with simpler predictors. incise_train_sources() has the method.
  */
+#include <errno.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -986,7 +987,7 @@ static void save_factor(const struct train_options *options,
 	cli_written();
 }
 
-/* Learn the texture, if one is asked for. */
+/* Learn the texture, if one is asked for; NULL also where the model alone is as good. */
 static struct incise_texture *train_texture(const struct train_options *options,
 					    struct incise_train_source *sources,
 					    const struct incise_trained *trained)
@@ -999,6 +1000,10 @@ static struct incise_texture *train_texture(const struct train_options *options,
 	texture = incise_train_texture(sources, options->n_paths, trained,
 				       &options->how.train, NULL, &err);
 	cli_progress_end();
+	if (!texture && err.code == EDOM) {
+		cli_warn("%s", err.text);
+		return NULL;
+	}
 	return cli_require(texture, &err);
 }
 

@@ -11,5 +11,6 @@ void incise_texture_fill(const struct incise_texture *texture, double variation,
 	memset(to, 0, sizeof(*to));
 	to->step_shift = 12;
 	for (int i = 0; i < INCISE_TEXTURE_KNOTS && texture; i++)
-		to->knot[i] = (int16_t)(texture->point[i % texture->n[0]] * INCISE_TEXTURE_ONE);
+		to->knot[i] =
+			(int16_t)(texture->point[i % texture->n[0]] * INCISE_TEXTURE_ONE);
 }
