@@ -62,7 +62,7 @@ static bool is_held(const struct cuts *cuts, const char *name)
 	const struct incise_corpus_source *source = cuts->source;
 	const struct incise_corpus *corpus = cuts->trained->corpus;
 
-	for (int i = 0; i < incise_corpus_sources(corpus); i++) {
+	for (int i = 0; corpus && i < incise_corpus_sources(corpus); i++) {
 		const struct incise_corpus_survey *of = incise_corpus_source(corpus, i);
 		uint64_t key = incise_group_key(source->own_groups ? of->hash : "", name);
 		bool same = !strncmp(of->name, source->name, sizeof(of->name) - 1);
