@@ -64,18 +64,18 @@ static int read_fields(struct incise_lines *in, struct incise_texture *texture)
 /* Read the curves into room for so many points, of which as many are left. */
 static int read_curves(struct incise_lines *in, struct incise_texture *texture, int left)
 {
-	double *to = texture->point, most = texture->info.most;
+	double *to = texture->point, most = texture->info.most * INCISE_TEXTURE_ONE;
 	long n;
 	int rc = 0;
 
 	for (int i = 0; i < texture->n_curves && !rc; i++) {
-		rc = incise_companion_whole(in, "curve", 2, left, &n);
+		rc = incise_companion_whole(in, "curve", 2, left < INCISE_TEXTURE_PIECE ? left : INCISE_TEXTURE_PIECE, &n);
 		if (!rc)
 			rc = incise_companion_row(in, to, (int)n);
 		for (int k = 0; k < n && !rc; k++)
-			if (fabs(to[k]) > most)
-				rc = fail(in, EINVAL, "%g is beyond the most, %g", to[k],
-					  most);
+			if (!(fabs(to[k]) <= most) || to[k] != rint(to[k]))
+				rc = fail(in, EINVAL, "%g is not a whole number of up to %g",
+					  to[k], most);
 		texture->n[i] = (int)n;
 		to += n;
 		left -= (int)n;
@@ -119,8 +119,9 @@ static int read_texture_file(struct incise_lines *in, struct incise_texture *tex
 		rc = read_fields(in, texture);
 	if (!rc)
 		rc = incise_companion_numbers(in, "step", &texture->step, 1);
-	if (!rc && !(texture->step > 0))
-		rc = fail(in, EINVAL, "step: expected a number above 0");
+	if (!rc && !(texture->step >= ldexp(1, INCISE_TEXTURE_SHIFT_LEAST - 16) &&
+		     texture->step <= ldexp(1, INCISE_TEXTURE_SHIFT_MOST - 16)))
+		rc = fail(in, EINVAL, "step: expected 1/256 to 16");
 	if (!rc)
 		rc = read_count(in, "curves", 1, INCISE_TEXTURE_CURVES,
 				&texture->n_curves);
