@@ -347,8 +347,7 @@ static void make_noise(struct incise_fixed_texture *texture, uint64_t key)
 	}
 }
 
-/* The force of each cut as its sensor would have measured it; returns the sum over the sum of the model's. */
-static double render_cuts(const struct incise_fixed_texture *texture,
+double incise_look_render(const struct incise_fixed_texture *texture,
 			  const struct incise_texture_cut *cuts, int n, double noise,
 			  uint64_t key, double *const *force)
 {
@@ -382,7 +381,8 @@ static int add_draw(const struct incise_texture *texture, enum incise_realism_ki
 			    &knots);
 	if (kind == INCISE_REALISM_NOISE)
 		make_noise(&knots, incise_random_mix(seed + 1));
-	mean = render_cuts(&knots, cuts, n, look.noise, incise_random_mix(~seed), force);
+	mean = incise_look_render(&knots, cuts, n, look.noise, incise_random_mix(~seed),
+				  force);
 	rc = incise_look_at(&look, cuts, n, force);
 	if (!rc) {
 		row->rate += look.rate / recorded->rate / DRAWS;

@@ -44,7 +44,8 @@ struct learning {
 	uint64_t seed;
 	struct incise_watch *watch;
 	struct incise_look recorded;
-	double step, *tau, *sum, **force; /* of the points of a cut, of its rows rendered */
+	double step, *tau, *sum,
+		**force; /* of the points of a cut, of its rows rendered */
 };
 
 /* --- pieces --- */
@@ -71,10 +72,9 @@ static size_t find_tau(struct learning *learning, const struct incise_texture_cu
 		while (row + 2 < part.n && part.way[row + 1] <= at)
 			row++;
 		share = (at - part.way[row]) / (part.way[row + 1] - part.way[row]);
-		model = part.model[row] +
-			share * (part.model[row + 1] - part.model[row]);
-		tau[i] = part.force[row] +
-			 share * (part.force[row + 1] - part.force[row]);
+		model = part.model[row] + share * (part.model[row + 1] - part.model[row]);
+		tau[i] =
+			part.force[row] + share * (part.force[row + 1] - part.force[row]);
 		tau[i] /= fmax(model, least);
 		mean += tau[i] / (double)n;
 	}
@@ -98,8 +98,8 @@ static void take_running_mean(struct learning *learning, size_t n, double window
 		size_t half = i < n - 1 - i ? i : n - 1 - i;
 
 		half = half < most ? half : most;
-		learning->tau[i] -= (sum[i + half + 1] - sum[i - half]) /
-				    (double)(2 * half + 1);
+		learning->tau[i] -=
+			(sum[i + half + 1] - sum[i - half]) / (double)(2 * half + 1);
 	}
 }
 
@@ -297,8 +297,7 @@ static struct incise_texture *learn_pieces(struct learning *learning,
 			err, EDOM,
 			"no texture makes cuts that it was not learned from more alike "
 			"the recorded ones than the model alone (cross-validated)");
-	texture = rc ? NULL
-		     : find_pieces(learning, learning->cuts, learning->n, &best);
+	texture = rc ? NULL : find_pieces(learning, learning->cuts, learning->n, &best);
 	if (texture && !note_looks(learning, &best, &texture->info))
 		return texture;
 	incise_texture_free(texture);

@@ -45,8 +45,8 @@ static void draw_factors(struct incise_fixed_texture *to, double sd, uint64_t *s
 		x = times(size, z) - times(size, size) / 2;
 		x = x < -2 * ONE ? -2 * ONE : x > 2 * ONE ? 2 * ONE : x;
 		to->factor[i] = (int32_t)(exponential(x) >> (SHIFT - 16));
-		to->factor_most = to->factor[i] > to->factor_most ? to->factor[i]
-								  : to->factor_most;
+		to->factor_most =
+			to->factor[i] > to->factor_most ? to->factor[i] : to->factor_most;
 	}
 }
 
@@ -61,8 +61,8 @@ static void shuffle_pieces(uint16_t *order, int n, uint64_t *state)
 }
 
 /* Pieces in random order, all before one comes again, to the length nearest to @most; returns it. */
-static int join_pieces(const struct incise_texture *texture, uint64_t *state, int16_t *tape,
-		       int most)
+static int join_pieces(const struct incise_texture *texture, uint64_t *state,
+		       int16_t *tape, int most)
 {
 	uint16_t order[INCISE_TEXTURE_CURVES];
 	int first[INCISE_TEXTURE_CURVES], at = 0, length = 0;
@@ -102,8 +102,9 @@ static void set_knots(struct incise_fixed_texture *to, const int16_t *tape, int 
 		tau = tau > INCISE_TEXTURE_MOST ? INCISE_TEXTURE_MOST : tau;
 		tau = tau < -INCISE_TEXTURE_MOST ? -INCISE_TEXTURE_MOST : tau;
 		to->knot[i] = (int16_t)tau;
-		to->most = (int32_t)(tau > to->most ? tau : -tau > to->most ? -tau
-									    : to->most);
+		to->most = (int32_t)(tau > to->most    ? tau
+				     : -tau > to->most ? -tau
+						       : to->most);
 	}
 }
 

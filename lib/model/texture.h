@@ -9,10 +9,10 @@
 #include <incise/texture.h>
 #include "../fixed/texture.h"
 
-#define INCISE_TEXTURE_UNIT 16	     /* bytes of a unit's name */
-#define INCISE_TEXTURE_CURVES 4096   /* at most */
-#define INCISE_TEXTURE_POINTS 16384  /* of all curves, at most */
-#define INCISE_TEXTURE_PIECE 2048    /* of one curve, at most */
+#define INCISE_TEXTURE_UNIT 16	    /* bytes of a unit's name */
+#define INCISE_TEXTURE_CURVES 4096  /* at most */
+#define INCISE_TEXTURE_POINTS 16384 /* of all curves, at most */
+#define INCISE_TEXTURE_PIECE 2048   /* of one curve, at most */
 
 /* Steps of a tape; see lib/fixed/texture.h. */
 #define INCISE_TEXTURE_SHIFT_LEAST 8
