@@ -60,6 +60,14 @@ int incise_realism_of(const struct incise_texture *texture,
 		      const struct incise_texture_cut *cuts, int n, uint64_t seed,
 		      struct incise_realism *realism);
 
+/*
+ * The force of each cut as its sensor would have measured it, with such noise; returns its sum over that of
+ * the model.
+ */
+double incise_look_render(const struct incise_fixed_texture *texture,
+			  const struct incise_texture_cut *cuts, int n, double noise,
+			  uint64_t key, double *const *force);
+
 /* Mean distance of the octaves of two looks, dB. */
 double incise_look_distance(const struct incise_look *a, const struct incise_look *b);
 
