@@ -17,10 +17,18 @@
 #define FALL_SD 6
 #define FALL_SHARE 0.02
 
+/* A part with more cells, of long steps among short ones, is looked at up to there. */
+#define CELLS_PER_ROW 4
+
 /* sd of a normal distribution over the median of |second difference|: 1/(0.6745 √6). */
 #define SD_OF_BENDS 0.60527
 
-/* --- scale: step of the way and noise --- */
+/* --- part of a cut, step of the way and noise --- */
+
+/* The part is at least so fast and has such a force, relative to almost the most. */
+#define FAST_SHARE 0.2
+#define FORCE_SHARE 0.5
+#define ALMOST 0.99
 
 static size_t rows_of_cuts(const struct incise_texture_cut *cuts, int n)
 {
@@ -31,22 +39,48 @@ static size_t rows_of_cuts(const struct incise_texture_cut *cuts, int n)
 	return rows;
 }
 
-/* Half of the way is in steps of at most this: there are at most twice as many cells as rows. */
-static double median_step(const struct incise_texture_cut *cuts, int n, double *steps)
+static double quantile(double *numbers, size_t n, double share)
 {
-	double length = 0, sum = 0;
-	size_t m = 0, i = 0;
-
-	for (int c = 0; c < n; c++)
-		for (size_t k = 1; k < cuts[c].n; k++, m++)
-			length += steps[m] = cuts[c].way[k] - cuts[c].way[k - 1];
-	qsort(steps, m, sizeof(*steps), ascending);
-	while (i < m && (sum += steps[i]) < length / 2)
-		i++;
-	return m ? steps[i < m ? i : m - 1] : 1;
+	qsort(numbers, n, sizeof(*numbers), ascending);
+	return n ? numbers[(size_t)(share * (double)(n - 1))] : 0;
 }
 
-static double median_noise(const struct incise_texture_cut *cuts, int n, double *bends)
+struct incise_texture_cut incise_look_part(const struct incise_texture_cut *cut,
+					   double *numbers)
+{
+	const double *way = cut->way, *force = cut->force;
+	double fast, strong;
+	size_t from = cut->n, to = 0;
+
+	for (size_t i = 1; i < cut->n; i++)
+		numbers[i - 1] = way[i] - way[i - 1];
+	fast = FAST_SHARE * quantile(numbers, cut->n ? cut->n - 1 : 0, ALMOST);
+	memcpy(numbers, force, cut->n * sizeof(*numbers));
+	strong = FORCE_SHARE * quantile(numbers, cut->n, ALMOST);
+	for (size_t i = 1; i < cut->n; i++)
+		if (way[i] - way[i - 1] >= fast && force[i] >= strong) {
+			from = from < i ? from : i;
+			to = i + 1;
+		}
+	from = from < to ? from : to;
+	return (struct incise_texture_cut){way + from, force + from, cut->model + from,
+					   to - from};
+}
+
+static double median_step(const struct incise_texture_cut *cuts, int n, double *numbers)
+{
+	size_t m = 0;
+
+	for (int c = 0; c < n; c++) {
+		struct incise_texture_cut part = incise_look_part(&cuts[c], numbers + m);
+
+		for (size_t k = 1; k < part.n; k++)
+			numbers[m++] = part.way[k] - part.way[k - 1];
+	}
+	return m ? quantile(numbers, m, 0.5) : 1;
+}
+
+static double median_noise(const struct incise_texture_cut *cuts, int n, double *numbers)
 {
 	size_t m = 0;
 
@@ -54,10 +88,9 @@ static double median_noise(const struct incise_texture_cut *cuts, int n, double 
 		const double *f = cuts[c].force;
 
 		for (size_t k = 2; k < cuts[c].n; k++)
-			bends[m++] = fabs(f[k] - 2 * f[k - 1] + f[k - 2]);
+			numbers[m++] = fabs(f[k] - 2 * f[k - 1] + f[k - 2]);
 	}
-	qsort(bends, m, sizeof(*bends), ascending);
-	return m ? bends[m / 2] * SD_OF_BENDS : 0;
+	return quantile(numbers, m, 0.5) * SD_OF_BENDS;
 }
 
 /* --- one cut --- */
@@ -220,7 +253,7 @@ static void finish_look(struct incise_look *look, const struct sums *sums)
 int incise_look_at(struct incise_look *look, const struct incise_texture_cut *cuts, int n,
 		   double *const *rendered)
 {
-	size_t most = 2 * rows_of_cuts(cuts, n) + 1;
+	size_t most = CELLS_PER_ROW * rows_of_cuts(cuts, n) + 1;
 	double *numbers = malloc(most * sizeof(*numbers));
 	struct sums sums = {0};
 	int rc = numbers ? 0 : -ENOMEM;
@@ -230,13 +263,16 @@ int incise_look_at(struct incise_look *look, const struct incise_texture_cut *cu
 		look->noise = median_noise(cuts, n, numbers);
 	}
 	for (int i = 0; i < n && !rc; i++) {
-		const double *force = rendered ? rendered[i] : cuts[i].force;
+		struct incise_texture_cut part = incise_look_part(&cuts[i], numbers);
+		const double *force = rendered
+					      ? rendered[i] + (part.force - cuts[i].force)
+					      : part.force;
 		double largest = 0;
 		size_t m;
 
 		for (size_t k = 0; k < cuts[i].n; k++)
 			largest = fmax(largest, cuts[i].force[k]);
-		m = average_cells(&cuts[i], force, look->step, numbers, most);
+		m = average_cells(&part, force, look->step, numbers, most);
 		rc = look_at_cells(look, &sums, numbers, m, largest);
 	}
 	free(numbers);
@@ -311,8 +347,7 @@ static void make_noise(struct incise_fixed_texture *texture, uint64_t key)
 	}
 }
 
-/* The force of each cut as its sensor would have measured it; returns the sum over the sum of the model's. */
-static double render_cuts(const struct incise_fixed_texture *texture,
+double incise_look_render(const struct incise_fixed_texture *texture,
 			  const struct incise_texture_cut *cuts, int n, double noise,
 			  uint64_t key, double *const *force)
 {
@@ -346,7 +381,8 @@ static int add_draw(const struct incise_texture *texture, enum incise_realism_ki
 			    &knots);
 	if (kind == INCISE_REALISM_NOISE)
 		make_noise(&knots, incise_random_mix(seed + 1));
-	mean = render_cuts(&knots, cuts, n, look.noise, incise_random_mix(~seed), force);
+	mean = incise_look_render(&knots, cuts, n, look.noise, incise_random_mix(~seed),
+				  force);
 	rc = incise_look_at(&look, cuts, n, force);
 	if (!rc) {
 		row->rate += look.rate / recorded->rate / DRAWS;

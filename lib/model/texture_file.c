@@ -40,7 +40,7 @@ static const struct {
 	FIELD("error", info.error, 2, 0, 1e3),
 	LOOK("recorded", info.recorded),
 	LOOK("rendered", info.rendered),
-	FIELD("step", step, 1, 1e-9, 1e9),
+	FIELD("step", step, 1, 1. / 256, 16),
 };
 
 #define FIELDS (sizeof(fields) / sizeof(*fields))
@@ -75,15 +75,18 @@ static int read_count(struct incise_lines *in, const char *key, long least, long
 
 static int read_curves(struct incise_lines *in, struct incise_texture *texture)
 {
+	double most = texture->info.most * INCISE_TEXTURE_ONE;
 	int points = 0, rc = 0;
 
 	texture->n = calloc((size_t)texture->n_curves, sizeof(*texture->n));
 	if (!texture->n)
 		return fail(in, ENOMEM, "no memory to read it");
 	for (int i = 0; i < texture->n_curves && !rc; points += texture->n[i++]) {
+		int left = INCISE_TEXTURE_POINTS - points;
 		double *more;
 
-		rc = read_count(in, "curve", 2, INCISE_TEXTURE_POINTS - points,
+		rc = read_count(in, "curve", 2,
+				left < INCISE_TEXTURE_PIECE ? left : INCISE_TEXTURE_PIECE,
 				&texture->n[i]);
 		if (rc)
 			return rc;
@@ -94,9 +97,10 @@ static int read_curves(struct incise_lines *in, struct incise_texture *texture)
 		texture->point = more;
 		rc = incise_companion_row(in, more + points, texture->n[i]);
 		for (int k = points; k < points + texture->n[i] && !rc; k++)
-			if (fabs(more[k]) > texture->info.most)
-				rc = fail(in, EINVAL, "%g is beyond the most, %g",
-					  more[k], texture->info.most);
+			if (fabs(more[k]) > most || more[k] != rint(more[k]))
+				rc = fail(in, EINVAL,
+					  "%g is not a whole number up to the most, %g",
+					  more[k], most);
 	}
 	return rc ? rc : incise_companion_end(in);
 }

@@ -100,6 +100,12 @@ struct incise_plan_kernel {
 	bool fade_told;	 /* the last one said whether to fade as it is */
 };
 
+/* Sums of 1, a mean force, its texture and the force that acts, times each other. */
+struct incise_felt {
+	double sum[4][4];
+	double way_mm; /* of the front when the last one was added */
+};
+
 struct incise_plan {
 	const struct incise_scene *scene;
 	struct incise_stage stage[INCISE_PLAN_STAGES_MAX];
@@ -145,6 +151,8 @@ struct incise_plan {
 	const struct incise_fixed *fixed;
 	struct incise_fixed *own_fixed; /* compiled here */
 	struct incise_acting_force acting[INCISE_FORCES];
+	const struct incise_fixed_texture *texture; /* the scene's, of a cut, or NULL */
+	struct incise_felt felt;
 
 	struct incise_doubles doubles;	  /* by all of the above */
 	struct incise_integers *integers; /* with arithmetic = "fixed"; else NULL */
@@ -194,8 +202,24 @@ bool incise_plan_kind_range(const struct incise_plan *plan, enum incise_model_in
 /* Scale all numbers of a checked plan that go with the gain. incise_plan_set_numbers() takes it over. */
 void incise_plan_set_gain(struct incise_plan *plan, double gain);
 
+/* The most by which the plan's texture multiplies its model's force, (1 + max τ) · factor; 1 without one. */
+double incise_plan_texture_most(const struct incise_plan *plan);
+
 /* Fill in the plan in double, by all that was found of the scene. */
 void incise_plan_set_numbers(struct incise_plan *plan);
+
+/*
+ * Take a tick of new tissue in: its force, the size of its model's part, and @texture, τ. incise_plan_texture_felt() has
+ * the result.
+ */
+void incise_plan_feel(struct incise_plan *plan, const struct incise_tick *tick,
+		      const double force_N[3], double size_N,
+		      double texture) INCISE_REALTIME;
+
+/* Add a tick; the share of the texture that acts, NaN: not known. */
+void incise_felt_add(struct incise_felt *felt, double mean_N, double texture_N,
+		     double acting_N) INCISE_REALTIME;
+double incise_felt_share(const struct incise_felt *felt);
 
 /* Take the force away, and keep why. Returns @rc. */
 int incise_plan_fail(struct incise_plan *plan, struct incise_tick *tick,

@@ -37,7 +37,7 @@ struct contact {
 
 /* What all scenes met. */
 struct met {
-	int contacts, returned, unpaid;
+	int contacts, textured, returned, unpaid;
 	double most_mJ;
 };
 
@@ -78,9 +78,11 @@ static void walk(uint64_t seed, const struct drawn *d, int k, bool account,
 	struct contact contact = {.is = false};
 	struct incise_tick tick;
 	struct hand hand;
+	bool textured;
 
 	succeeds(scene);
 	scene->unchecked = true;
+	textured = seed % 4 && add_texture(seed, scene);
 	/* Limits are another stage's. */
 	scene->limits.force_N = scene->limits.start_N = 1000;
 	scene->limits.slew_N_s = 1e6;
@@ -98,6 +100,7 @@ static void walk(uint64_t seed, const struct drawn *d, int k, bool account,
 		if (!follow(&contact, &tick, plan[0]->accounts))
 			continue;
 		met->contacts++;
+		met->textured += textured;
 		met->most_mJ = fmax(met->most_mJ, contact.put_mJ);
 		if (over(&contact) && met->returned++ < PRINTED && account)
 			printf("seed %" PRIu64
@@ -123,9 +126,10 @@ TEST(test_no_closed_motion_returns_more_than_it_takes)
 		walk(first + (uint64_t)i, &d, 0, false, &without);
 	}
 	for (int k = 0; k < 2; k++)
-		printf("%s: %d contacts of up to %.3g mJ, %d return more; %d ticks unpaid\n",
+		printf("%s: %d contacts of up to %.3g mJ, %d with texture, %d return more; "
+		       "%d ticks unpaid\n",
 		       k ? "integers" : "double", met[k].contacts, met[k].most_mJ,
-		       met[k].returned, met[k].unpaid);
+		       met[k].textured, met[k].returned, met[k].unpaid);
 	printf("without an account: %d return more\n", without.returned);
 	for (int k = 0; k < 2; k++) {
 		assert_int_equal(met[k].returned, 0);
