@@ -65,7 +65,7 @@ FILE *figure_of_texture(const struct figure *figure)
 		"plot $drops%s",
 		info.recorded.rate, info.unit, info.rendered.rate, looks);
 	fprintf(script,
-		"set origin 0.5,0\nset logscale x 2\n"
+		"set origin 0.5,0\nset logscale x 2\nset key bottom left\n"
 		"set title 'spectrum: %.2g dB apart, %.2g dB without texture'\n"
 		"set xlabel 'cycles per %s'\nset ylabel 'power / dB'\nplot $octaves%s"
 		"unset multiplot\n",
