@@ -31,6 +31,9 @@
 /* A blade so far beside the line of its cut is in new tissue: half the width of a blade. */
 #define BESIDE N(1)
 
+/* The way of the front, by the square of the distance from the line: a curve is little longer than its chords. */
+#define ASIDE N_OF(1, 8)
+
 /* --- line --- */
 
 void T(line_along)(dir along[3], const dir normal[3], const dir side[3])
@@ -107,6 +110,7 @@ static void keep(struct T(front) *front)
 	front->n = front->n ? front->n : 1;
 	front->kept[front->in].line = front->line;
 	front->kept[front->in].cut = front->cut;
+	front->kept[front->in].way = front->way;
 }
 
 static void begin_cut_of(struct T(front) *front, const num at[3], const dir normal[3],
@@ -137,11 +141,13 @@ bool T(front_enter)(struct T(front) *front, const num at[3], const dir normal[3]
 	front->work2 = front->most2 = 0;
 	if (there < 0) {
 		begin_cut_of(front, at, normal, side);
+		front->way = (struct T(way)){.number = front->begun++};
 		return true;
 	}
 	front->in = there;
 	front->line = front->kept[there].line;
 	front->cut = front->kept[there].cut;
+	front->way = front->kept[there].way;
 	return false;
 }
 
@@ -157,8 +163,27 @@ num T(front_advance)(struct T(front) *front, const num at[3], const dir normal[3
 		return n_sub(n_sub(line->to, line->from), length);
 	/* It left the line sideways; a curved skin does that too. The cut goes on from here. */
 	keep(front);
+	front->way.before += w_of(n_add(n_sub(line->to, line->from), ASIDE));
 	begin_cut_of(front, at, normal, side);
 	return BESIDE;
+}
+
+bool T(front_way)(struct T(front) *front, const num at[3], num depth)
+{
+	const struct T(line) *line = &front->line;
+	num off[3], aside;
+	wide way, beside2 = 0;
+
+	off_line(off, line, at);
+	for (int i = 0; i < 3; i++)
+		beside2 = w_work(beside2, off[i], 0, off[i]);
+	aside = n_of(w_min(w_shifted(beside2, 16), w_of(BESIDE)));
+	way = front->way.before + w_of(n_sub(line->to, line->from)) +
+	      w_of(n_add(n_times(ASIDE, aside), n_max(depth, 0)));
+	if (!(front->way.most < way))
+		return false;
+	front->way.most = way;
+	return true;
 }
 
 num T(front_force)(struct T(front) *front, num unloading, num friction, num depth,

@@ -153,10 +153,10 @@ static int with(uint8_t *bytes, uint32_t size, size_t at, int64_t value)
 
 	memcpy(&was, place, sizeof(was));
 	memcpy(place, &number, sizeof(number));
-	head_of(bytes)->version = incise_fixed_plan_version(&head_of(bytes)->numbers);
+	head_of(bytes)->version = incise_fixed_plan_version(head_of(bytes));
 	rc = open_sealed(bytes, size);
 	memcpy(place, &was, sizeof(was));
-	head_of(bytes)->version = incise_fixed_plan_version(&head_of(bytes)->numbers);
+	head_of(bytes)->version = incise_fixed_plan_version(head_of(bytes));
 	return rc;
 }
 

@@ -390,7 +390,7 @@ static inline uint32_t incise_fx_trial_plan(uint64_t seed, void *bytes)
 		size += head->heights_size;
 	}
 	head->size = size;
-	head->version = incise_fixed_plan_version(&head->numbers);
+	head->version = incise_fixed_plan_version(head);
 	incise_fx_trial_seal(bytes, size);
 	return size;
 }
