@@ -31,7 +31,7 @@
 /* A blade so far beside the line of its cut is in new tissue: half the width of a blade. */
 #define BESIDE N(1)
 
-/* The way of the front, by the square of the distance from the line: a curve is little longer than its chords. */
+/* Share of the way beside a line in the way of the front: a curve is little longer than its chords. */
 #define ASIDE N_OF(1, 8)
 
 /* --- line --- */
@@ -151,6 +151,17 @@ bool T(front_enter)(struct T(front) *front, const num at[3], const dir normal[3]
 	return false;
 }
 
+/* Length of a line, and a share of the way beside it, by its parts: both add up from line to line. */
+static num length_of(const struct T(line) *line, const num at[3])
+{
+	num off[3];
+
+	off_line(off, line, at);
+	return n_add(n_sub(line->to, line->from),
+		     n_times(ASIDE,
+			     n_add(n_add(n_abs(off[0]), n_abs(off[1])), n_abs(off[2]))));
+}
+
 num T(front_advance)(struct T(front) *front, const num at[3], const dir normal[3],
 		     const dir side[3])
 {
@@ -163,23 +174,16 @@ num T(front_advance)(struct T(front) *front, const num at[3], const dir normal[3
 		return n_sub(n_sub(line->to, line->from), length);
 	/* It left the line sideways; a curved skin does that too. The cut goes on from here. */
 	keep(front);
-	front->way.before += w_of(n_add(n_sub(line->to, line->from), ASIDE));
+	front->way.before += w_of(length_of(line, at));
 	begin_cut_of(front, at, normal, side);
 	return BESIDE;
 }
 
 bool T(front_way)(struct T(front) *front, const num at[3], num depth)
 {
-	const struct T(line) *line = &front->line;
-	num off[3], aside;
-	wide way, beside2 = 0;
+	wide way = front->way.before +
+		   w_of(n_add(length_of(&front->line, at), n_max(depth, 0)));
 
-	off_line(off, line, at);
-	for (int i = 0; i < 3; i++)
-		beside2 = w_work(beside2, off[i], 0, off[i]);
-	aside = n_of(w_min(w_shifted(beside2, 16), w_of(BESIDE)));
-	way = front->way.before + w_of(n_sub(line->to, line->from)) +
-	      w_of(n_add(n_times(ASIDE, aside), n_max(depth, 0)));
 	if (!(front->way.most < way))
 		return false;
 	front->way.most = way;

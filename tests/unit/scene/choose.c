@@ -264,7 +264,7 @@ TEST(test_everything)
 	/* On a plane there is nothing to average. */
 	scene = scene_of(&(struct lacking){0}, PLANE, "fixed");
 	plan = plan_of(scene);
-	assert_int_equal(stages(plan), stages_of_a_loop() - 1);
+	assert_int_equal(stages(plan), stages_of_a_loop() - 2);
 	assert_non_null(strstr(why_not(plan, "normal"), "is constant"));
 	incise_plan_free(plan);
 	incise_scene_free(scene);
