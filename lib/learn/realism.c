@@ -347,7 +347,7 @@ static void make_noise(struct incise_fixed_texture *texture, uint64_t key)
 	}
 }
 
-double incise_look_render(const struct incise_fixed_texture *texture,
+double incise_look_render(const struct incise_fixed_texture *knots,
 			  const struct incise_texture_cut *cuts, int n, double noise,
 			  uint64_t key, double *const *force)
 {
@@ -359,7 +359,7 @@ double incise_look_render(const struct incise_fixed_texture *texture,
 			double f = fmax(cuts[i].model[k], 0);
 
 			model += f;
-			f *= 1 + tau_at(texture, i, cuts[i].way[k] - cuts[i].way[0]);
+			f *= 1 + tau_at(knots, i, cuts[i].way[k] - cuts[i].way[0]);
 			sum += f;
 			force[i][k] = f + noise * incise_random_normal(key, at++);
 		}

@@ -46,6 +46,14 @@ int incise_look_at(struct incise_look *look, const struct incise_texture_cut *cu
 		   double *const *rendered);
 
 /*
+ * The force of each cut by the tables of a texture as a sensor with @noise would have measured it, into one
+ * array for each cut; returns the sum of the force over the sum of the model's.
+ */
+double incise_look_render(const struct incise_fixed_texture *knots,
+			  const struct incise_texture_cut *cuts, int n, double noise,
+			  uint64_t key, double *const *force);
+
+/*
  * Compare cuts, rendered in each way, with what was recorded. All is 0 without cuts. 0 or -ENOMEM.
  */
 int incise_realism_of(const struct incise_texture *texture,

@@ -20,6 +20,9 @@
 /* More rows tell no more of a texture; the cut with the last of them is the last one. */
 #define ROWS_MOST 4000000
 
+/* Rows within so much time count as one, their mean: 1 kHz is the rate of the loop. */
+#define APART_S 0.95e-3
+
 /* A cut is divided into so many parts, each with its ratio of forces. */
 #define PARTS 8
 
@@ -44,7 +47,8 @@ struct cuts {
 	struct own_cut *cut;
 	size_t n_cuts, most; /* the latter: capacity */
 	char name[256];	     /* of the present one */
-	double deepest, t_s;
+	double t_s, first_s; /* of the last row; of the first one of the mean */
+	double mean[CUT_COLUMNS], in_mean; /* its sums, and its rows */
 };
 
 static int no_cuts_memory(struct incise_error *err)
@@ -58,7 +62,7 @@ static bool is_held(const struct cuts *cuts, const char *name)
 	const struct incise_corpus_source *source = cuts->source;
 	const struct incise_corpus *corpus = cuts->trained->corpus;
 
-	for (int i = 0; i < incise_corpus_sources(corpus); i++) {
+	for (int i = 0; corpus && i < incise_corpus_sources(corpus); i++) {
 		const struct incise_corpus_survey *of = incise_corpus_source(corpus, i);
 		uint64_t key = incise_group_key(source->own_groups ? of->hash : "", name);
 		bool same = !strncmp(of->name, source->name, sizeof(of->name) - 1);
@@ -71,13 +75,36 @@ static bool is_held(const struct cuts *cuts, const char *name)
 	return false;
 }
 
+/* Add the mean as a row of the present cut if the front has gone on. Returns whether there is memory. */
+static bool end_mean(struct cuts *cuts)
+{
+	size_t start = cuts->n_cuts ? cuts->cut[cuts->n_cuts - 1].start : 0;
+	double n = cuts->in_mean, way = cuts->mean[CUT_WAY] / n;
+
+	cuts->in_mean = 0;
+	if (!n || (cuts->n > start && way <= cuts->column[CUT_WAY][cuts->n - 1]))
+		return true;
+	for (int i = 0; i < CUT_COLUMNS; i++) {
+		size_t capacity = cuts->capacity;
+
+		if (!grow_array(&cuts->column[i], cuts->n, &capacity, 4096, sizeof(n)))
+			return false;
+		cuts->column[i][cuts->n] = cuts->mean[i] / n;
+		if (i == CUT_COLUMNS - 1)
+			cuts->capacity = capacity;
+	}
+	cuts->n++;
+	return true;
+}
+
 static bool begin_cut(struct cuts *cuts, const char *name)
 {
-	if (!grow_array(&cuts->cut, cuts->n_cuts, &cuts->most, 64, sizeof(*cuts->cut)))
+	if (!end_mean(cuts) ||
+	    !grow_array(&cuts->cut, cuts->n_cuts, &cuts->most, 64, sizeof(*cuts->cut)))
 		return false;
 	cuts->cut[cuts->n_cuts++] = (struct own_cut){cuts->n, is_held(cuts, name)};
 	snprintf(cuts->name, sizeof(cuts->name), "%s", name);
-	cuts->deepest = cuts->t_s = -INFINITY;
+	cuts->t_s = -INFINITY;
 	return true;
 }
 
@@ -107,20 +134,13 @@ static int take_cut_row(void *user, const double *row, const char *group,
 			"their order, as incise export writes them",
 			cuts->t_s, more[TIME], group);
 	cuts->t_s = fmax(more[TIME], cuts->t_s);
-	if (!(way > cuts->deepest))
-		return 0;
-	cuts->deepest = way;
-	for (int i = 0; i < CUT_COLUMNS; i++) {
-		size_t capacity = cuts->capacity;
-
-		if (!grow_array(&cuts->column[i], cuts->n, &capacity, 4096,
-				sizeof(*values)))
-			return no_cuts_memory(err);
-		cuts->column[i][cuts->n] = values[i];
-		if (i == CUT_COLUMNS - 1)
-			cuts->capacity = capacity;
-	}
-	cuts->n++;
+	if (!(cuts->t_s - cuts->first_s < APART_S) && !end_mean(cuts))
+		return no_cuts_memory(err);
+	if (!cuts->in_mean)
+		cuts->first_s = more[TIME];
+	for (int i = 0; i < CUT_COLUMNS; i++)
+		cuts->mean[i] = (cuts->in_mean ? cuts->mean[i] : 0) + values[i];
+	cuts->in_mean++;
 	return 0;
 }
 
@@ -271,6 +291,8 @@ struct incise_texture *incise_train_texture(struct incise_train_source *sources,
 		*cuts.name = '\0';
 		watch.step.source = i;
 		rc = cuts.source->read(cuts.source->user, take_cut_row, &cuts, err);
+		if (!rc && !end_mean(&cuts))
+			rc = no_cuts_memory(err);
 	}
 	if (!rc)
 		texture = learn_cuts(&cuts, options->seed, realism, &watch, err);

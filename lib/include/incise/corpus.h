@@ -206,7 +206,7 @@ INCISE_API int incise_train_factors(const char *const *paths, int n, double ridg
  * Learn the texture of a trained model from the same sources, which need a column cut and rows in their
  * order at full rate. Not real-time safe.
  *
- * @param trained with its corpus; its first input depth_UNIT is the way, where sources have no column
+ * @param trained with its corpus, or a model alone; its first input depth_UNIT is the way, where sources have no column
  *                way_UNIT; cuts that it holds out are not learned from
  * @param options progress and seed
  * @param realism measured on the cuts that are held out; or NULL
