@@ -47,8 +47,9 @@ static const struct cli_option options[] = {
 static const struct cli_command command = {
 	.name = "plot",
 	.synopsis = "FILE [-o NAME.png] [OPTIONS]",
-	.summary = "Draw a recording, a dataset, a model (.fis, .fx), a texture (.tex), a session or a "
-		   "calibration. The kind of the file is recognised by its content.",
+	.summary =
+		"Draw a recording, a dataset, a model (.fis, .fx), a texture (.tex), a session or a "
+		"calibration. The kind of the file is recognised by its content.",
 	.options = options,
 	.examples = "incise plot liver.fis --data pairs.csv -o liver.png",
 };
@@ -131,9 +132,9 @@ static const char *window_form(void)
 static void parse_plot(struct plot_job *job, int argc, char **argv)
 {
 	cli_parse(&command, argc, argv, job);
-	job->figure.path =
-		cli_operand(argc, argv, "FILE",
-			    "recording, dataset, model, texture, session or calibration to draw");
+	job->figure.path = cli_operand(
+		argc, argv, "FILE",
+		"recording, dataset, model, texture, session or calibration to draw");
 }
 
 int main(int argc, char **argv)

@@ -3,6 +3,7 @@
  * incise train SOURCE... -o MODEL.fis: learn a fuzzy force model from recordings and CSV files,
  * and compare it with simpler predictors. incise_train_sources() has the method.
  */
+#include <errno.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -23,7 +24,7 @@ struct train_options {
 	int n_paths;
 	char *typed;	  /* the arguments, or NULL */
 	const char *data; /* for messages: the path, or the number of sources */
-	const char *model, *initial, *history, *premises, *factor;
+	const char *model, *initial, *history, *premises, *factor, *tex;
 	struct recording_rows rows;
 	long sample; /* pairs; 0: all */
 	struct shard {
@@ -134,6 +135,10 @@ static const struct cli_option option_table[] = {
 	 "write the sums of these sources for incise merge, instead of a "
 	 "model; needs --premises",
 	 CLI_OUTPUT(struct train_options, factor), .extensions = ".fac"},
+	{'o', "output", "FILE.fis.tex",
+	 "write only the texture, of the model FILE.fis that is there, for example of "
+	 "averaged pairs",
+	 CLI_OUTPUT(struct train_options, tex), .extensions = ".fis.tex"},
 	{0, "premises", "FILE",
 	 "keep the membership functions and ranges of this model (.fis); only the "
 	 "consequents are learnt",
@@ -326,16 +331,23 @@ static void parse_train(struct train_options *options, int argc, char **argv)
 	if (options->factor && options->json)
 		cli_usage("--json reports a model; leave it out with -o %s",
 			  options->factor);
+	if (options->tex &&
+	    (options->model || options->factor || options->initial || options->history ||
+	     options->premises || options->how.check > 0 || options->mpi))
+		cli_usage("-o %s writes the texture of a model that is there; leave out "
+			  "other outputs, --premises, --check and --share",
+			  options->tex);
+	options->texture |= options->tex != NULL;
 	if (options->texture && (options->factor || options->mpi))
 		cli_usage("--texture needs a model and all sources in one process; leave "
 			  "out %s",
 			  options->factor ? "-o FILE.fac" : "--share mpi");
 	if (options->texture && options->rows.rate_hz > 0)
 		cli_usage("--texture needs each sample; leave out --rate");
-	if (options->factor) {
+	if (options->factor)
 		options->how.end = INCISE_TRAIN_TO_FACTOR;
+	if (options->factor || options->tex)
 		return;
-	}
 	if (!options->model)
 		options->model = default_model(options);
 	if (!options->model || !*options->model)
@@ -986,20 +998,50 @@ static void save_factor(const struct train_options *options,
 	cli_written();
 }
 
-/* Learn the texture, if one is asked for. */
+/* Learn the texture, if one is asked for; NULL also where the model alone is as good. */
 static struct incise_texture *train_texture(const struct train_options *options,
 					    struct incise_train_source *sources,
-					    const struct incise_model *model)
+					    const struct incise_trained *trained)
 {
 	struct incise_texture *texture;
 	struct incise_error err = {0};
 
 	if (!options->texture)
 		return NULL;
-	texture = incise_train_texture(sources, options->n_paths, model,
-				       &options->how.train, &err);
+	texture = incise_train_texture(sources, options->n_paths, trained,
+				       &options->how.train, NULL, &err);
 	cli_progress_end();
+	if (!texture && err.code == EDOM) {
+		cli_warn("%s", err.text);
+		return NULL;
+	}
 	return cli_require(texture, &err);
+}
+
+/* Learn and save the texture of the model that its path names. */
+static void train_texture_alone(const struct train_options *options)
+{
+	char *path = cli_text("%.*s", (int)strlen(options->tex) - 4, options->tex);
+	struct incise_train_source *sources =
+		sources_new(options->paths, options->n_paths, &options->rows);
+	struct incise_error err = {0};
+	struct incise_trained trained = {
+		.model = cli_require(incise_model_load(path, &err), &err)};
+	struct incise_texture *texture = train_texture(options, sources, &trained);
+	json_t *report = texture_json(texture);
+
+	if (texture)
+		cli_check(incise_texture_save(texture, options->tex, &err), &err);
+	if (options->json)
+		json_print(json_incref(report));
+	else if (texture)
+		texture_print(texture);
+	cli_written();
+	json_decref(report);
+	incise_texture_free(texture);
+	incise_trained_free(&trained);
+	sources_free(sources, options->n_paths);
+	free(path);
 }
 
 static void save_model(const struct train_options *options,
@@ -1052,6 +1094,12 @@ int main(int argc, char **argv)
 	char *data;
 
 	parse_train(&options, argc, argv);
+	if (options.tex) {
+		check_writable(options.tex);
+		train_texture_alone(&options);
+		cli_finish();
+		return 0;
+	}
 	if (options.mpi)
 		join_job();
 	if (!job || !job->rank) {
@@ -1078,7 +1126,7 @@ int main(int argc, char **argv)
 	if (options.factor && trained.factor && (!job || !job->rank)) {
 		save_factor(&options, &trained);
 	} else if (trained.model) {
-		texture = train_texture(&options, sources, trained.model);
+		texture = train_texture(&options, sources, &trained);
 		save_model(&options, &trained, texture, history);
 		report_model(&options, &trained, texture);
 	}

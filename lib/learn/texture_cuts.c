@@ -11,13 +11,17 @@
 #include <stdlib.h>
 #include <string.h>
 #include <incise/corpus.h>
+#include "../base/grow.h"
 #include "../model/companion.h"
 #include "interval.h"
 #include "reader.h"
-#include "texture.h"
+#include "realism.h"
 
 /* More rows tell no more of a texture; the cut with the last of them is the last one. */
 #define ROWS_MOST 4000000
+
+/* Rows within so much time count as one, their mean: 1 kHz is the rate of the loop. */
+#define APART_S 0.95e-3
 
 /* A cut is divided into so many parts, each with its ratio of forces. */
 #define PARTS 8
@@ -25,18 +29,26 @@
 /* A part has at least such a share of the force of the mean part of its cut. */
 #define PART_LEAST 0.05
 
-/* Columns behind those of the model. */
+/* Columns behind those of the model, and of a cut. */
 enum further { WAY, TIME, COUNT, FURTHER };
+enum column { CUT_WAY, CUT_FORCE, CUT_MODEL, CUT_COLUMNS };
+
+struct own_cut {
+	size_t start; /* of its rows; they end where those of the next one start */
+	bool held;    /* it is for checking */
+};
 
 struct cuts {
-	const struct incise_model *model;
-	int n_inputs, depth;	    /* number of the input */
-	double *way, *force, *mean; /* of all rows */
+	const struct incise_trained *trained;
+	const struct incise_corpus_source *source; /* the present one */
+	int n_inputs, depth;			   /* number of the input */
+	double *column[CUT_COLUMNS];		   /* of all rows */
 	size_t n, capacity;
-	size_t *start; /* of each cut, and the end of the last one */
-	char **name;
-	int n_cuts, first; /* the latter of the present source */
-	double deepest, t_s;
+	struct own_cut *cut;
+	size_t n_cuts, most; /* the latter: capacity */
+	char name[256];	     /* of the present one */
+	double t_s, first_s; /* of the last row; of the first one of the mean */
+	double mean[CUT_COLUMNS], in_mean; /* its sums, and its rows */
 };
 
 static int no_cuts_memory(struct incise_error *err)
@@ -44,44 +56,56 @@ static int no_cuts_memory(struct incise_error *err)
 	return incise_error_set(err, ENOMEM, "no memory to learn a texture");
 }
 
-static int begin_cut(struct cuts *cuts, const char *name, struct incise_error *err)
+/* Whether the training has held out the pairs of a cut: alone, or with all of its source. */
+static bool is_held(const struct cuts *cuts, const char *name)
 {
-	size_t n = (size_t)cuts->n_cuts + 2;
-	size_t *start = realloc(cuts->start, n * sizeof(*start));
-	char **names = start ? realloc(cuts->name, n * sizeof(*names)) : NULL;
+	const struct incise_corpus_source *source = cuts->source;
+	const struct incise_corpus *corpus = cuts->trained->corpus;
 
-	cuts->start = start ? start : cuts->start;
-	cuts->name = names ? names : cuts->name;
-	if (!names || !(names[cuts->n_cuts] = strdup(name)))
-		return no_cuts_memory(err);
-	for (int i = cuts->first; i < cuts->n_cuts; i++)
-		if (!strcmp(names[i], name))
-			return incise_error_set(
-				err, EINVAL,
-				"the rows of cut %s are not together; a texture needs "
-				"them in their order, as incise export writes them",
-				name);
-	start[cuts->n_cuts++] = cuts->n;
-	cuts->deepest = cuts->t_s = -INFINITY;
-	return 0;
+	for (int i = 0; corpus && i < incise_corpus_sources(corpus); i++) {
+		const struct incise_corpus_survey *of = incise_corpus_source(corpus, i);
+		uint64_t key = incise_group_key(source->own_groups ? of->hash : "", name);
+		bool same = !strncmp(of->name, source->name, sizeof(of->name) - 1);
+
+		for (int g = 0; same && g < of->n_groups; g++)
+			if (of->groups[g].check &&
+			    (*of->group || of->groups[g].key == key))
+				return true;
+	}
+	return false;
 }
 
-static int make_room(struct cuts *cuts, struct incise_error *err)
+/* Add the mean as a row of the present cut if the front has gone on. Returns whether there is memory. */
+static bool end_mean(struct cuts *cuts)
 {
-	size_t n = cuts->capacity ? 2 * cuts->capacity : 4096;
-	double **of[] = {&cuts->way, &cuts->force, &cuts->mean};
+	size_t start = cuts->n_cuts ? cuts->cut[cuts->n_cuts - 1].start : 0;
+	double n = cuts->in_mean, way = cuts->mean[CUT_WAY] / n;
 
-	if (cuts->n < cuts->capacity)
-		return 0;
-	for (int i = 0; i < 3; i++) {
-		double *more = realloc(*of[i], n * sizeof(**of));
+	cuts->in_mean = 0;
+	if (!n || (cuts->n > start && way <= cuts->column[CUT_WAY][cuts->n - 1]))
+		return true;
+	for (int i = 0; i < CUT_COLUMNS; i++) {
+		size_t capacity = cuts->capacity;
 
-		if (!more)
-			return no_cuts_memory(err);
-		*of[i] = more;
+		if (!grow_array(&cuts->column[i], cuts->n, &capacity, 4096, sizeof(n)))
+			return false;
+		cuts->column[i][cuts->n] = cuts->mean[i] / n;
+		if (i == CUT_COLUMNS - 1)
+			cuts->capacity = capacity;
 	}
-	cuts->capacity = n;
-	return 0;
+	cuts->n++;
+	return true;
+}
+
+static bool begin_cut(struct cuts *cuts, const char *name)
+{
+	if (!end_mean(cuts) ||
+	    !grow_array(&cuts->cut, cuts->n_cuts, &cuts->most, 64, sizeof(*cuts->cut)))
+		return false;
+	cuts->cut[cuts->n_cuts++] = (struct own_cut){cuts->n, is_held(cuts, name)};
+	snprintf(cuts->name, sizeof(cuts->name), "%s", name);
+	cuts->t_s = -INFINITY;
+	return true;
 }
 
 static int take_cut_row(void *user, const double *row, const char *group,
@@ -89,49 +113,49 @@ static int take_cut_row(void *user, const double *row, const char *group,
 {
 	struct cuts *cuts = user;
 	const double *more = row + cuts->n_inputs + 1;
-	const char *name = cuts->n_cuts > cuts->first ? cuts->name[cuts->n_cuts - 1] : "";
-	double way;
-	int rc = 0;
+	double way = isnan(more[WAY]) ? row[cuts->depth] : more[WAY];
+	double values[] = {way, row[cuts->n_inputs],
+			   incise_model_eval(cuts->trained->model, row, NULL)};
+	bool other = strncmp(cuts->name, group, sizeof(cuts->name) - 1);
 
 	if (!isnan(more[COUNT]))
 		return incise_error_set(
 			err, EINVAL,
 			"its rows are means over bins (count); a texture needs each sample, "
 			"as incise export writes without --average");
-	if (cuts->n_cuts == cuts->first || strcmp(name, group)) {
-		if (cuts->n >= ROWS_MOST)
-			return 0;
-		rc = begin_cut(cuts, group, err);
-	}
-	if (!rc && more[TIME] < cuts->t_s)
+	if (other && cuts->n >= ROWS_MOST)
+		return 0;
+	if (other && !begin_cut(cuts, group))
+		return no_cuts_memory(err);
+	if (more[TIME] < cuts->t_s)
 		return incise_error_set(
 			err, EINVAL,
 			"t_s falls from %g to %g in cut %s; a texture needs the rows in "
 			"their order, as incise export writes them",
 			cuts->t_s, more[TIME], group);
-	if (!rc)
-		rc = make_room(cuts, err);
-	if (rc)
-		return rc;
 	cuts->t_s = fmax(more[TIME], cuts->t_s);
-	way = isnan(more[WAY]) ? row[cuts->depth] : more[WAY];
-	if (!(way > cuts->deepest))
-		return 0;
-	cuts->way[cuts->n] = cuts->deepest = way;
-	cuts->force[cuts->n] = row[cuts->n_inputs];
-	cuts->mean[cuts->n++] = incise_model_eval(cuts->model, row, NULL);
+	if (!(cuts->t_s - cuts->first_s < APART_S) && !end_mean(cuts))
+		return no_cuts_memory(err);
+	if (!cuts->in_mean)
+		cuts->first_s = more[TIME];
+	for (int i = 0; i < CUT_COLUMNS; i++)
+		cuts->mean[i] = (cuts->in_mean ? cuts->mean[i] : 0) + values[i];
+	cuts->in_mean++;
 	return 0;
 }
 
 /*
  * The sd of the logarithm of one factor for each cut: the part that the parts of a cut have in common, by
- * analysis of variance.
+ * analysis of variance. NaN: no memory.
  */
 static double find_variation(const struct incise_texture_cut *cuts, int n)
 {
-	struct incise_unit *unit = calloc((size_t)n, sizeof(*unit));
+	struct incise_unit *unit;
 	double mean = 0, square = 0, all = 0, within;
 
+	if (n < 2)
+		return 0;
+	unit = calloc((size_t)n, sizeof(*unit));
 	for (int i = 0; i < n && unit; i++) {
 		double force[PARTS] = {0}, model[PARTS] = {0}, sum = 0;
 
@@ -158,62 +182,68 @@ static double find_variation(const struct incise_texture_cut *cuts, int n)
 		unit[i].sum -= mean * unit[i].n;
 	square = unit ? incise_common_variance(unit, n, square - all * mean * mean,
 					       &within)
-		      : 0;
+		      : NAN;
 	free(unit);
 	/* The mean is of the same cuts. */
-	return n > 1 ? fmin(sqrt(square * n / (n - 1)), 1) : 0;
+	return isnan(square) ? NAN : fmin(sqrt(square * n / (n - 1)), 1);
 }
 
-/* The rows of the sources as cuts, and the texture of these. */
+/* The cuts that are held out, or the others; returns their number. */
+static int list_cuts(const struct cuts *cuts, bool held, struct incise_texture_cut *list)
+{
+	int n = 0;
+
+	for (size_t i = 0; i < cuts->n_cuts; i++) {
+		size_t at = cuts->cut[i].start;
+		size_t end = i + 1 < cuts->n_cuts ? cuts->cut[i + 1].start : cuts->n;
+
+		if (cuts->cut[i].held == held)
+			list[n++] = (struct incise_texture_cut){
+				cuts->column[CUT_WAY] + at, cuts->column[CUT_FORCE] + at,
+				cuts->column[CUT_MODEL] + at, end - at};
+	}
+	return n;
+}
+
+/* The rows of the sources as cuts, the texture of these, and of those held out how alike it is. */
 static struct incise_texture *learn_cuts(const struct cuts *cuts, uint64_t seed,
+					 struct incise_realism *realism,
 					 struct incise_watch *watch,
 					 struct incise_error *err)
 {
-	size_t n = (size_t)cuts->n_cuts;
-	struct incise_texture_cut *list = calloc(n + 1, sizeof(*list));
+	struct incise_texture_cut *list = calloc(cuts->n_cuts + 1, sizeof(*list));
 	struct incise_texture *texture = NULL;
 	double length = 0;
+	int n;
 
 	if (!list)
 		return no_cuts_memory(err), NULL;
-	for (size_t i = 0; i < n; i++) {
-		size_t at = cuts->start[i],
-		       end = i + 1 < n ? cuts->start[i + 1] : cuts->n;
-
-		list[i] = (struct incise_texture_cut){cuts->way + at, cuts->force + at,
-						      cuts->mean + at, end - at};
-		if (end > at)
-			length += cuts->way[end - 1] - cuts->way[at];
-	}
-	texture = incise_texture_learn(list, (int)n, seed, watch, err);
+	n = list_cuts(cuts, false, list);
+	for (int i = 0; i < n; i++)
+		if (list[i].n)
+			length += list[i].way[list[i].n - 1] - list[i].way[0];
+	texture = incise_texture_learn(list, n, seed, watch, err);
 	if (texture) {
-		texture->checksum = incise_model_checksum(cuts->model);
+		texture->checksum = incise_model_checksum(cuts->trained->model);
 		texture->info.length = length;
-		texture->info.variation = find_variation(list, (int)n);
+		texture->info.variation = find_variation(list, n);
+	}
+	if (texture &&
+	    (isnan(texture->info.variation) ||
+	     (realism && incise_realism_of(texture, list, list_cuts(cuts, true, list),
+					   seed, realism)))) {
+		incise_texture_free(texture);
+		texture = NULL;
+		no_cuts_memory(err);
 	}
 	free(list);
 	return texture;
 }
 
-static int read_cuts(struct cuts *cuts, struct incise_reader *sources, int n,
-		     struct incise_watch *watch, struct incise_error *err)
-{
-	int rc = 0;
-
-	for (int i = 0; i < n && !rc; i++) {
-		struct incise_corpus_source *source = &sources[i].corpus;
-
-		watch->step.source = i;
-		cuts->first = cuts->n_cuts;
-		rc = source->read(source->user, take_cut_row, cuts, err);
-	}
-	return rc;
-}
-
 /* The unit of the way, by the name of a depth; NULL with an error: there is none. */
 static const char *find_depth(struct cuts *cuts, struct incise_error *err)
 {
-	const struct incise_model_info *info = incise_model_info(cuts->model);
+	const struct incise_model_info *info = incise_model_info(cuts->trained->model);
 
 	for (; cuts->depth < info->n_inputs; cuts->depth++)
 		if (!strncmp(info->input[cuts->depth].name, "depth_", 6))
@@ -224,11 +254,12 @@ static const char *find_depth(struct cuts *cuts, struct incise_error *err)
 }
 
 struct incise_texture *incise_train_texture(struct incise_train_source *sources, int n,
-					    const struct incise_model *model,
+					    const struct incise_trained *trained,
 					    const struct incise_train_options *options,
+					    struct incise_realism *realism,
 					    struct incise_error *err)
 {
-	const struct incise_model_info *info = incise_model_info(model);
+	const struct incise_model_info *info = incise_model_info(trained->model);
 	struct incise_watch watch = incise_watch_of(options);
 	const char *columns[INCISE_MODEL_INPUTS_MAX + 1 + FURTHER];
 	struct incise_reading reading = {.columns = columns,
@@ -237,7 +268,7 @@ struct incise_texture *incise_train_texture(struct incise_train_source *sources,
 					 .where = "advancing",
 					 .cost = 5e3,
 					 .watch = &watch};
-	struct cuts cuts = {.model = model, .n_inputs = info->n_inputs};
+	struct cuts cuts = {.trained = trained, .n_inputs = info->n_inputs};
 	const char *unit = find_depth(&cuts, err);
 	struct incise_texture *texture = NULL;
 	struct incise_reader *readers;
@@ -254,21 +285,25 @@ struct incise_texture *incise_train_texture(struct incise_train_source *sources,
 	       FURTHER * sizeof(*columns));
 	watch.step = (struct incise_train_step){.phase = INCISE_TRAIN_ADD, .sources = n};
 	readers = incise_readers_new(sources, n, "cut", &reading);
-	rc = readers ? read_cuts(&cuts, readers, n, &watch, err) : no_cuts_memory(err);
+	rc = readers ? 0 : no_cuts_memory(err);
+	for (int i = 0; i < n && !rc; i++) {
+		cuts.source = &readers[i].corpus;
+		*cuts.name = '\0';
+		watch.step.source = i;
+		rc = cuts.source->read(cuts.source->user, take_cut_row, &cuts, err);
+		if (!rc && !end_mean(&cuts))
+			rc = no_cuts_memory(err);
+	}
 	if (!rc)
-		texture = learn_cuts(&cuts, options->seed, &watch, err);
+		texture = learn_cuts(&cuts, options->seed, realism, &watch, err);
 	if (texture)
 		snprintf(texture->unit, sizeof(texture->unit), "%.15s", unit);
 	if (watch.stopped)
 		incise_error_set(err, ECANCELED, "training was stopped");
 	rc = texture ? 0 : errno;
-	for (int i = 0; i < cuts.n_cuts; i++)
-		free(cuts.name[i]);
-	free(cuts.name);
-	free(cuts.start);
-	free(cuts.way);
-	free(cuts.force);
-	free(cuts.mean);
+	for (int i = 0; i < CUT_COLUMNS; i++)
+		free(cuts.column[i]);
+	free(cuts.cut);
 	incise_readers_free(readers, n);
 	errno = rc;
 	return texture;

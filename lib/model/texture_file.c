@@ -18,28 +18,29 @@
 #define fail incise_lines_error
 
 /* Lines of numbers, in their order, each within its range. */
-#define INFO(key, member, n, least, most)                                         \
-	{                                                                         \
-		key, offsetof(struct incise_texture_info, member), n, least, most \
+#define FIELD(key, member, n, least, most)                                   \
+	{                                                                    \
+		key, offsetof(struct incise_texture, member), n, least, most \
 	}
-#define LOOK(key, of)                                                               \
-	INFO(key "-rate", of.rate, 1, 0, 1e9), INFO(key "-rms", of.rms, 1, 0, 1e9), \
-		INFO(key "-drops", of.drop, INCISE_TEXTURE_DECILES, 0, 1e9),        \
-		INFO(key "-octaves", of.octave, INCISE_TEXTURE_OCTAVES, -1e3, 1e3)
+#define LOOK(key, of)                                                                 \
+	FIELD(key "-rate", of.rate, 1, 0, 1e9), FIELD(key "-rms", of.rms, 1, 0, 1e9), \
+		FIELD(key "-drops", of.drop, INCISE_TEXTURE_DECILES, 0, 1e9),         \
+		FIELD(key "-octaves", of.octave, INCISE_TEXTURE_OCTAVES, -1e3, 1e3)
 
 static const struct {
 	const char *key;
-	size_t at; /* in the info */
+	size_t at; /* in the texture */
 	int n;
 	double least, most;
 } fields[] = {
-	INFO("most", most, 1, 0, (double)INCISE_TEXTURE_MOST / INCISE_TEXTURE_ONE),
-	INFO("variation", variation, 1, 0, 1),
-	INFO("cycles", up_to_cycles, 1, 0, 1e9),
-	INFO("length", length, 1, 0, 1e12),
-	INFO("error", error, 2, 0, 1e3),
-	LOOK("recorded", recorded),
-	LOOK("rendered", rendered),
+	FIELD("most", info.most, 1, 0, (double)INCISE_TEXTURE_MOST / INCISE_TEXTURE_ONE),
+	FIELD("variation", info.variation, 1, 0, 1),
+	FIELD("cycles", info.up_to_cycles, 1, 0, 1e9),
+	FIELD("length", info.length, 1, 0, 1e12),
+	FIELD("error", info.error, 2, 0, 1e3),
+	LOOK("recorded", info.recorded),
+	LOOK("rendered", info.rendered),
+	FIELD("step", step, 1, 1. / 256, 16),
 };
 
 #define FIELDS (sizeof(fields) / sizeof(*fields))
@@ -47,7 +48,7 @@ static const struct {
 static int read_fields(struct incise_lines *in, struct incise_texture *texture)
 {
 	for (size_t i = 0; i < FIELDS; i++) {
-		double *to = (double *)((char *)&texture->info + fields[i].at);
+		double *to = (double *)((char *)texture + fields[i].at);
 		int rc = incise_companion_numbers(in, fields[i].key, to, fields[i].n);
 
 		for (int k = 0; k < fields[i].n && !rc; k++)
@@ -61,30 +62,6 @@ static int read_fields(struct incise_lines *in, struct incise_texture *texture)
 	return 0;
 }
 
-/* Read the curves into room for so many points, of which as many are left. */
-static int read_curves(struct incise_lines *in, struct incise_texture *texture, int left)
-{
-	double *to = texture->point, most = texture->info.most;
-	long n;
-	int rc = 0;
-
-	for (int i = 0; i < texture->n_curves && !rc; i++) {
-		rc = incise_companion_whole(in, "curve", 2, left, &n);
-		if (!rc)
-			rc = incise_companion_row(in, to, (int)n);
-		for (int k = 0; k < n && !rc; k++)
-			if (fabs(to[k]) > most)
-				rc = fail(in, EINVAL, "%g is beyond the most, %g", to[k],
-					  most);
-		texture->n[i] = (int)n;
-		to += n;
-		left -= (int)n;
-	}
-	return !rc && left
-		       ? fail(in, EINVAL, "points: %d more than the curves have", left)
-		       : rc;
-}
-
 /* The line "KEY N" into an int. */
 static int read_count(struct incise_lines *in, const char *key, long least, long most,
 		      int *to)
@@ -96,10 +73,42 @@ static int read_count(struct incise_lines *in, const char *key, long least, long
 	return rc;
 }
 
+static int read_curves(struct incise_lines *in, struct incise_texture *texture)
+{
+	double most = texture->info.most * INCISE_TEXTURE_ONE;
+	int points = 0, rc = 0;
+
+	texture->n = calloc((size_t)texture->n_curves, sizeof(*texture->n));
+	if (!texture->n)
+		return fail(in, ENOMEM, "no memory to read it");
+	for (int i = 0; i < texture->n_curves && !rc; points += texture->n[i++]) {
+		int left = INCISE_TEXTURE_POINTS - points;
+		double *more;
+
+		rc = read_count(in, "curve", 2,
+				left < INCISE_TEXTURE_PIECE ? left : INCISE_TEXTURE_PIECE,
+				&texture->n[i]);
+		if (rc)
+			return rc;
+		more = reallocarray(texture->point, (size_t)(points + texture->n[i]),
+				    sizeof(*more));
+		if (!more)
+			return fail(in, ENOMEM, "no memory to read it");
+		texture->point = more;
+		rc = incise_companion_row(in, more + points, texture->n[i]);
+		for (int k = points; k < points + texture->n[i] && !rc; k++)
+			if (fabs(more[k]) > most || more[k] != rint(more[k]))
+				rc = fail(in, EINVAL,
+					  "%g is not a whole number up to the most, %g",
+					  more[k], most);
+	}
+	return rc ? rc : incise_companion_end(in);
+}
+
 static int read_texture_file(struct incise_lines *in, struct incise_texture *texture)
 {
 	struct incise_texture_info *info = &texture->info;
-	int rc = incise_companion_head(in, KIND, VERSION, &texture->checksum), points;
+	int rc = incise_companion_head(in, KIND, VERSION, &texture->checksum);
 	char *unit = rc ? NULL : incise_companion_value(in, "way");
 	long seed = 0;
 
@@ -118,22 +127,9 @@ static int read_texture_file(struct incise_lines *in, struct incise_texture *tex
 	if (!rc)
 		rc = read_fields(in, texture);
 	if (!rc)
-		rc = incise_companion_numbers(in, "step", &texture->step, 1);
-	if (!rc && !(texture->step > 0))
-		rc = fail(in, EINVAL, "step: expected a number above 0");
-	if (!rc)
 		rc = read_count(in, "curves", 1, INCISE_TEXTURE_CURVES,
 				&texture->n_curves);
-	if (!rc)
-		rc = read_count(in, "points", 2, INCISE_TEXTURE_POINTS, &points);
-	if (rc)
-		return rc;
-	texture->n = calloc((size_t)texture->n_curves, sizeof(*texture->n));
-	texture->point = calloc((size_t)points, sizeof(*texture->point));
-	if (!texture->n || !texture->point)
-		return fail(in, ENOMEM, "no memory to read it");
-	rc = read_curves(in, texture, points);
-	return rc ? rc : incise_companion_end(in);
+	return rc ? rc : read_curves(in, texture);
 }
 
 struct incise_texture *incise_texture_load(const char *path,
@@ -171,7 +167,6 @@ int incise_texture_save(const struct incise_texture *texture, const char *path,
 	struct incise_outfile *file = incise_outfile_open(path, err);
 	const double *point = texture->point;
 	struct incise_c_locale locale;
-	int points = 0;
 	FILE *out;
 
 	if (!file)
@@ -184,15 +179,13 @@ int incise_texture_save(const struct incise_texture *texture, const char *path,
 		VERSION, texture->checksum, texture->unit, info->seed, info->n_cuts,
 		info->n_events);
 	for (size_t i = 0; i < FIELDS; i++) {
-		const double *from = (const double *)((const char *)info + fields[i].at);
+		const double *from =
+			(const double *)((const char *)texture + fields[i].at);
 
 		fprintf(out, "%s ", fields[i].key);
 		incise_companion_write_row(out, from, fields[i].n);
 	}
-	for (int i = 0; i < texture->n_curves; i++)
-		points += texture->n[i];
-	fprintf(out, "step %.17g\ncurves %d\npoints %d\n", texture->step,
-		texture->n_curves, points);
+	fprintf(out, "curves %d\n", texture->n_curves);
 	for (int i = 0; i < texture->n_curves; point += texture->n[i++]) {
 		fprintf(out, "curve %d\n", texture->n[i]);
 		incise_companion_write_row(out, point, texture->n[i]);

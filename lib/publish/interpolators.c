@@ -491,8 +491,11 @@ static void set_history(const struct incise_blade_pose *blade, int64_t t_ns, dou
 	value->mean_speed_mm_s = both ? mix_interpolators(before->mean_speed_mm_s,
 							  after->mean_speed_mm_s, share)
 				      : of->mean_speed_mm_s;
-	value->way_mm = both ? mix_interpolators(before->way_mm, after->way_mm, share)
-			     : of->way_mm;
+	/* The record after the end of a cut starts again. */
+	value->way_mm =
+		both ? fmax(mix_interpolators(before->way_mm, after->way_mm, share),
+			    before->way_mm)
+		     : of->way_mm;
 	value->deepest_mm = fmax(of == before || before->began_ns == after->began_ns
 					 ? before->deepest_mm
 					 : 0,

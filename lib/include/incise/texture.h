@@ -22,8 +22,9 @@ INCISE_BEGIN_DECLS
 
 struct incise_texture;
 
-/** Octaves of a spectrum, and deciles of drops. */
+/** Octaves of a spectrum. */
 #define INCISE_TEXTURE_OCTAVES 4
+/** Deciles of drops. */
 #define INCISE_TEXTURE_DECILES 9
 
 /** Points of a tape. */
@@ -44,11 +45,12 @@ struct incise_texture_info {
 	const char *unit; /**< of the way: "mm", "deg" …; valid as long as the texture */
 	uint64_t seed;	  /**< of its learning */
 	double most;	  /**< largest |τ|, 0 … 0.9 */
-	double variation; /**< sd of the logarithm of a cut's factor, ≥ 0 */
+	double variation;     /**< sd of the logarithm of a cut's factor, ≥ 0 */
 	double up_to_cycles;  /**< per unit of the way: half of the recordings' rate */
 	int n_cuts, n_events; /**< that it was learned from */
 	double length;	      /**< of their way, all together */
-	double error[2]; /**< cross-validated distance of spectra in dB: without, with texture */
+	double error
+		[2]; /**< cross-validated distance of spectra in dB: without, with texture */
 	/** The same cuts, as recorded, and rendered by a texture of other cuts. */
 	struct incise_texture_look recorded, rendered;
 };
@@ -77,6 +79,7 @@ INCISE_API int incise_texture_save(const struct incise_texture *texture, const c
 /** NULL is accepted. */
 INCISE_API void incise_texture_free(struct incise_texture *texture);
 
+/** The numbers of a texture; the unit is valid as long as it. */
 INCISE_API void incise_texture_info(const struct incise_texture *texture,
 				    struct incise_texture_info *info);
 

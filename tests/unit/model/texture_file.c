@@ -93,6 +93,8 @@ TEST(test_round_trip)
 		assert_int_equal(incise_texture_save(a, path, &err), 0);
 		text = read_all(&size);
 		b = incise_texture_load(path, NULL, &err);
+		if (!b)
+			print_error("%s\n", err.text);
 		assert_non_null(b);
 		incise_texture_info(a, &x);
 		incise_texture_info(b, &y);
@@ -135,7 +137,7 @@ static const char good[] =
 	"recorded-rate 1\nrecorded-rms 0.1\nrecorded-drops 1 2 3 4 5 6 7 8 9\n"
 	"recorded-octaves -1 -2 -3 -4\nrendered-rate 1\nrendered-rms 0.1\n"
 	"rendered-drops 1 2 3 4 5 6 7 8 9\nrendered-octaves -1 -2 -3 -4\n\nstep 0.1\n"
-	"curves 2\npoints 5\ncurve 3\n0 0.25 -0.5\ncurve 2\n0.125 0\n";
+	"curves 2\ncurve 3\n0 0.25 -0.5\ncurve 2\n0.125 0\n";
 
 static const struct {
 	const char *from, *to, *line; /* of the error */
@@ -168,18 +170,15 @@ static const struct {
 	{"step 0.1", "step x", ":22"},
 	{"curves 2", "curves 0", ":23"},
 	{"curves 2", "curves 16385", ":23"},
-	{"curves 2", "curves 3", ":28"},
+	{"curves 2", "curves 3", ":27"},
 	{"curves 2", "curves 1", ":26"},
-	{"points 5", "points 4", ":27"},
-	{"points 5", "points 6", ":28"},
-	{"points 5", "points 262145", ":24"},
-	{"curve 3", "curve 1", ":25"},
-	{"curve 3", "curve 2", ":26"},
-	{"curve 3", "curve 4", ":26"},
-	{"curve 3", "curve 6", ":25"},
-	{"0.25", "0.75", ":26"},
-	{"0.125 0\n", "", ":27"},
-	{"0.125 0\n", "0.125 0\n0\n", ":29"},
+	{"curve 3", "curve 1", ":24"},
+	{"curve 3", "curve 2", ":25"},
+	{"curve 3", "curve 4", ":25"},
+	{"curve 3", "curve 300000", ":24"},
+	{"0.25", "0.75", ":25"},
+	{"0.125 0\n", "", ":26"},
+	{"0.125 0\n", "0.125 0\n0\n", ":28"},
 };
 
 TEST(test_damage_is_refused)
