@@ -57,7 +57,10 @@ static size_t count_points(const struct incise_texture_cut *part, double step)
 	return (size_t)fmin(n, (double)(POINTS_PER_ROW * part->n));
 }
 
-/* τ of part of a cut at each step; returns the number of points. */
+/*
+ * τ of part of a cut at each step, that of the nearest row: means of rows would make falls less steep. Returns
+ * the number of points.
+ */
 static size_t find_tau(struct learning *learning, const struct incise_texture_cut *cut)
 {
 	struct incise_texture_cut part = incise_look_part(cut, learning->sum);
@@ -67,15 +70,11 @@ static size_t find_tau(struct learning *learning, const struct incise_texture_cu
 	for (size_t i = 0; i < part.n; i++)
 		least = fmax(least, MODEL_LEAST * part.model[i]);
 	for (size_t i = 0; i < n; i++) {
-		double at = part.way[0] + (double)i * learning->step, share, model;
+		double at = part.way[0] + (double)i * learning->step;
 
-		while (row + 2 < part.n && part.way[row + 1] <= at)
+		while (row + 1 < part.n && part.way[row + 1] - at < at - part.way[row])
 			row++;
-		share = (at - part.way[row]) / (part.way[row + 1] - part.way[row]);
-		model = part.model[row] + share * (part.model[row + 1] - part.model[row]);
-		tau[i] =
-			part.force[row] + share * (part.force[row + 1] - part.force[row]);
-		tau[i] /= fmax(model, least);
+		tau[i] = part.force[row] / fmax(part.model[row], least);
 		mean += tau[i] / (double)n;
 	}
 	if (!(mean > 0))
@@ -110,7 +109,7 @@ static void add_piece(struct incise_texture *texture, size_t *points, const doub
 	    texture->n_curves == INCISE_TEXTURE_CURVES)
 		return;
 	for (size_t i = 0; i < n; i++) {
-		double point = rint(gain * tau[i] * INCISE_TEXTURE_ONE);
+		double point = rint(gain * tau[i] * INCISE_TEXTURE_ONE) + 0.0;
 
 		point = fmax(-TAU_MOST, fmin(point, TAU_MOST));
 		texture->point[(*points)++] = point;
