@@ -51,10 +51,11 @@ static struct incise_plan *textured(struct incise_scene **scene,
 	struct incise_plan *plan;
 	char text[300];
 
-	snprintf(text, sizeof(text),
-		 "model = \"m.%s\"; arithmetic = \"%s\"; tissue = { unloading_N_mm = 0.3; "
-		 "};\nlimits = { slew_N_s = %.1f; };\n",
-		 strcmp(arithmetic, "fixed") ? "fis" : "fx", arithmetic, slew_N_s);
+	snprintf(
+		text, sizeof(text),
+		"model = \"m.%s\"; arithmetic = \"%s\"; tissue = { unloading_N_mm = 0.3; "
+		"};\nlimits = { slew_N_s = %.1f; };\n",
+		strcmp(arithmetic, "fixed") ? "fis" : "fx", arithmetic, slew_N_s);
 	*scene = fed_scene(&folder, text, &err);
 	succeeds(*scene);
 	(*scene)->unchecked = true;
@@ -178,8 +179,8 @@ TEST(test_share_that_is_felt)
 			run(plan, force_N);
 			assert_true(incise_plan_texture(plan, &texture));
 			felt = incise_plan_texture_felt(plan);
-			if (!i && !(fabs(felt - 1) < 1e-6 &&
-				    fabs(texture.follows - 1) < 1e-6))
+			if (!i &&
+			    !(fabs(felt - 1) < 1e-6 && fabs(texture.follows - 1) < 1e-6))
 				fail_msg("%s: %.9g is felt, %.9g can be", arithmetics[k],
 					 felt, texture.follows);
 			if (!(felt < last))
@@ -208,8 +209,8 @@ TEST(test_a_scene_is_refused_by_its_largest_factor)
 	succeeds(scene);
 	incise_scene_leave_texture_out(scene);
 	scene->texture = teeth(0.4, 2.5);
-	assert_error(incise_plan_new_fed(scene, &tracker, &err), EDOM, &err, "liver.scene",
-		     "not stable", words, "leave out its texture");
+	assert_error(incise_plan_new_fed(scene, &tracker, &err), EDOM, &err,
+		     "liver.scene", "not stable", words, "leave out its texture");
 	scene->tissue.gain = atof(strstr(err.text, words) + strlen(words));
 	assert_true(scene->tissue.gain > 0.2 && scene->tissue.gain < 1);
 	plan = incise_plan_new_fed(scene, &tracker, &err);
