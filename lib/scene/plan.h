@@ -67,7 +67,7 @@ struct incise_doubles {
 };
 
 /* Stages besides forces; those that no loop has are always left out. */
-#define INCISE_PLAN_OTHER_STAGES 11
+#define INCISE_PLAN_OTHER_STAGES 12
 #define INCISE_PLAN_NO_STAGES 2
 _Static_assert(INCISE_PLAN_OTHER_STAGES + INCISE_FORCES <= INCISE_PLAN_STAGES_MAX,
 	       "raise INCISE_PLAN_STAGES_MAX");
@@ -149,7 +149,8 @@ struct incise_plan {
 	bool accounts;			  /* for the work of its forces */
 	const struct incise_model *model; /* fuzzy: one of these */
 	const struct incise_fixed *fixed;
-	struct incise_fixed *own_fixed; /* compiled here */
+	struct incise_fixed *own_fixed;		    /* compiled here */
+	const struct incise_fixed_texture *texture; /* of the cut, checked, or NULL */
 	struct incise_acting_force acting[INCISE_FORCES];
 	const struct incise_fixed_texture *texture; /* the scene's, of a cut, or NULL */
 	struct incise_felt felt;

@@ -70,7 +70,7 @@ setup() {
 	incise plan wall.scene --full --json >all.json
 	[ "$(key few.json kept)" = '["pose","predict","contact","reaction","start","limit"]' ]
 	stages=$(sqlite3 :memory: "SELECT group_concat(value) FROM json_each(readfile('all.json'), '\$.kept')")
-	[[ "$stages" == pose,predict,tool,contact,normal,incision,membrane,reaction,plane,*,start,work,limit ]]
+	[[ "$stages" == pose,predict,tool,contact,normal,incision,membrane,texture,reaction,plane,*,start,work,limit ]]
 	# what is left out of a full plan is no stage of a loop without a stepper
 	left=$(sqlite3 :memory: "SELECT group_concat(json_extract(value, '\$.stage'))
 		FROM json_each(readfile('all.json'), '\$.left_out')")

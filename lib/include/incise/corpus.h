@@ -211,7 +211,8 @@ INCISE_API int incise_train_factors(const char *const *paths, int n, double ridg
  * @param options progress and seed
  * @param realism measured on the cuts that are held out; or NULL
  * @return texture, to be freed with incise_texture_free(); NULL with errno EINVAL (no such input or column,
- *         rows that are means or out of order), ENODATA (too few events), ECANCELED (by the progress),
+ *         rows that are means or out of order), ENODATA (too few events), EDOM (none is better
+ *         than the model alone, which realism is of then), ECANCELED (by the progress),
  *         ENOMEM, or one of the sources
  */
 INCISE_API struct incise_texture *incise_train_texture(
