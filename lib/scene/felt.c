@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The share of a texture that a hand feels. The force that acts is a sum of three parts, by least squares over ticks
- * at which the blade cuts new tissue,
+ * The share of a texture that acts on a hand: of the forces at ticks at which the blade cuts new tissue, by least squares,
  *
  *   acting = a + b · mean + share · texture
  *
- * where mean + texture is the force that the tissue asks for: 1 if all of it acts at once, 0 if none does. Neither an
- * actuator that is not along the normal nor a ramp of the force counts, as both act on the mean as well.
+ * with the model's force and its texture as they are before the front: a share of 1 is all of it, at once. Neither an
+ * actuator aside of the normal nor a ramp of the force counts, as both act on the mean as well.
  */
 #include <math.h>
 #include "../base/vector.h"
@@ -43,19 +42,15 @@ double incise_felt_share(const struct incise_felt *felt)
 }
 
 void incise_plan_feel(struct incise_plan *plan, const struct incise_tick *tick,
-		      const double force_N[3], double size_N, double texture)
+		      double mean_N, double texture_N)
 {
-	double all_N = v3_dot(force_N, tick->normal), acting_N[3];
-	double texture_N = size_N * texture / (1 + texture);
+	double acting_N[3];
 
-	v3_copy(acting_N, plan->last_N);
-	if (plan->axes.n)
-		v3_copy(acting_N, (const double[3]){0});
+	v3_copy(acting_N, plan->axes.n ? (const double[3]){0} : plan->last_N);
 	for (int i = 0; i < plan->axes.n; i++)
 		v3_add(acting_N, acting_N, tick->rendered_N[i],
 		       plan->axes.axis[i].direction);
-	incise_felt_add(&plan->felt, all_N - texture_N, texture_N,
-			v3_dot(acting_N, tick->normal));
+	incise_felt_add(&plan->felt, mean_N, texture_N, v3_dot(acting_N, tick->normal));
 }
 
 double incise_plan_texture_felt(const struct incise_plan *plan)

@@ -103,7 +103,6 @@ struct incise_plan_kernel {
 /* Sums of 1, a mean force, its texture and the force that acts, times each other. */
 struct incise_felt {
 	double sum[4][4];
-	double way_mm; /* of the front when the last one was added */
 };
 
 struct incise_plan {
@@ -152,7 +151,6 @@ struct incise_plan {
 	struct incise_fixed *own_fixed;		    /* compiled here */
 	const struct incise_fixed_texture *texture; /* of the cut, checked, or NULL */
 	struct incise_acting_force acting[INCISE_FORCES];
-	const struct incise_fixed_texture *texture; /* the scene's, of a cut, or NULL */
 	struct incise_felt felt;
 
 	struct incise_doubles doubles;	  /* by all of the above */
@@ -209,13 +207,9 @@ double incise_plan_texture_most(const struct incise_plan *plan);
 /* Fill in the plan in double, by all that was found of the scene. */
 void incise_plan_set_numbers(struct incise_plan *plan);
 
-/*
- * Take a tick of new tissue in: its force, the size of its model's part, and @texture, τ. incise_plan_texture_felt() has
- * the result.
- */
+/* Take in a tick of new tissue: its model's force and the texture of that, which are along the normal. */
 void incise_plan_feel(struct incise_plan *plan, const struct incise_tick *tick,
-		      const double force_N[3], double size_N,
-		      double texture) INCISE_REALTIME;
+		      double mean_N, double texture_N) INCISE_REALTIME;
 
 /* Add a tick; the share of the texture that acts, NaN: not known. */
 void incise_felt_add(struct incise_felt *felt, double mean_N, double texture_N,

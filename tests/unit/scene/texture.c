@@ -53,7 +53,7 @@ static struct incise_plan *textured(struct incise_scene **scene,
 
 	snprintf(
 		text, sizeof(text),
-		"model = \"m.%s\"; arithmetic = \"%s\"; tissue = { unloading_N_mm = 0.3; "
+		"model = \"m.%s\"; arithmetic = \"%s\"; tissue = { unloading_N_mm = 2.0; "
 		"};\nlimits = { slew_N_s = %.1f; };\n",
 		strcmp(arithmetic, "fixed") ? "fis" : "fx", arithmetic, slew_N_s);
 	*scene = fed_scene(&folder, text, &err);
@@ -179,8 +179,9 @@ TEST(test_share_that_is_felt)
 			run(plan, force_N);
 			assert_true(incise_plan_texture(plan, &texture));
 			felt = incise_plan_texture_felt(plan);
+			/* In the first micrometres the front's force is yet below the model's. */
 			if (!i &&
-			    !(fabs(felt - 1) < 1e-6 && fabs(texture.follows - 1) < 1e-6))
+			    !(fabs(felt - 1) < 1e-3 && fabs(texture.follows - 1) < 1e-6))
 				fail_msg("%s: %.9g is felt, %.9g can be", arithmetics[k],
 					 felt, texture.follows);
 			if (!(felt < last))
