@@ -50,6 +50,12 @@ shows() {
 	! grep -q residual texts
 	# a curve for each function: 5 over the depth and 4 over the velocity
 	[ "$(grep -cxE '(very )?(shallow|medium|deep|slow|fast)' texts)" = 9 ]
+	# both intervals; no calibration of a rig is stated, and degrees have their unit
+	shows "a new cut" "the mean of all cuts" "95 % intervals; other inputs at the middle of their support"
+	sed '1s/_mm/_deg/g' pairs.csv >deg.csv
+	incise train deg.csv --inputs depth_deg,velocity_deg_s -o deg.fis >/dev/null 2>&1
+	draws deg.fis
+	shows "depth / °" "velocity / (°/s)"
 }
 
 @test "residuals are those of incise eval" {
