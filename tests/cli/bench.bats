@@ -127,10 +127,8 @@ setup() {
 	echo "{\"figures\": [{$good}]}" >good.json
 	try() {
 		printf '%s' "$1" >bad.json
-		run --separate-stderr incise bench compare bad.json good.json
-		failed_with bad.json "$2"
-		run --separate-stderr incise bench compare good.json bad.json
-		failed_with bad.json "$2"
+		fails incise bench compare bad.json good.json -- bad.json "$2"
+		fails incise bench compare good.json bad.json -- bad.json "$2"
 	}
 	try '' "not JSON"
 	try '{' "not JSON"
@@ -153,25 +151,20 @@ setup() {
 	try '{"figures": [{"name": "x", "unit": "s", "kind": "time", "value": 1}]}' "'yardsticks' is missing"
 	try "{\"figures\": [{$good}, {$good}]}" "'x' occurs twice"
 	try '{"figures": [{"name": "y", "unit": "N", "kind": "exact", "value": 1}]}' "no metric in common"
-	run --separate-stderr incise bench compare good.json none.json
-	failed_with none.json "No such file"
-	run --separate-stderr incise bench compare . good.json
-	failed_with "."
-	run --separate-stderr incise bench compare good.json /dev/zero
-	failed_with "/dev/zero: not a regular file"
+	fails incise bench compare good.json none.json -- none.json "No such file"
+	fails incise bench compare . good.json -- "."
+	fails incise bench compare good.json /dev/zero -- "/dev/zero: not a regular file"
 	# Short, and a gibibyte once it is read.
 	{ echo '[{}'; yes ',{}' | head -n 4000000 | tr -d '\n'; echo ']'; } >many.json
 	(
 		ulimit -v 500000
-		run --separate-stderr incise bench compare good.json many.json
-		failed_with "many.json: out of memory"
+		fails incise bench compare good.json many.json -- "many.json: out of memory"
 	)
 	echo "{\"quick\": true, \"figures\": [{$good}]}" >quick.json
 	echo "{\"quick\": false, \"figures\": [{$good}]}" >full.json
 	run --separate-stderr incise bench compare quick.json full.json
 	failed_with "quick.json was made with --quick and full.json was not"
-	run --separate-stderr incise bench compare good.json
-	bad_usage "'compare' and two reports"
+	misused incise bench compare good.json -- "'compare' and two reports"
 	run --separate-stderr incise bench compare good.json good.json --quick
 	bad_usage "'compare' takes no option but --json"
 }
@@ -187,10 +180,8 @@ setup() {
 	[ "$(key both.json quick)" = 1 ]
 	# said before the work
 	echo '{}' >bad.json
-	run --separate-stderr incise bench training --against bad.json
-	failed_with bad.json "no metrics"
-	run --separate-stderr incise bench training --against r.json --load cpu
-	bad_usage "--load"
+	fails incise bench training --against bad.json -- bad.json "no metrics"
+	misused incise bench training --against r.json --load cpu -- "--load"
 }
 
 @test "bench precision lists what fails, and why" {
@@ -246,11 +237,9 @@ setup() {
 	incise bench precision m.fis --quick --json >r.json
 	[ "$(key r.json rules)" = 20 ]
 	holds "$(row r.json fixed_table max_error_N) < 1e-4"
-	run --separate-stderr incise bench precision none.fis
-	failed_with none.fis
+	fails incise bench precision none.fis -- none.fis
 	incise train pairs.csv --search type=gbellmf -o bell.fis 2>/dev/null
-	run --separate-stderr incise bench precision bell.fis
-	failed_with gbellmf
+	fails incise bench precision bell.fis -- gbellmf
 }
 
 @test "bench precision measures a model of one input" {
@@ -264,17 +253,12 @@ setup() {
 }
 
 @test "bench: bad usage" {
-	run --separate-stderr incise bench
-	bad_usage "'precision'"
-	run --separate-stderr incise bench nothing
-	bad_usage "unknown benchmark 'nothing'"
-	run --separate-stderr incise bench presision
-	bad_usage "unknown benchmark 'presision'; did you mean 'precision'?"
-	run --separate-stderr incise bench precision a b
-	bad_usage "'precision' takes at most 1 operand, got 2"
+	misused incise bench -- "'precision'"
+	misused incise bench nothing -- "unknown benchmark 'nothing'"
+	misused incise bench presision -- "unknown benchmark 'presision'; did you mean 'precision'?"
+	misused incise bench precision a b -- "'precision' takes at most 1 operand, got 2"
 	for name in "" -a - a/ a/.png "a'b" 'a;b' '$(id)' 'a b'; do
-		run --separate-stderr incise bench precision --quick -o "$name"
-		bad_usage "--output"
+		misused incise bench precision --quick -o "$name" -- "--output"
 	done
 }
 
@@ -397,14 +381,11 @@ in_order() {
 
 @test "bench loop: bad usage" {
 	run -2 --separate-stderr incise bench loop a b
-	run --separate-stderr incise bench loop -o a
-	bad_usage "--output"
+	misused incise bench loop -o a -- "--output"
 	run --separate-stderr incise bench loop --load much
 	bad_usage "--load: expected idle, cpu, memory, disk or view, found 'much'"
-	run --separate-stderr incise bench training --load cpu
-	bad_usage "--load does not go with 'training'"
-	run --separate-stderr incise bench loop none.scene
-	failed_with none.scene
+	misused incise bench training --load cpu -- "--load does not go with 'training'"
+	fails incise bench loop none.scene -- none.scene
 }
 
 @test "bench stability finds in time what theory says" {
@@ -482,12 +463,9 @@ in_order() {
 }
 
 @test "bench stability: bad usage" {
-	run --separate-stderr incise bench stability a b
-	bad_usage "'stability'"
-	run --separate-stderr incise bench stability a
-	failed_with "a: No such file"
+	misused incise bench stability a b -- "'stability'"
+	fails incise bench stability a -- "a: No such file"
 	[ -z "$output" ] # before any work
-	run --separate-stderr incise bench stability -o a/
-	bad_usage "--output"
+	misused incise bench stability -o a/ -- "--output"
 }
 

@@ -59,10 +59,7 @@ draws() {
 }
 
 @test "bench view: bad usage" {
-	run --separate-stderr incise bench view a b
-	bad_usage "at most one scene"
-	run --separate-stderr incise bench view none.scene
-	failed_with none.scene
-	run --separate-stderr incise bench --json view
-	bad_usage "'view' must come directly after"
+	misused incise bench view a b -- "at most one scene"
+	fails incise bench view none.scene -- none.scene
+	misused incise bench --json view -- "'view' must come directly after"
 }

@@ -54,9 +54,7 @@ setup() {
 	[ "$status" -eq 1 ]
 	[ "$(cat zero.conf)" = 'tracker_delay_ms = 0.0;' ]
 	incise capture -o short.rec --rig $rig --duration 5s
-	run --separate-stderr incise calibrate delay --from short.rec
-	failed_with "in common"
-	run --separate-stderr incise calibrate delay --from none.rec
-	failed_with "none.rec"
+	fails incise calibrate delay --from short.rec -- "in common"
+	fails incise calibrate delay --from none.rec -- "none.rec"
 	[ ! -e calibration.conf ]
 }

@@ -196,6 +196,24 @@ bad_usage() {
 	holds_pieces "${stderr_lines[0]}" "$@"
 }
 
+# fails COMMAND… -- PIECE…: run it, and then as failed_with; misused, as bad_usage.
+fails() {
+	judge_refusal failed_with "$@"
+}
+
+misused() {
+	judge_refusal bad_usage "$@"
+}
+
+judge_refusal() {
+	local verdict=$1 words=()
+	while shift && [ "$1" != -- ]; do
+		words+=("$1")
+	done
+	run --separate-stderr "${words[@]}"
+	"$verdict" "${@:2}"
+}
+
 # One value of a JSON file, by path: key report.json check.rmse_N. Fails without it.
 key() {
 	local type

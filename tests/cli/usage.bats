@@ -139,8 +139,7 @@ table() {
 	done < <(table)
 	[ "$(ls -A)" = "$before" ]
 	# Arguments that are no words.
-	run --separate-stderr incise train a.csv -o ""
-	bad_usage "-o"
+	misused incise train a.csv -o "" -- "-o"
 	run --separate-stderr incise stepper move --rig $rig -- ""
 	bad_usage ""
 	run --separate-stderr incise stepper move --rig $rig -- --
