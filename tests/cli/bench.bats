@@ -7,10 +7,6 @@ load report
 names="double_libm double_separable double_library fixed_direct fixed_table_64 \
 	fixed_table_1024 fixed_table force_table_32 force_table batch batch_force"
 
-setup() {
-	work_folder
-}
-
 @test "bench precision measures a model of its own, and says where" {
 	run -0 --separate-stderr incise bench precision --quick
 	[ -z "$stderr" ]

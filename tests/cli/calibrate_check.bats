@@ -13,10 +13,6 @@ need_recording() {
 	incise capture -o "$recording" -r "$BATS_FILE_TMPDIR/rig.conf"
 }
 
-setup() {
-	work_folder
-}
-
 # An entry of the history: kind, key, value, date, pass.
 entry() {
 	printf '{ kind = "%s"; date = "%s"; pass = %s; verdict = "said so";

@@ -6,10 +6,6 @@ load cli
 
 rig=sim:clock=simulated,motion=2
 
-setup() {
-	work_folder
-}
-
 @test "a tracker's delay that is wrong by 4 ms is found" {
 	for latency in 4.2 11; do
 		echo 'tracker_delay_ms = 1.5;' >calibration.conf

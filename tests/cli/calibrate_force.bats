@@ -3,10 +3,6 @@
 
 load cli
 
-setup() {
-	work_folder
-}
-
 # Pairs of three ascending series and a descending one, 1250 mV/N and 180 mV, noise of 1 mV
 # or so that is the same in each run; lines can be changed by an awk condition on i.
 made_weights() {

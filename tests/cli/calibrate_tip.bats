@@ -6,10 +6,6 @@ load cli
 
 rig=sim:clock=simulated,motion=1,tip_x_mm=3,tip_y_mm=-20,tip_z_mm=60
 
-setup() {
-	work_folder
-}
-
 # By how many of its expanded uncertainties a value of r.json is off.
 within() {
 	local left u

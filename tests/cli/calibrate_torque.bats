@@ -4,10 +4,6 @@
 
 load cli
 
-setup() {
-	work_folder
-}
-
 # bats test_tags=check
 @test "the friction of a device is found, and its cogging" {
 	free=sim:haptic,clock=simulated,motion=still,hand_N_mm=0,hand_kg=0,hand_N_s_mm=0,damping_N_s_mm=1e-5

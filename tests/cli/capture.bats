@@ -6,10 +6,6 @@ load cli
 
 quick=sim:clock=simulated
 
-setup() {
-	work_folder
-}
-
 teardown() {
 	[ -z "$mounted" ] || umount "$mounted"
 }

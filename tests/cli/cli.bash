@@ -22,6 +22,11 @@ work_folder() {
 	run_folder
 }
 
+# Of the files that have none of their own.
+setup() {
+	work_folder
+}
+
 # The same in memory, where there is room: a disk that others keep busy can stand still for
 # seconds, and a test of what is lost in real time is not about that one. left_memory() at
 # the end.

@@ -3,10 +3,6 @@
 
 load cli
 
-setup() {
-	work_folder
-}
-
 # bats test_tags=check
 @test "--help and help list the verbs, in groups, twenty at most" {
 	run -0 --separate-stderr incise help advanced

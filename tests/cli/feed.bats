@@ -4,10 +4,6 @@
 
 load cli
 
-setup() {
-	work_folder
-}
-
 # bats test_tags=check
 @test "a scene becomes a plan, which info explains" {
 	run -0 --separate-stderr incise compile neck -o n.plan

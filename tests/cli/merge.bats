@@ -3,10 +3,6 @@
 
 load cli
 
-setup() {
-	work_folder
-}
-
 # Cuts $2 … $3 of $4 pairs each, 250 by default, into the file $1.
 cuts() {
 	awk -v from="$2" -v to="$3" -v pairs="${4:-250}" 'BEGIN {

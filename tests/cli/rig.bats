@@ -3,10 +3,6 @@
 
 load cli
 
-setup() {
-	work_folder
-}
-
 # The row of a key, with one blank between its columns.
 row() {
 	grep -E "^${1//[/\\[} " <<<"$output" | tr -s ' '
