@@ -248,14 +248,13 @@ names="double_libm double_separable double_library fixed_direct fixed_table_64 \
 	done
 }
 
-@test "bench: bad usage" {
-	misused incise bench -- "'precision'"
-	misused incise bench nothing -- "unknown benchmark 'nothing'"
-	misused incise bench presision -- "unknown benchmark 'presision'; did you mean 'precision'?"
-	misused incise bench precision a b -- "'precision' takes at most 1 operand, got 2"
+@test "bench: names of plots and operands that are none" {
 	for name in "" -a - a/ a/.png "a'b" 'a;b' '$(id)' 'a b'; do
 		misused incise bench precision --quick -o "$name" -- "--output"
 	done
+	fails incise bench loop none.scene -- none.scene
+	fails incise bench stability a -- "a: No such file"
+	[ -z "$output" ] # before any work
 }
 
 @test "bench training gives error on unseen cuts over time, by method and epochs" {
@@ -375,15 +374,6 @@ in_order() {
 	bench_interrupted loop --quick --load disk --duration 1min "$root/scenes/wall.scene"
 }
 
-@test "bench loop: bad usage" {
-	run -2 --separate-stderr incise bench loop a b
-	misused incise bench loop -o a -- "--output"
-	run --separate-stderr incise bench loop --load much
-	bad_usage "--load: expected idle, cpu, memory, disk or view, found 'much'"
-	misused incise bench training --load cpu -- "--load does not go with 'training'"
-	fails incise bench loop none.scene -- none.scene
-}
-
 @test "bench stability finds in time what theory says" {
 	quick_report stability
 	# the tolerances of the manual
@@ -456,12 +446,5 @@ in_order() {
 	[ -n "${plot[*]}" ] || skip "gnuplot is not installed, it draws the chart"
 	[ "$(head -c 8 "a folder/w-map.png" | od -An -tx1 | tr -d ' \n')" = 89504e470d0a1a0a ]
 	grep -q 'delay of 2 ticks' "a folder/w-map.svg"
-}
-
-@test "bench stability: bad usage" {
-	misused incise bench stability a b -- "'stability'"
-	fails incise bench stability a -- "a: No such file"
-	[ -z "$output" ] # before any work
-	misused incise bench stability -o a/ -- "--output"
 }
 

@@ -58,8 +58,6 @@ draws() {
 	holds "$(key r.json frames[0].in_20_ms_percent) >= 0 && $(key r.json frames[0].in_20_ms_percent) <= 100"
 }
 
-@test "bench view: bad usage" {
-	misused incise bench view a b -- "at most one scene"
+@test "bench view: a scene that is not there" {
 	fails incise bench view none.scene -- none.scene
-	misused incise bench --json view -- "'view' must come directly after"
 }

@@ -238,12 +238,9 @@ static void add_metric(json_t *metrics, const struct bench_table *table,
 {
 	const void *member = (const char *)row + metric->offset;
 	char name[TEXT_BYTES];
-	json_t *added;
 
 	expand(table, row, metric->name, name, sizeof(name));
-	added = metrics_add(metrics, metric->kind, member, metric->unit, "%s", name);
-	if (metric->more_is_better)
-		metrics_more_is_better(added);
+	metrics_add(metrics, metric->kind, member, metric->unit, "%s", name);
 }
 
 static void write_line(FILE *out, const struct bench_table *table, const void *row)

@@ -72,7 +72,6 @@ struct bench_metric {
 	size_t offset; /* struct harness_time, struct harness_spread or double */
 	const char *unit, *name;
 	const char *where; /* rows with "KEY=TEXT,KEY!=TEXT|TEXT"; NULL: all */
-	bool more_is_better;
 };
 
 #define METRIC(kind_, row, member, ...)                                         \
