@@ -192,9 +192,9 @@ static const struct bench_table tick_table = {
 enum load_kind { LOAD_IDLE, LOAD_CPU, LOAD_MEMORY, LOAD_DISK, LOAD_VIEW, LOADS };
 const char *const bench_loads[LOADS + 1] = {"idle", "cpu", "memory", "disk", "view"};
 
-/* Wake-ups of one program, us; NaN: not measured. Quantiles are upper edges of bins. */
+/* Wake-ups of one program, us. Quantiles are upper edges of bins. */
 struct lateness {
-	double median, p99, p999, max;
+	double p999; /* NaN: not measured */
 	uint64_t ticks;
 	json_t *json; /* {"min", "median", …, "ticks"}, or null */
 };
@@ -595,20 +595,19 @@ static double percentile(const uint64_t *bins, uint64_t ticks, double q)
 
 static struct lateness lateness_of(const uint64_t *bins, double max_us)
 {
-	struct lateness l = {.max = max_us};
+	struct lateness l = {0};
 	int least = 0;
 
 	while (least < INCISE_LOOP_BINS - 1 && !bins[least])
 		least++;
 	for (int i = 0; i < INCISE_LOOP_BINS; i++)
 		l.ticks += bins[i];
-	l.median = percentile(bins, l.ticks, 0.5);
-	l.p99 = percentile(bins, l.ticks, 0.99);
 	l.p999 = percentile(bins, l.ticks, 0.999);
 	l.json = json_pack("{sf so so so so sf sI}", "min", (double)least, "median",
-			   json_number(l.median), "p99", json_number(l.p99), "p999",
+			   json_number(percentile(bins, l.ticks, 0.5)), "p99",
+			   json_number(percentile(bins, l.ticks, 0.99)), "p999",
 			   json_number(l.p999), "p9999",
-			   json_number(percentile(bins, l.ticks, 0.9999)), "max", l.max,
+			   json_number(percentile(bins, l.ticks, 0.9999)), "max", max_us,
 			   "ticks", (json_int_t)l.ticks);
 	return l;
 }
@@ -747,7 +746,7 @@ static bool wanted(enum load_kind load, enum load_kind only, bool quick, int rat
 static void measure_wakeups(const char *scene, enum load_kind only, bool quick,
 			    double seconds, struct wakeups *wakeups)
 {
-	static const struct lateness none = {NAN, NAN, NAN, NAN, 0, NULL};
+	static const struct lateness none = {NAN, 0, NULL};
 	const double rates_hz[] = {scene ? scene_rate(scene) : 1000, 4000};
 	struct incise_realtime *realtime;
 
@@ -818,16 +817,6 @@ static const struct bench_table wakeup_table = {
 			   "late at {rate_hz} Hz, {load}, 99.9 %")},
 };
 
-static void report_wakeups(struct bench_run *run, const struct wakeups *wakeups)
-{
-	bench_values(run, "{s{sf ss so si}}", "wakeups", "seconds", wakeups->seconds,
-		     "policy", wakeups->realtime ? "fifo" : "other", "priority",
-		     wakeups->realtime ? json_integer(INCISE_REALTIME_PRIORITY)
-				       : json_null(),
-		     "cpu", wakeups->cpu);
-	bench_rows(run, &wakeup_table, wakeups->row, wakeups->n);
-}
-
 /* --- the bench --- */
 
 /* Members of the first rows, where scripts look for them. */
@@ -869,7 +858,12 @@ static void run(struct bench_run *run)
 			&wakeups);
 	report_first(run, ticks, wakeups.row);
 	bench_rows(run, &tick_table, ticks, n);
-	report_wakeups(run, &wakeups);
+	bench_values(run, "{s{sf ss so si}}", "wakeups", "seconds", wakeups.seconds,
+		     "policy", wakeups.realtime ? "fifo" : "other", "priority",
+		     wakeups.realtime ? json_integer(INCISE_REALTIME_PRIORITY)
+				      : json_null(),
+		     "cpu", wakeups.cpu);
+	bench_rows(run, &wakeup_table, wakeups.row, wakeups.n);
 }
 
 const struct bench bench_loop = {
