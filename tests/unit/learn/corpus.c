@@ -6,7 +6,6 @@
 #include "../unit.h"
 #include "../../../lib/learn/corpus.c"
 #include "../cases.h"
-#include "../message.h"
 
 #define SOURCES 3
 

@@ -8,7 +8,6 @@
 #include "../../../lib/base/random.h"
 #include "../../../lib/learn/pairs.h"
 #include "../cases.h"
-#include "../message.h"
 
 static struct incise_model *grid(int n_inputs, const double *min, const double *max,
 				 const int *n_mfs, enum incise_mf_type type)
