@@ -29,6 +29,9 @@
 /* A part of a cut with more points, of long steps among short ones, is used up to there. */
 #define POINTS_PER_ROW 4
 
+/* An improvement by less, dB, may be chance: there is no texture. */
+#define IMPROVEMENT 0.5
+
 #define DECIBEL(ratio) (10 * log10(fmax(ratio, 1e-30)))
 
 struct candidate {
@@ -36,7 +39,7 @@ struct candidate {
 	double gain;   /* 0: no texture */
 };
 
-static const double windows[] = {0, 64, 16, 4}, gains[] = {1, 0.7, 0.5, 0.35};
+static const double windows[] = {0, 64, 16, 4, 2}, gains[] = {1, 0.7, 0.5, 0.35, 0.25};
 
 struct learning {
 	struct incise_texture_cut *cuts; /* in random order */
@@ -77,7 +80,7 @@ static size_t find_tau(struct learning *learning, const struct incise_texture_cu
 		tau[i] = part.force[row] / fmax(part.model[row], least);
 		mean += tau[i] / (double)n;
 	}
-	if (!(mean > 0))
+	if (!(mean > 0 && isfinite(mean)))
 		return 0;
 	for (size_t i = 0; i < n; i++)
 		tau[i] = tau[i] / mean - 1;
@@ -148,7 +151,7 @@ static struct incise_texture *find_pieces(struct learning *learning,
 		if (candidate->window)
 			take_running_mean(learning, m, candidate->window);
 		for (size_t k = 1; k < m; k++) {
-			if (tau[k - 1] >= 0 || tau[k] < 0)
+			if (!(tau[k - 1] < 0 && tau[k] >= 0))
 				continue;
 			if (from && incise_random_next(&state) <= share)
 				add_piece(texture, &points, tau + from, k - from,
@@ -201,7 +204,7 @@ static double score_look(const struct incise_look *look,
 	return incise_look_distance(look, recorded) + fabs(DECIBEL(ratio));
 }
 
-/* The candidate with the best score, that of no texture first. 0, -ENOMEM or -ECANCELED. */
+/* The candidate with the best score, if it improves on none, which is the first. 0, -ENOMEM or -ECANCELED. */
 static int choose_candidate(struct learning *learning, struct candidate *best)
 {
 	int n_gains = sizeof(gains) / sizeof(*gains),
@@ -225,7 +228,7 @@ static int choose_candidate(struct learning *learning, struct candidate *best)
 		if (learning->watch && incise_watch_ask(learning->watch))
 			return -ECANCELED;
 		if (score < least) {
-			least = score;
+			least = score - (i ? 0 : IMPROVEMENT);
 			*best = candidate;
 		}
 	}
