@@ -5,7 +5,7 @@ load cli
 
 setup() {
 	work_folder
-	cp "$root"/scenes/*.scene "$root"/scenes/*.fis .
+	cp "$root"/scenes/* .
 }
 
 @test "plan shows what each shipped scene runs and leaves out" {
@@ -22,7 +22,7 @@ setup() {
 # bats test_tags=check
 @test "plan reports as JSON: every stage is kept or left out" {
 	incise plan liver.scene --json >r.json
-	[ "$(key r.json kept)" = '["pose","predict","contact","reaction","fracture","start","limit"]' ]
+	[ "$(key r.json kept)" = '["pose","predict","contact","texture","reaction","fracture","start","limit"]' ]
 	holds "$(key r.json margin) > 1 && $(key r.json margin) == $(key r.json weakest.margin)"
 	holds "$(key r.json weakest.states) >= 3 && $(key r.json weakest.hz) > 5"
 	holds "$(key r.json tick_ns) > 0"
@@ -68,7 +68,7 @@ setup() {
 @test "a full plan keeps every stage" {
 	incise plan wall.scene --json >few.json
 	incise plan wall.scene --full --json >all.json
-	[ "$(key few.json kept)" = '["pose","predict","contact","reaction","start","limit"]' ]
+	[ "$(key few.json kept)" = '["pose","predict","contact","texture","reaction","start","limit"]' ]
 	stages=$(sqlite3 :memory: "SELECT group_concat(value) FROM json_each(readfile('all.json'), '\$.kept')")
 	[[ "$stages" == pose,predict,tool,contact,normal,incision,membrane,texture,reaction,plane,*,start,work,limit ]]
 	# what is left out of a full plan is no stage of a loop without a stepper
@@ -115,7 +115,7 @@ setup() {
 }
 
 @test "plan: another model, another arithmetic" {
-	incise plan liver.scene --json >fixed.json
+	incise plan liver.scene --no-texture --json >fixed.json
 	incise plan liver.scene --arith double --json >double.json
 	holds "$(key fixed.json bound_N) > 0"
 	[ "$(key double.json bound_N)" = 0.0 ]
