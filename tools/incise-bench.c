@@ -31,7 +31,8 @@ static const struct cli_option options[] = {
 };
 
 static const struct bench *const benches[] = {
-	&bench_precision, &bench_training, &bench_stability, &bench_loop, &bench_scenes,
+	&bench_precision, &bench_training, &bench_realism,
+	&bench_stability, &bench_loop,	   &bench_scenes,
 };
 
 /* --- help --- */

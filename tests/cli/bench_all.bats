@@ -20,7 +20,7 @@ setup() {
 	r=$BATS_FILE_TMPDIR/r
 }
 
-benchmarks="precision training stability loop view scenes"
+benchmarks="precision training realism stability loop view scenes"
 
 # A folder that is a report to incise bench all, of this JSON.
 report_of() {
@@ -79,7 +79,7 @@ report_of() {
 	else
 		[ "$(cat "$BATS_FILE_TMPDIR/status")" = 1 ]
 		[ "$(cat "$BATS_FILE_TMPDIR/err")" = \
-			"incise bench all: $n of 6 benchmarks failed; r/report.md says why" ]
+			"incise bench all: $n of 7 benchmarks failed; r/report.md says why" ]
 	fi
 }
 

@@ -45,10 +45,10 @@ well_formed() {
 @test "export raw at a rate, to standard output" {
 	run -0 --separate-stderr incise export --no-lineage liver.rec --rate 100
 	[ -z "$stderr" ]
-	[ "${lines[0]}" = cut,t_s,depth_mm,velocity_mm_s,force_N,clipped,advancing,acceleration_mm_s2,tilt_deg,time_in_tissue_s,mean_speed_mm_s,deepest_mm ]
+	[ "${lines[0]}" = cut,t_s,depth_mm,velocity_mm_s,force_N,clipped,advancing,acceleration_mm_s2,tilt_deg,time_in_tissue_s,mean_speed_mm_s,deepest_mm,way_mm ]
 	[[ "${lines[1]}" == liver-01,* ]]
 	printf '%s\n' "${lines[@]}" >out.csv
-	well_formed out.csv 12 2
+	well_formed out.csv 13 2
 	[ "$(cut -d, -f1 out.csv | sort -u | grep -c liver-)" -eq 14 ]
 	# 14 cuts of not quite 2 s at 100 rows a second
 	[ "${#lines[@]}" -gt 1400 ]

@@ -126,8 +126,8 @@ struct bench {
 	struct bench_plot plot; /* without its script -o is bad usage */
 };
 
-extern const struct bench bench_loop, bench_precision, bench_scenes, bench_stability,
-	bench_training;
+extern const struct bench bench_loop, bench_precision, bench_realism, bench_scenes,
+	bench_stability, bench_training;
 
 /* Parts of bench_stability. */
 void stability_rest(struct bench_run *run);
