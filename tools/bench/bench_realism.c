@@ -67,7 +67,7 @@ static void measure_file(char *path, const char *name, struct row *row)
 		incise_train_texture(source, 1, &trained, &options.train, &row->of, &err);
 	/* No texture is better than the model alone: they are the same then. */
 	if (!texture && errno != EDOM)
-		cli_fail_with(&err);
+		cli_fail("%s: %s", path, err.text);
 	cli_progress_end();
 	for (int k = INCISE_REALISM_KINDS - 1; k >= 0; k--)
 		row[k] = (struct row){name, kinds[k], row->of, row->of.kind[k]};
