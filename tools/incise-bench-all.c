@@ -10,7 +10,7 @@
 #include <unistd.h>
 #include <incise/version.h>
 #include "bench/metrics.h"
-#include "bench/machine.h"
+#include "cli/machine.h"
 #include "cli/cli.h"
 #include "cli/file.h"
 #include "cli/folder.h"
@@ -18,8 +18,8 @@
 #include "cli/report_script.h"
 
 /* In the order of the report. */
-static const char *const benchmarks[] = {"precision", "training", "stability", "loop",
-					 "view",      "scenes",	  NULL};
+static const char *const benchmarks[] = {"precision", "training", "realism", "stability",
+					 "loop",      "view",	  "scenes",  NULL};
 #define BENCHMARKS (int)(sizeof(benchmarks) / sizeof(*benchmarks) - 1)
 
 struct bench_all_job {

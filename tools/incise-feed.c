@@ -13,6 +13,7 @@ static const struct cli_option options[] = {
 	HAPTIC_TIP_OPTION,
 	{0, "model", "FILE", "use this model instead of the scene's",
 	 CLI_INPUT(struct haptic_job, haptic.argument.model)},
+	SCENE_ARGUMENT_NO_TEXTURE(struct haptic_job, haptic.argument),
 	{0, "tool", "KIND",
 	 "tool in the hand at the start: auto, blade, handle or tube (default: auto)",
 	 CLI_CHOICE(struct haptic_job, haptic.tool, loop_tool_names)},

@@ -110,6 +110,8 @@ static void watch_kernel(struct haptic_job *job)
 		arguments[n++] = cli_text("--calibration=%s", job->calibration);
 	if (haptic->argument.model)
 		arguments[n++] = cli_text("--model=%s", haptic->argument.model);
+	if (haptic->argument.no_texture)
+		arguments[n++] = cli_text("--no-texture");
 	if (job->state)
 		arguments[n++] = cli_text("--state=%s", job->state);
 	arguments[n++] = cli_text("--tool=%s", loop_tool_names[haptic->tool]);

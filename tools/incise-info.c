@@ -10,6 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 #include <incise/factor.h>
 #include <incise/fixed.h>
 #include <incise/model.h>
@@ -27,6 +28,7 @@
 #include "cli/proof_report.h"
 #include "cli/recording.h"
 #include "cli/stream_report.h"
+#include "cli/texture_report.h"
 #include "cli/wall_report.h"
 #include "stepper/module.h"
 #include "train/sources.h"
@@ -71,11 +73,11 @@ static const struct cli_option options[] = {
 static const struct cli_command command = {
 	.name = "info",
 	.synopsis =
-		"MODEL.fis|MODEL.fx|NAME.plan|NAME.fac|NAME.rec|NAME.scene|rig.conf|rig|stepper|"
+		"MODEL.fis|MODEL.fx|MODEL.fis.tex|NAME.plan|NAME.fac|NAME.rec|NAME.scene|rig.conf|rig|stepper|"
 		"/dev/incise-stepperN|can:IFACE|"
 		"slcan:TTY|devices|DATA.csv… [OPTIONS]",
 	.summary =
-		"Describe a model, a compiled model, a compiled scene, a factor, a "
+		"Describe a model, a compiled model, a texture, a compiled scene, a factor, a "
 		"recording, a scene or a rig; the state and cost of the kernel's stepper module; the drives "
 		"on a CAN bus; or the devices that are attached.",
 	.options = options,
@@ -165,7 +167,8 @@ static json_t *notes_json(const char *notes)
 }
 
 static void model_json(const struct incise_model *model, const struct incise_fixed *fx,
-		       const char *refused, const char *notes)
+		       const char *refused, const char *notes,
+		       const struct incise_texture *texture)
 {
 	const struct incise_model_info *info = incise_model_info(model);
 	const struct incise_variable *out = &info->output;
@@ -190,6 +193,7 @@ static void model_json(const struct incise_model *model, const struct incise_fix
 			   "and_method", and_method(model), "rules", rules);
 	json_object_set_new(report, "notes", notes_json(notes));
 	add_fixed_json(report, fx, refused);
+	json_object_set_new(report, "texture", texture_json(texture));
 	json_print(report);
 }
 
@@ -243,9 +247,38 @@ static void model_text(const struct incise_model *model, const struct incise_fix
 	}
 }
 
+/* The texture beside a model, or NULL; a damaged one is a warning. */
+static struct incise_texture *texture_beside(const char *path,
+					     const struct incise_model *model)
+{
+	char *tex = cli_text("%s.tex", path);
+	struct incise_texture *texture = NULL;
+	struct incise_error err = {0};
+
+	if (!access(tex, F_OK) && !(texture = incise_texture_load(tex, model, &err)))
+		cli_warn("%s", err.text);
+	free(tex);
+	return texture;
+}
+
+static void show_texture(const char *path, bool json)
+{
+	struct incise_error err = {0};
+	struct incise_texture *texture =
+		cli_require(incise_texture_load(path, NULL, &err), &err);
+
+	if (json)
+		json_print(json_pack("{ss so}", "kind", "texture", "texture",
+				     texture_json(texture)));
+	else
+		texture_print(texture);
+	incise_texture_free(texture);
+}
+
 static void show_model(const char *path, bool json)
 {
 	struct incise_error err = {0}, refused = {0};
+	struct incise_texture *texture;
 	struct incise_model *model;
 	struct incise_fixed *fixed;
 	struct stat st;
@@ -257,10 +290,14 @@ static void show_model(const char *path, bool json)
 			? cli_require(incise_model_notes(path, &err), &err)
 			: cli_text("%s", "");
 	fixed = incise_fixed_compile(model, NULL, &refused);
+	texture = texture_beside(path, model);
 	if (json)
-		model_json(model, fixed, refused.text, notes);
+		model_json(model, fixed, refused.text, notes, texture);
 	else
 		model_text(model, fixed, refused.text, notes);
+	if (texture && !json)
+		texture_print(texture);
+	incise_texture_free(texture);
 	free(notes);
 	incise_fixed_free(fixed);
 	incise_model_free(model);
@@ -904,7 +941,8 @@ int main(int argc, char **argv)
 	      !strncmp(path, "sim:", 4);
 	if (!rig && !stepper_module_is(path) && strcmp(path, "devices") && !is_bus(path))
 		file_expect(path, FILE_RECORDING | FILE_MODEL | FILE_COMPILED |
-					  FILE_PLAN | FILE_FACTOR | FILE_SCENE);
+					  FILE_PLAN | FILE_FACTOR | FILE_SCENE |
+					  FILE_TEXTURE);
 	compiled = kind ? kind == FILE_COMPILED : cli_ends_with(path, ".fx");
 	plan = kind ? kind == FILE_PLAN : cli_ends_with(path, ".plan");
 	if (job.all && !rig && kind != FILE_SCENE)
@@ -925,6 +963,8 @@ int main(int argc, char **argv)
 			show_compiled(path, job.json);
 		else if (kind == FILE_FACTOR || (!kind && cli_ends_with(path, ".fac")))
 			show_factor(path, job.json);
+		else if (kind == FILE_TEXTURE || (!kind && cli_ends_with(path, ".tex")))
+			show_texture(path, job.json);
 		else if (plan)
 			show_plan(path, job.json);
 		else

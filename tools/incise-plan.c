@@ -9,7 +9,7 @@
 #include <stdio.h>
 #include <string.h>
 #include <incise/plan.h>
-#include "bench/tick_cost.h"
+#include "plan/tick_cost.h"
 #include "cli/cli.h"
 #include "cli/json.h"
 #include "cli/loop_report.h"
@@ -172,6 +172,18 @@ static bool is_of_device(const char *stage)
 	return !strcmp(stage, "actuate") || !strcmp(stage, "push");
 }
 
+/* The highest frequency of a force of this amplitude on a handle at rest, by the profile of the nut. */
+#define BANDWIDTH_N 0.1
+
+static double bandwidth_hz(const struct incise_stepper_info *info)
+{
+	double way_mm = BANDWIDTH_N / info->spring_N_mm;
+
+	return fmin(info->velocity_mm_s / way_mm,
+		    sqrt(info->acceleration_mm_s2 / way_mm)) /
+	       (2 * M_PI);
+}
+
 /* The rig's actuators. */
 static json_t *axes_json(struct incise_rig *rig, const struct incise_plan_stability *s)
 {
@@ -183,9 +195,10 @@ static json_t *axes_json(struct incise_rig *rig, const struct incise_plan_stabil
 	for (int i = 0; rig && (stepper = incise_rig_axis(rig, i, direction)); i++) {
 		incise_stepper_info(stepper, &info);
 		json_array_append_new(axes,
-				      json_pack("{ss so si}", "name", info.name,
+				      json_pack("{ss so si sf}", "name", info.name,
 						"direction", json_numbers(direction, 3),
-						"late_ticks", s->axis_late_ticks[i]));
+						"late_ticks", s->axis_late_ticks[i],
+						"bandwidth_hz", bandwidth_hz(&info)));
 	}
 	return axes;
 }
@@ -215,6 +228,30 @@ static json_t *surface_json(const struct incise_plan *plan)
 			 s.open_edges ? json_numbers(s.open_lo_mm, 3) : json_null(),
 			 "open_to_mm",
 			 s.open_edges ? json_numbers(s.open_hi_mm, 3) : json_null());
+}
+
+static json_t *texture_json(const struct incise_plan *plan)
+{
+	struct incise_plan_texture t;
+
+	if (!incise_plan_texture(plan, &t))
+		return json_null();
+	return json_pack("{sf sf sf sf sf so}", "most", t.most, "rms", t.rms,
+			 "events_per_mm", t.events_per_mm, "factor_min", t.factor_least,
+			 "factor_max", t.factor_most, "follows", json_number(t.follows));
+}
+
+static void print_texture(const struct incise_plan *plan)
+{
+	struct incise_plan_texture t;
+
+	if (incise_plan_texture(plan, &t))
+		printf("texture     up to ±%.3g %% of the force, %.3g %% rms, %.3g events/mm; "
+		       "a cut has %.3g to %.3g times the force\n"
+		       "            at 10 mm/s and half the largest force %.0f %% of it can be "
+		       "followed\n",
+		       100 * t.most, 100 * t.rms, t.events_per_mm, t.factor_least,
+		       t.factor_most, 100 * t.follows);
 }
 
 static void report_plan_json(const struct plan_job *job, const struct incise_plan *plan,
@@ -261,6 +298,7 @@ static void report_plan_json(const struct plan_job *job, const struct incise_pla
 	json_object_set_new(object, "puncture_model", model_json(plan, INCISE_PUNCTURE));
 	json_object_set_new(object, "withdraw_model", model_json(plan, INCISE_WITHDRAW));
 	json_object_set_new(object, "axes", axes_json(rig, &stability));
+	json_object_set_new(object, "texture", texture_json(plan));
 	json_print(object);
 }
 
@@ -382,7 +420,8 @@ static void print_axes(struct incise_rig *rig, const struct incise_plan_stabilit
 		incise_stepper_info(stepper, &info);
 		print_direction(n ? "            along " : "felt        along ",
 				direction[n]);
-		printf(": %s, %d ticks late\n", info.name, s->axis_late_ticks[n]);
+		printf(": %s, %d ticks late, ±%g N up to %.3g Hz\n", info.name,
+		       s->axis_late_ticks[n], BANDWIDTH_N, bandwidth_hz(&info));
 	}
 	if (n == 1)
 		printf("            not felt: forces across it\n");
@@ -443,6 +482,7 @@ static void report_plan_text(const struct plan_job *job, const struct incise_pla
 		       stability.certified ? "certified" : "by estimated slopes");
 	putchar('\n');
 	print_evaluation(plan);
+	print_texture(plan);
 	print_stability(job, plan);
 	if (rig)
 		print_axes(rig, &stability);

@@ -47,8 +47,9 @@ static const struct cli_option options[] = {
 static const struct cli_command command = {
 	.name = "plot",
 	.synopsis = "FILE [-o NAME.png] [OPTIONS]",
-	.summary = "Draw a recording, a dataset, a model (.fis, .fx), a session or a "
-		   "calibration. The kind of the file is recognised by its content.",
+	.summary =
+		"Draw a recording, a dataset, a model (.fis, .fx), a texture (.tex), a session or a "
+		"calibration. The kind of the file is recognised by its content.",
 	.options = options,
 	.examples = "incise plot liver.fis --data pairs.csv -o liver.png",
 };
@@ -62,6 +63,7 @@ static const struct drawn {
 	{FILE_RECORDING, figure_of_recording}, {FILE_MODEL, figure_of_model},
 	{FILE_COMPILED, figure_of_compiled},   {FILE_TABLE, figure_of_dataset},
 	{FILE_SESSION, figure_of_session},     {FILE_CALIBRATION, figure_of_calibration},
+	{FILE_TEXTURE, figure_of_texture},
 };
 
 #define DRAWN (sizeof(drawn) / sizeof(*drawn))
@@ -85,7 +87,7 @@ static const struct drawn *find_drawn(const char *path)
 		return &drawn[0];
 	cli_fail(
 		"%s: %s; give a recording (.rec), a dataset (.csv), a model (.fis, .fx), a "
-		"session or a calibration.conf",
+		"texture (.tex), a session or a calibration.conf",
 		path, stat(path, &st) ? strerror(errno) : "is of no kind that is known");
 }
 
@@ -130,9 +132,9 @@ static const char *window_form(void)
 static void parse_plot(struct plot_job *job, int argc, char **argv)
 {
 	cli_parse(&command, argc, argv, job);
-	job->figure.path =
-		cli_operand(argc, argv, "FILE",
-			    "recording, dataset, model, session or calibration to draw");
+	job->figure.path = cli_operand(
+		argc, argv, "FILE",
+		"recording, dataset, model, texture, session or calibration to draw");
 }
 
 int main(int argc, char **argv)

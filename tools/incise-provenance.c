@@ -285,7 +285,9 @@ _Noreturn static void fail_without(const char *path)
 			 "file that it was compiled from",
 			 path);
 	case FILE_DEVIATION:
-		cli_fail("%s: a .sd file belongs to its model; give that", path);
+	case FILE_TEXTURE:
+		cli_fail("%s: a .%s file belongs to its model; give that", path,
+			 file_kind_of(path) == FILE_TEXTURE ? "tex" : "sd");
 	case FILE_TABLE:
 		cli_fail("%s: says nothing of its origin; 'incise export' without "
 			 "--no-lineage writes it into a CSV",

@@ -191,9 +191,9 @@ static void report_replay_json(const struct replay_job *job, double rate_hz,
 
 	snprintf(crc, sizeof(crc), "%08x", r->crc);
 	json_print(json_pack(
-		"{so so sI sf so sf sf sI si sI so so so so so so so ss so so}", "path",
-		json_text(job->recording), "scene", json_text(job->scene.path), "ticks",
-		(json_int_t)stats->ticks, "rate_hz", rate_hz, "seconds",
+		"{so so sI sf so sf sf sI si sI so so so so so so so ss so so so}",
+		"path", json_text(job->recording), "scene", json_text(job->scene.path),
+		"ticks", (json_int_t)stats->ticks, "rate_hz", rate_hz, "seconds",
 		json_number(r->seconds), "tracker_hz", r->tracker.rate_hz,
 		"tracker_latency_ms", r->tracker.latency_ns * 1e-6, "poses",
 		(json_int_t)r->poses, "cuts", r->cuts, "compared",
@@ -204,7 +204,8 @@ static void report_replay_json(const struct replay_job *job, double rate_hz,
 		json_number(stats->force_max_N), "flags", loop_flags_json(stats->flagged),
 		"spells", loop_flags_json(r->spells), "crc32c", crc, "lateness_us",
 		job->how.real_time ? loop_lateness_json(stats) : json_null(), "late",
-		job->how.real_time ? json_integer((json_int_t)r->late) : json_null()));
+		job->how.real_time ? json_integer((json_int_t)r->late) : json_null(),
+		"texture_felt", json_number(stats->texture_felt)));
 }
 
 /* Print the reasons why there was less force than the tissue's. */
@@ -260,6 +261,7 @@ static void report_replay_text(const struct replay_job *job, double rate_hz,
 	       (unsigned long long)
 		       stats->flagged[__builtin_ctz(INCISE_TICK_EXTRAPOLATED)]);
 	held_line(stats, r);
+	loop_texture_line(stats);
 	if (job->how.real_time) {
 		loop_lateness_line(stats);
 		printf("late       %llu ticks by a period or more\n",

@@ -3,6 +3,7 @@
  * incise train SOURCE... -o MODEL.fis: learn a fuzzy force model from recordings and CSV files,
  * and compare it with simpler predictors. incise_train_sources() has the method.
  */
+#include <errno.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -15,6 +16,7 @@
 #include "cli/file.h"
 #include "cli/json.h"
 #include "cli/recording.h"
+#include "cli/texture_report.h"
 #include "train/sources.h"
 
 struct train_options {
@@ -22,7 +24,7 @@ struct train_options {
 	int n_paths;
 	char *typed;	  /* the arguments, or NULL */
 	const char *data; /* for messages: the path, or the number of sources */
-	const char *model, *initial, *history, *premises, *factor;
+	const char *model, *initial, *history, *premises, *factor, *tex;
 	struct recording_rows rows;
 	long sample; /* pairs; 0: all */
 	struct shard {
@@ -31,7 +33,7 @@ struct train_options {
 	char *inputs[INCISE_MODEL_INPUTS_MAX];
 	const char *target;
 	int n_mfs;
-	bool auto_mfs, json, mpi, wanted; /* the latter of the inputs */
+	bool auto_mfs, json, mpi, texture, wanted; /* the latter of the inputs */
 	enum uncertainties_wanted uncertainty;
 	struct incise_sources_options how;
 };
@@ -133,6 +135,10 @@ static const struct cli_option option_table[] = {
 	 "write the sums of these sources for incise merge, instead of a "
 	 "model; needs --premises",
 	 CLI_OUTPUT(struct train_options, factor), .extensions = ".fac"},
+	{'o', "output", "FILE.fis.tex",
+	 "write only the texture, of the model FILE.fis that is there, for example of "
+	 "averaged pairs",
+	 CLI_OUTPUT(struct train_options, tex), .extensions = ".fis.tex"},
 	{0, "premises", "FILE",
 	 "keep the membership functions and ranges of this model (.fis); only the "
 	 "consequents are learnt",
@@ -189,6 +195,10 @@ static const struct cli_option option_table[] = {
 	 "use share I of N of the sources, from 1, for the tasks of a job array, "
 	 "with -o FILE.fac; or share the sources among the processes of mpirun",
 	 CLI_PARSED_BY(parse_share)},
+	{0, "texture", NULL,
+	 "also learn the saw-tooth of cutting and the variation from cut to cut, "
+	 "into MODEL.fis.tex",
+	 CLI_FLAG(struct train_options, texture)},
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct train_options, json)},
 	{0},
 };
@@ -268,8 +278,6 @@ static char *spell_arguments(char **argv)
 
 static void parse_train(struct train_options *options, int argc, char **argv)
 {
-	char *sd;
-
 	*options = (struct train_options){
 		.typed = spell_arguments(argv),
 		.inputs = {"depth_mm", "velocity_mm_s"},
@@ -323,10 +331,23 @@ static void parse_train(struct train_options *options, int argc, char **argv)
 	if (options->factor && options->json)
 		cli_usage("--json reports a model; leave it out with -o %s",
 			  options->factor);
-	if (options->factor) {
+	if (options->tex &&
+	    (options->model || options->factor || options->initial || options->history ||
+	     options->premises || options->how.check > 0 || options->mpi))
+		cli_usage("-o %s writes the texture of a model that is there; leave out "
+			  "other outputs, --premises, --check and --share",
+			  options->tex);
+	options->texture |= options->tex != NULL;
+	if (options->texture && (options->factor || options->mpi))
+		cli_usage("--texture needs a model and all sources in one process; leave "
+			  "out %s",
+			  options->factor ? "-o FILE.fac" : "--share mpi");
+	if (options->texture && options->rows.rate_hz > 0)
+		cli_usage("--texture needs each sample; leave out --rate");
+	if (options->factor)
 		options->how.end = INCISE_TRAIN_TO_FACTOR;
+	if (options->factor || options->tex)
 		return;
-	}
 	if (!options->model)
 		options->model = default_model(options);
 	if (!options->model || !*options->model)
@@ -339,10 +360,16 @@ static void parse_train(struct train_options *options, int argc, char **argv)
 			  options->model);
 	if (options->json && !strcmp(options->model, "-"))
 		cli_usage("--json and -o - would both write to standard output");
-	sd = path_beside(options->model, ".sd");
-	if (sd)
-		cli_output_once(sd);
-	free(sd);
+	for (int i = 0; i <= options->texture; i++) {
+		char *beside = path_beside(options->model, i ? ".tex" : ".sd");
+
+		if (beside)
+			cli_output_once(beside);
+		else if (i)
+			cli_usage("--texture needs -o MODEL.fis, next to which it is "
+				  "written");
+		free(beside);
+	}
 	if (options->n_mfs && options->n_mfs != options->how.n_inputs)
 		cli_usage("--mf: expected %d counts, one for each of --inputs, found %d",
 			  options->how.n_inputs, options->n_mfs);
@@ -678,7 +705,8 @@ static json_t *propagated_json(const struct train_options *options,
 }
 
 static void report_train_json(const struct train_options *options,
-			      const struct incise_trained *trained, json_t *warned)
+			      const struct incise_trained *trained,
+			      const struct incise_texture *texture, json_t *warned)
 {
 	const struct incise_model *model = trained->model;
 	const struct incise_train_report *report = &trained->report;
@@ -749,6 +777,7 @@ static void report_train_json(const struct train_options *options,
 	json_set_number(object, "high_end_bias", trained->end_bias[1]);
 	json_object_set_new(object, "uncertainty",
 			    propagated_json(options, &trained->propagated));
+	json_object_set_new(object, "texture", texture_json(texture));
 	json_object_set_new(object, "warnings", warned);
 	json_object_set_new(object, "model", json_string(options->model));
 	json_print(object);
@@ -806,7 +835,8 @@ static void print_clamped(const struct incise_trained *trained)
 }
 
 static void report_train_text(const struct train_options *options,
-			      const struct incise_trained *trained)
+			      const struct incise_trained *trained,
+			      const struct incise_texture *texture)
 {
 	const struct incise_model *model = trained->model;
 	const struct incise_corpus_side *fit = incise_corpus_side(trained->corpus, false);
@@ -894,6 +924,8 @@ static void report_train_text(const struct train_options *options,
 		printf("  penalty from a random %zu of the pairs, consequents from all\n",
 		       report->pairs_tuned);
 	print_better(options, trained);
+	if (texture)
+		texture_print(texture);
 	cli_written();
 }
 
@@ -961,16 +993,66 @@ static void save_factor(const struct train_options *options,
 	print_clamped(trained);
 	if (info.parts < INCISE_FACTOR_FOLDS)
 		printf("%d of %d parts, as small ones would reveal their pairs: a merge "
-		       "cross-validates over these\n",
-		       info.parts, INCISE_FACTOR_FOLDS);
+		       "%s\n",
+		       info.parts, INCISE_FACTOR_FOLDS,
+		       info.parts > 1 ? "cross-validates over these"
+				      : "with it cannot cross-validate; add sources, or "
+					"give incise merge --ridge");
 	cli_written();
+}
+
+/* Learn the texture, if one is asked for; NULL also where the model alone is as good. */
+static struct incise_texture *train_texture(const struct train_options *options,
+					    struct incise_train_source *sources,
+					    const struct incise_trained *trained)
+{
+	struct incise_texture *texture;
+	struct incise_error err = {0};
+
+	if (!options->texture)
+		return NULL;
+	texture = incise_train_texture(sources, options->n_paths, trained,
+				       &options->how.train, NULL, &err);
+	cli_progress_end();
+	if (!texture && err.code == EDOM) {
+		cli_warn("%s", err.text);
+		return NULL;
+	}
+	return cli_require(texture, &err);
+}
+
+/* Learn and save the texture of the model that its path names. */
+static void train_texture_alone(const struct train_options *options)
+{
+	char *path = cli_text("%.*s", (int)strlen(options->tex) - 4, options->tex);
+	struct incise_train_source *sources =
+		sources_new(options->paths, options->n_paths, &options->rows);
+	struct incise_error err = {0};
+	struct incise_trained trained = {
+		.model = cli_require(incise_model_load(path, &err), &err)};
+	struct incise_texture *texture = train_texture(options, sources, &trained);
+
+	if (texture)
+		cli_check(incise_texture_save(texture, options->tex, &err), &err);
+	if (options->json) {
+		json_print(json_pack("{so}", "texture", texture_json(texture)));
+	} else if (texture) {
+		texture_print(texture);
+		cli_written();
+	}
+	incise_texture_free(texture);
+	incise_trained_free(&trained);
+	sources_free(sources, options->n_paths);
+	free(path);
 }
 
 static void save_model(const struct train_options *options,
 		       const struct incise_trained *trained,
+		       const struct incise_texture *texture,
 		       struct incise_outfile *history)
 {
 	char *sd = path_beside(options->model, ".sd");
+	char *tex = texture ? path_beside(options->model, ".tex") : NULL;
 	struct incise_error err = {0};
 
 	hold_signals(SIG_BLOCK);
@@ -978,22 +1060,25 @@ static void save_model(const struct train_options *options,
 	     incise_model_save(trained->initial, options->initial, &err)) ||
 	    incise_model_save_notes(trained->model, options->model, trained->notes,
 				    &err) ||
-	    (sd && incise_uncertainty_save(trained->uncertainty, sd, &err)))
+	    (sd && incise_uncertainty_save(trained->uncertainty, sd, &err)) ||
+	    (tex && incise_texture_save(texture, tex, &err)))
 		cli_fail_with(&err);
 	whole_file_end(history);
 	hold_signals(SIG_UNBLOCK);
 	free(sd);
+	free(tex);
 }
 
 static void report_model(const struct train_options *options,
-			 const struct incise_trained *trained)
+			 const struct incise_trained *trained,
+			 const struct incise_texture *texture)
 {
 	json_t *warned = warnings(options, trained);
 
 	if (options->json)
-		report_train_json(options, trained, warned);
+		report_train_json(options, trained, texture, warned);
 	else if (strcmp(options->model, "-"))
-		report_train_text(options, trained);
+		report_train_text(options, trained, texture);
 	if (!options->json)
 		json_decref(warned);
 }
@@ -1003,6 +1088,7 @@ int main(int argc, char **argv)
 	const char *columns[INCISE_MODEL_INPUTS_MAX + 1 + INCISE_BUDGET_PARTS + FURTHER];
 	struct incise_model *premises = NULL;
 	struct incise_train_source *sources;
+	struct incise_texture *texture = NULL;
 	struct incise_outfile *history = NULL;
 	struct uncertainties uncertainties;
 	struct incise_trained trained;
@@ -1010,6 +1096,12 @@ int main(int argc, char **argv)
 	char *data;
 
 	parse_train(&options, argc, argv);
+	if (options.tex) {
+		check_writable(options.tex);
+		train_texture_alone(&options);
+		cli_finish();
+		return 0;
+	}
 	if (options.mpi)
 		join_job();
 	if (!job || !job->rank) {
@@ -1036,10 +1128,12 @@ int main(int argc, char **argv)
 	if (options.factor && trained.factor && (!job || !job->rank)) {
 		save_factor(&options, &trained);
 	} else if (trained.model) {
-		save_model(&options, &trained, history);
-		report_model(&options, &trained);
+		texture = train_texture(&options, sources, &trained);
+		save_model(&options, &trained, texture, history);
+		report_model(&options, &trained, texture);
 	}
 	cli_finish();
+	incise_texture_free(texture);
 	incise_trained_free(&trained);
 	incise_model_free(premises);
 	sources_free(sources, options.n_paths);

@@ -5,6 +5,7 @@
  *
  *   x[0], x[1] …     of the evaluator, a quarter of the support beyond either end too
  *   a cut            for the stages reaction and plane: any numbers, at which sums are held too
+ *   a texture        for plans
  */
 #ifndef INCISE_FX_TRIAL_H
 #define INCISE_FX_TRIAL_H
@@ -74,6 +75,35 @@ static inline void incise_fx_trial_force(uint64_t *state, struct incise_fx_trial
 	incise_fixed_stage_reaction(&cut->plan, &cut->state, &cut->tick);
 	incise_fixed_stage_plane(&cut->plan, &cut->state, &cut->tick);
 	incise_fx_copy(force, cut->state.force);
+}
+
+/* A saw-tooth that falls from knot to knot, up to @most of INCISE_TEXTURE_ONE. */
+static inline void incise_fx_trial_texture(uint64_t *state, int32_t most,
+					   struct incise_fixed_texture *to)
+{
+	int32_t rise, at = 0;
+
+	*to = (struct incise_fixed_texture){
+		.step_shift = 8 + (incise_fx_trial_number(state) & INT32_MAX) % 13,
+		.most = most,
+		.factor_most = 2 << 16,
+	};
+	for (int i = 0; i < INCISE_TEXTURE_CUTS; i++) {
+		to->factor[i] = 1 << 15;
+		to->factor[i] += (incise_fx_trial_number(state) & INT32_MAX) % (3 << 15);
+		to->start[i] = (uint16_t)(incise_fx_trial_number(state) &
+					  (INCISE_TEXTURE_KNOTS - 1));
+	}
+	rise = 1 + (incise_fx_trial_number(state) & 1023);
+	for (int i = 0; i < INCISE_TEXTURE_KNOTS; i++) {
+		bool falls =
+			at + rise > most || !(incise_fx_trial_number(state) & 15 << 20);
+
+		at = falls ? at - (incise_fx_trial_number(state) & INT32_MAX) %
+					     (at + most + 1)
+			   : at + rise;
+		to->knot[i] = (int16_t)at;
+	}
 }
 
 #endif

@@ -13,6 +13,7 @@ int incise_lines_open(struct incise_lines *in, const char *path,
 {
 	*in = (struct incise_lines){
 		.path = strcmp(path, "-") || kind->regular ? path : "standard input",
+		.kind = kind->name,
 		.file = incise_infile_open(path, kind, err),
 		.err = err};
 	if (!in->file)

@@ -10,7 +10,7 @@
 #include "c_locale.h"
 
 struct incise_lines {
-	const char *path;
+	const char *path, *kind; /* the latter with an article */
 	int line;
 	char *text; /* the present line */
 	struct incise_infile *file;

@@ -40,6 +40,8 @@
 		"path of the tip since it first touched the surface over that time"
 #define INCISE_DEEPEST_COLUMN \
 	"deepest_mm", "mm", "largest depth since the tip first touched the surface"
+#define INCISE_WAY_COLUMN \
+	"way_mm", "mm", "of the front through new tissue: depth and length of the cut"
 
 enum incise_model_input {
 	INCISE_INPUT_DEPTH,

@@ -153,6 +153,23 @@ bool incise_fixed_numbers_good(const struct incise_fixed_numbers *numbers)
 	return true;
 }
 
+bool incise_fixed_texture_good(const struct incise_fixed_texture *texture)
+{
+	if (!in_range(texture->step_shift, 8, 20) ||
+	    !in_range(texture->most, 0, INCISE_TEXTURE_MOST) ||
+	    !in_range(texture->factor_most, 1, INCISE_TEXTURE_FACTOR_MOST) ||
+	    texture->reserved)
+		return false;
+	for (int i = 0; i < INCISE_TEXTURE_CUTS; i++)
+		if (!in_range(texture->factor[i], 1, texture->factor_most) ||
+		    texture->start[i] >= INCISE_TEXTURE_KNOTS)
+			return false;
+	for (int i = 0; i < INCISE_TEXTURE_KNOTS; i++)
+		if (!in_range(texture->knot[i], -texture->most, texture->most))
+			return false;
+	return true;
+}
+
 int64_t incise_fixed_plan_fade_ns(const struct incise_fixed_numbers *numbers)
 {
 	/* 2^28 · 2^25 */
@@ -178,6 +195,8 @@ static int open_parts(struct incise_fixed_plan *plan, const uint8_t *bytes,
 
 	if (!is_within_plan(head->model_at, head->model_size, head->size) ||
 	    !is_within_plan(head->heights_at, head->heights_size, head->size) ||
+	    !is_within_plan(head->texture_at,
+			    head->texture_at ? sizeof(*plan->texture) : 0, head->size) ||
 	    !head->heights_size == (head->numbers.shape.kind == INCISE_FIXED_GRID))
 		return BAD;
 	plan->has_model = head->model_size > 0;
@@ -198,6 +217,12 @@ static int open_parts(struct incise_fixed_plan *plan, const uint8_t *bytes,
 			head->heights_size);
 	if (!rc && head->numbers.unloading && !plan->has_model)
 		return BAD;
+	if (!rc && head->texture_at) {
+		plan->texture = (const void *)(bytes + head->texture_at);
+		/* A rise of it is as steep as the tissue unloads. */
+		if (!head->numbers.unloading || !incise_fixed_texture_good(plan->texture))
+			return BAD;
+	}
 	return rc;
 }
 
@@ -206,8 +231,12 @@ static int open_parts(struct incise_fixed_plan *plan, const uint8_t *bytes,
 #define NUMBER(...)
 #define MORE(member) || numbers->member
 
-uint32_t incise_fixed_plan_version(const struct incise_fixed_numbers *numbers)
+uint32_t incise_fixed_plan_version(const struct incise_fixed_plan_header *head)
 {
+	const struct incise_fixed_numbers *numbers = &head->numbers;
+
+	if (head->texture_at)
+		return INCISE_FIXED_PLAN_VERSION_TEXTURE;
 	if (numbers->account || numbers->upright
 #include "../tissue/forces.def"
 	)
@@ -231,10 +260,9 @@ int incise_fixed_plan_open(struct incise_fixed_plan *plan, const void *blob,
 		if (head->magic[i] != INCISE_FIXED_PLAN_MAGIC[i])
 			return BAD;
 	if (head->version < INCISE_FIXED_PLAN_VERSION ||
-	    head->version > INCISE_FIXED_PLAN_VERSION_MORE)
+	    head->version > INCISE_FIXED_PLAN_VERSION_TEXTURE)
 		return UNSUPPORTED;
-	if (head->version != incise_fixed_plan_version(&head->numbers) ||
-	    head->size != size || head->reserved ||
+	if (head->version != incise_fixed_plan_version(head) || head->size != size ||
 	    head->crc != incise_fx_crc(bytes + INCISE_FIXED_PLAN_CRC_FROM,
 				       size - INCISE_FIXED_PLAN_CRC_FROM) ||
 	    !incise_fx_is_name(head->name, sizeof(head->name)) ||

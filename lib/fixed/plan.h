@@ -4,8 +4,8 @@
  * the whole of arithmetic = "fixed" in a program, and runs unchanged in the kernel module. lib/tissue
  * has the same stages in double.
  *
- *   pose ─▶ predict ─▶ tool ─▶ contact ─▶ normal ─▶ incision ─▶ membrane ─▶ forces ─▶ start ─▶
- *   limit ─▶ targets
+ *   pose ─▶ predict ─▶ tool ─▶ contact ─▶ normal ─▶ incision ─▶ membrane ─▶ texture ─▶ forces ─▶
+ *   start ─▶ limit ─▶ targets
  *
  * Parts that a scene does not need are 0 in its plan, and cost a comparison.
  *
@@ -28,11 +28,13 @@
 #include "input.h"
 #include "integers.h"
 #include "shape.h"
+#include "texture.h"
 
 #define INCISE_FIXED_PLAN_MAGIC "INCISEPL"
 #define INCISE_FIXED_PLAN_VERSION 1
 #define INCISE_FIXED_PLAN_VERSION_INPUTS 2 /* of a plan with @inputs */
 #define INCISE_FIXED_PLAN_VERSION_MORE 3   /* of a plan with forces that came later */
+#define INCISE_FIXED_PLAN_VERSION_TEXTURE 4
 #define INCISE_FIXED_PLAN_SIZE_MAX (32 << 20)
 
 #define INCISE_FIXED_FORCE_MAX (1 << 28) /* of a plan's limit: 4096 N */
@@ -92,8 +94,8 @@ bool incise_fixed_filter_good(const struct incise_fixed_filter *filter);
 /* The same of a setup of cuts. */
 bool incise_fixed_incision_good(const struct incise_fixed_incision_setup *setup);
 
-/* The bytes of a plan, all little-endian: this, then a model (a blob as of incise/fixed.h) and the
- * heights of a grid, each at a multiple of 8 bytes. */
+/* The bytes of a plan, all little-endian: this, then a model (a blob as of incise/fixed.h), the
+ * heights of a grid and a texture, each at a multiple of 8 bytes. */
 struct incise_fixed_plan_header {
 	char magic[8];
 	uint32_t version;
@@ -101,9 +103,9 @@ struct incise_fixed_plan_header {
 	uint32_t crc;			   /* CRC-32C of all behind this field */
 	uint32_t model_at, model_size;	   /* 0: none */
 	uint32_t heights_at, heights_size; /* 0: none */
-	uint32_t reserved;
-	char name[64];	  /* of the scene's file, zero-padded */
-	char surface[32]; /* what it was: "plane", "mesh" … */
+	uint32_t texture_at;		   /* 0: none */
+	char name[64];			   /* of the scene's file, zero-padded */
+	char surface[32];		   /* what it was: "plane", "mesh" … */
 	struct incise_fixed_numbers numbers;
 };
 
@@ -125,6 +127,7 @@ struct incise_fixed_plan {
 	struct incise_fixed model; /* where has_model */
 	bool has_model;
 	struct incise_fixed_grid grid;
+	const struct incise_fixed_texture *texture; /* of the cut, or NULL */
 	const struct incise_fixed_surface
 		*surface; /* takes the place of shape; or NULL */
 };
@@ -139,8 +142,8 @@ struct incise_fixed_plan {
 int incise_fixed_plan_open(struct incise_fixed_plan *plan, const void *blob,
 			   uint32_t size);
 
-/* The version of a plan of these numbers. */
-uint32_t incise_fixed_plan_version(const struct incise_fixed_numbers *numbers);
+/* The version of a plan, by its numbers and parts. */
+uint32_t incise_fixed_plan_version(const struct incise_fixed_plan_header *head);
 
 /* The same of numbers alone, without a model and a grid. @return whether they are good */
 bool incise_fixed_numbers_good(const struct incise_fixed_numbers *numbers);

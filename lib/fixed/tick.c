@@ -93,6 +93,24 @@ int32_t incise_fixed_model_force(const struct incise_fixed_plan *plan, int32_t p
 	return incise_fixed_eval(model, x);
 }
 
+int32_t incise_fixed_texture_at(const struct incise_fixed_plan *plan,
+				const struct incise_fixed_way *way, int32_t *factor)
+{
+	const struct incise_fixed_texture *texture = plan->texture;
+	uint32_t cut = way->number % INCISE_TEXTURE_CUTS, shift, from;
+	int64_t part, a, b;
+
+	shift = (uint32_t)texture->step_shift;
+	from = texture->start[cut] + (uint32_t)(way->most >> shift);
+	part = way->most & ((1 << shift) - 1);
+	a = texture->knot[from % INCISE_TEXTURE_KNOTS];
+	b = texture->knot[(from + 1) % INCISE_TEXTURE_KNOTS];
+	*factor = texture->factor[cut];
+	/* 2^16 · 2^20, of Q14 in Q16 */
+	return (int32_t)(N(1) + incise_fx_rounded(a * (1 << shift) + (b - a) * part,
+						  (int)shift - 2));
+}
+
 /* --- ticks ------------------------------------------------------------------------------ */
 
 void incise_fixed_plan_begin(const struct incise_fixed_plan *plan,
@@ -150,6 +168,7 @@ void incise_fixed_plan_tick(const struct incise_fixed_plan *plan,
 	incise_fixed_stage_normal(plan, state, tick);
 	incise_fixed_stage_incision(plan, state, tick);
 	incise_fixed_stage_membrane(plan, state, tick);
+	incise_fixed_stage_texture(plan, state, tick);
 #define FORCE(row, name, ...) incise_fixed_stage_##name(plan, state, tick);
 #define NUMBER(...)
 #define MORE(member)

@@ -31,8 +31,9 @@ static double find_student(double n)
 /* The slopes are held down as if by so many pairs of the whole range. */
 #define SLOPE_PAIRS 1
 
-/* As many shares of the slopes are tried, from 0 on. */
-#define SHARES 5
+/* Shares of the slopes that are tried; above 1, as small errors count as ERROR_LEAST and flatten them. */
+#define SHARES 9
+#define SHARE_STEP 0.25
 
 /* Fewer units than these have no quantile: Student's t widens the one of so many. */
 #define UNITS_MANY 18
@@ -149,39 +150,47 @@ static double score_share(const struct held *h, double share)
 	return sum;
 }
 
+double incise_common_variance(const struct incise_unit *unit, int n_units, double square,
+			      double *within)
+{
+	double all = 0, n = 0, between = 0;
+
+	for (int i = 0; i < n_units; i++) {
+		n += unit[i].n > 0;
+		all += unit[i].n;
+		between += unit[i].n > 0 ? unit[i].sum * unit[i].sum / unit[i].n : 0;
+	}
+	*within = (square - between) / (all - n);
+	return all > n ? fmax(0, (between / n - *within) * n / all) : 0;
+}
+
 /*
- * The share of the noise's variance that the pairs of a unit have in common, by analysis of
- * variance, over the number of units; 0 where a unit is one pair.
+ * The share of the noise's variance that the pairs of a unit have in common over the number of units; 0 where
+ * a unit is one pair.
  */
 static int find_shared(const struct held *h, const double *slope, double *shared)
 {
 	int n_units = h->folds->n_units, n = 0;
-	struct unit {
-		double n, sum;
-	} *unit = calloc((size_t)n_units, sizeof(*unit));
-	double all = 0, square = 0, between = 0, within, common;
+	struct incise_unit *unit = calloc((size_t)n_units, sizeof(*unit));
+	double square = 0, within, common;
 	size_t at = 0;
 
 	if (!unit)
 		return -ENOMEM;
 	for (int f = 0; f < h->folds->n; f++)
 		for (size_t i = 0; i < h->folds->held[f].n; i++, at++) {
-			struct unit *u = &unit[h->folds->unit[f][i]];
+			struct incise_unit *u = &unit[h->folds->unit[f][i]];
 			double e = h->ratios[at] *
 				   exp(-product_of(slope, h->x + at * h->d, h->d));
 
 			n += u->n == 0;
 			u->n++;
 			u->sum += e;
-			all++;
 			square += e * e;
 		}
-	for (int i = 0; i < n_units; i++)
-		between += unit[i].n > 0 ? unit[i].sum * unit[i].sum / unit[i].n : 0;
+	common = incise_common_variance(unit, n_units, square, &within);
 	free(unit);
-	within = (square - between) / (all - n);
-	common = fmax(0, (between / n - within) * n / all);
-	*shared = all > n && square > 0 ? common / (common + within) / n : 0;
+	*shared = common > 0 ? common / (common + within) / n : 0;
 	return 0;
 }
 
@@ -205,11 +214,11 @@ static int fit_interval(struct held *h, struct incise_interval *interval)
 	if (!rc)
 		rc = fit_slopes(h, -1, least, slope);
 	for (int i = 0; i < SHARES && !rc; i++) {
-		double score = score_share(h, (double)i / (SHARES - 1));
+		double score = score_share(h, SHARE_STEP * i);
 
 		if (score < lowest) {
 			lowest = score;
-			share = (double)i / (SHARES - 1);
+			share = SHARE_STEP * i;
 		}
 	}
 	if (rc)

@@ -28,6 +28,18 @@ int incise_interval_noise(const struct incise_basis *basis,
 int incise_interval_fit(const struct incise_folds *folds, const double *ratios,
 			struct incise_interval *interval);
 
+/* Values of a unit. */
+struct incise_unit {
+	double n, sum;
+};
+
+/*
+ * The variance that the values of a unit have in common, by analysis of variance, and that within units;
+ * @square: the sum of the squares of all. 0 where each unit is one value.
+ */
+double incise_common_variance(const struct incise_unit *unit, int n_units, double square,
+			      double *within);
+
 /* Student's t widens the noise by this factor where units are few; 0: their number is not known. */
 double incise_interval_widening(uint64_t units);
 

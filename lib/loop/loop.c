@@ -284,6 +284,7 @@ int incise_loop_run(struct incise_plan *plan, struct incise_clock *clock,
 		prctl(PR_SET_TIMERSLACK, slack_ns);
 	incise_plan_poses(run.plan, &poses);
 	incise_pose_counts_add(&stats->poses, &poses);
+	stats->texture_felt = incise_plan_texture_felt(run.plan);
 	released = incise_plan_release(run.plan);
 	if (!rc && !ended)
 		rc = released;

@@ -6,6 +6,7 @@
 #include <errno.h>
 #include <float.h>
 #include <inttypes.h>
+#include <limits.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -13,7 +14,7 @@
 #include <incise/outfile.h>
 #include <incise/uncertainty.h>
 #include "../base/c_locale.h"
-#include "../base/lines.h"
+#include "companion.h"
 #include "model.h"
 
 #define VERSION 3
@@ -37,52 +38,6 @@ static int calibrations(const struct incise_uncertainty *u)
 	return u->n_common + u->n_rig;
 }
 
-/* FNV-1a of the numbers that the output depends on, in the machine's double format. */
-static void sum(uint64_t *hash, double value)
-{
-	unsigned char bytes[sizeof(value)];
-
-	memcpy(bytes, &value, sizeof(value));
-	for (size_t i = 0; i < sizeof(value); i++) {
-#if __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__
-		*hash ^= bytes[sizeof(value) - 1 - i];
-#else
-		*hash ^= bytes[i];
-#endif
-		*hash *= 0x100000001b3;
-	}
-}
-
-static uint64_t checksum(const struct incise_model *model)
-{
-	int d = model->info.n_inputs, n_rules = model->info.n_rules;
-	uint64_t hash = 0xcbf29ce484222325;
-
-	sum(&hash, d);
-	for (int i = 0; i < d; i++) {
-		const struct incise_variable *v = &model->info.input[i];
-
-		sum(&hash, v->min);
-		sum(&hash, v->max);
-		for (int k = 0; k < model->info.n_mfs[i]; k++) {
-			const struct incise_mf *mf = incise_model_mf(model, i, k);
-
-			for (const char *c = incise_mf_type_name(mf->type); *c; c++)
-				sum(&hash, *c);
-			for (int j = 0; j < incise_mf_n_params(mf->type); j++)
-				sum(&hash, mf->p[j]);
-		}
-	}
-	for (int r = 0; r < n_rules; r++) {
-		sum(&hash, model->rule[r].weight);
-		for (int i = 0; i < d; i++)
-			sum(&hash, incise_model_rule(model, r)->mf[i]);
-		for (int i = 0; i <= d; i++)
-			sum(&hash, incise_model_rule(model, r)->p[i]);
-	}
-	return hash;
-}
-
 static int unknowns(const struct incise_model *model)
 {
 	return model->info.n_rules * (model->info.n_inputs + 1);
@@ -97,7 +52,7 @@ static struct incise_uncertainty *make(const struct incise_model *model)
 		return NULL;
 	u->n = (int)n;
 	u->n_inputs = model->info.n_inputs;
-	u->checksum = checksum(model);
+	u->checksum = incise_model_checksum(model);
 	u->shape.shared = NAN;
 	u->factor = malloc(n * (n + 1) / 2 * sizeof(*u->factor));
 	if (!u->factor) {
@@ -371,115 +326,23 @@ double incise_uncertainty_sd(const struct incise_uncertainty *uncertainty,
 
 #define fail incise_lines_error
 
-/* Next line that is not empty or a comment: 1, or 0 at the end. */
-static int next_uncertainty_line(struct incise_lines *in)
-{
-	int rc;
-
-	do
-		rc = incise_lines_next(in, " \t\r\n");
-	while (rc > 0 && (!*in->text || *in->text == '#'));
-	return rc;
-}
-
-/* The line "KEY VALUE": its value, or NULL. */
-static char *value_of(struct incise_lines *in, const char *key)
-{
-	size_t length = strlen(key);
-	int rc = next_uncertainty_line(in);
-
-	if (rc < 0)
-		return NULL;
-	if (!rc || strncmp(in->text, key, length) || in->text[length] != ' ') {
-		fail(in, EINVAL, "expected '%s', found '%.40s': not a .sd file", key,
-		     rc ? in->text : "the end");
-		return NULL;
-	}
-	return in->text + length + 1;
-}
-
-static int integer_of(struct incise_lines *in, const char *key, long *value)
-{
-	char *text = value_of(in, key), *end;
-
-	if (!text)
-		return -errno;
-	errno = 0;
-	*value = strtol(text, &end, 10);
-	if (end == text || *end || errno)
-		return fail(in, EINVAL, "%s: '%.40s' is not a whole number", key, text);
-	return 0;
-}
-
-/* A finite number at *at, behind one space for all but the first. */
-static int read_uncertainty_number(struct incise_lines *in, char **at, double *value)
-{
-	char *end;
-
-	*value = incise_decimal(*at, &end);
-	if (end == *at || (*end && *end != ' '))
-		return fail(in, EINVAL, "'%.30s' is not a number", *at);
-	if (!isfinite(*value))
-		return fail(in, EINVAL, "'%.*s' is not finite", (int)(end - *at), *at);
-	*at = end;
-	return 0;
-}
-
-/* So many numbers of a line, from *at on. */
-static int numbers(struct incise_lines *in, char **at, double *to, int n)
-{
-	int rc = 0;
-
-	for (int k = 0; k < n && !rc; k++)
-		rc = read_uncertainty_number(in, at, to + k);
-	return rc;
-}
-
-/* The line "KEY NUMBERS…" of so many. */
-static int numbers_of(struct incise_lines *in, const char *key, double *to, int n)
-{
-	char *at = value_of(in, key);
-	int rc = at ? numbers(in, &at, to, n) : -errno;
-
-	if (!rc && *at)
-		return fail(in, EINVAL, "%s: expected no more than %s", key,
-			    n == 1 ? "one number" : "three numbers");
-	return rc;
-}
-
-/* A row of the triangle, or of the calibrations: a line of n numbers. */
-static int read_row(struct incise_lines *in, double *to, int n)
-{
-	int rc = next_uncertainty_line(in);
-	char *at = in->text;
-
-	if (!rc)
-		return fail(in, EINVAL,
-			    "the file ends before its last row: it is truncated; train "
-			    "again");
-	rc = rc < 0 ? rc : numbers(in, &at, to, n);
-	if (!rc && *at)
-		return fail(in, EINVAL, "a row has more than %d numbers", n);
-	return rc;
-}
-
 static int read_noise(struct incise_lines *in, struct incise_uncertainty *u)
 {
 	struct incise_uncertainty_shape shape = {0};
-	int rc = numbers_of(in, "noise", &u->noise, 1);
+	int rc = incise_companion_numbers(in, "noise", &u->noise, 1);
 
 	if (!rc && u->noise < 0)
 		return fail(in, EINVAL, "noise: expected a number that is not negative");
 	if (!rc)
-		rc = numbers_of(in, "shared", &shape.shared, 1);
+		rc = incise_companion_numbers(in, "shared", &shape.shared, 1);
 	if (shape.shared == UNKNOWN)
 		shape.shared = NAN;
 	if (!rc)
-		rc = numbers_of(in, "offset", &shape.offset, 1);
+		rc = incise_companion_numbers(in, "offset", &shape.offset, 1);
 	for (int i = 0; i < u->n_inputs && !rc; i++) {
 		double slope[3];
 
-		rc = numbers_of(in, "slope", slope, 3);
+		rc = incise_companion_numbers(in, "slope", slope, 3);
 		shape.slope[i] = slope[0];
 		shape.low[i] = slope[1];
 		shape.high[i] = slope[2];
@@ -494,62 +357,36 @@ static int read_noise(struct incise_lines *in, struct incise_uncertainty *u)
 static int read_uncertainty_file(struct incise_lines *in, struct incise_uncertainty *u)
 {
 	double *to = u->factor;
-	char *text, *end;
-	uint64_t sum;
 	long value, n_common, n_rig;
-	int rc = integer_of(in, "incise-sd", &value);
+	int rc = incise_companion_head(in, "incise-sd", VERSION, &u->checksum);
 
-	if (rc)
-		return rc;
-	if (value != VERSION)
-		return fail(in, EINVAL,
-			    "version %ld: this incise reads version %d; train again",
-			    value, VERSION);
-	text = value_of(in, "model");
-	if (!text)
-		return -errno;
-	sum = strtoull(text, &end, 16);
-	if (strspn(text, "0123456789abcdef") != 16 || *end)
-		return fail(in, EINVAL, "model: '%.40s' is not a checksum of 16 digits",
-			    text);
-	if (sum != u->checksum)
-		return fail(in, ESTALE,
-			    "stale: made for other parameters of the model; train "
-			    "again, or remove it");
-	rc = integer_of(in, "unknowns", &value);
+	if (!rc)
+		rc = incise_companion_whole(in, "unknowns", LONG_MIN, LONG_MAX, &value);
 	if (rc)
 		return rc;
 	if (value != u->n)
 		return fail(in, EINVAL, "unknowns: %ld, the model has %d", value, u->n);
 	rc = read_noise(in, u);
 	if (!rc)
-		rc = integer_of(in, "common", &n_common);
+		rc = incise_companion_whole(in, "common", 0, u->n, &n_common);
 	if (!rc)
-		rc = integer_of(in, "rig", &n_rig);
+		rc = incise_companion_whole(in, "rig", 0, INCISE_UNCERTAINTY_SOURCES,
+					    &n_rig);
 	if (rc)
 		return rc;
-	if (n_common < 0 || n_common > u->n || n_rig < 0 ||
-	    n_rig > INCISE_UNCERTAINTY_SOURCES)
-		return fail(in, EINVAL,
-			    "expected at most %d common and %d rig calibrations", u->n,
-			    INCISE_UNCERTAINTY_SOURCES);
 	if (make_calibrations(u, (int)n_common, (int)n_rig))
 		return fail(in, ENOMEM, "no memory to read it");
 	for (int row = 0; row < u->n && !rc; to += u->n - row, row++) {
-		rc = read_row(in, to, u->n - row);
+		rc = incise_companion_row(in, to, u->n - row);
 		if (!rc && *to == 0)
 			return fail(in, EINVAL,
 				    "row %d begins with 0: the factor is singular",
 				    row + 1);
 	}
 	for (int i = 0; i < calibrations(u) && !rc; i++)
-		rc = read_row(in, u->calibration + (size_t)i * (size_t)u->n, u->n);
-	if (rc)
-		return rc;
-	rc = next_uncertainty_line(in);
-	if (rc > 0)
-		return fail(in, EINVAL, "'%.20s' after the last row", in->text);
-	return rc;
+		rc = incise_companion_row(in, u->calibration + (size_t)i * (size_t)u->n,
+					  u->n);
+	return rc ? rc : incise_companion_end(in);
 }
 
 struct incise_uncertainty *incise_uncertainty_load(const char *path,
@@ -581,14 +418,6 @@ struct incise_uncertainty *incise_uncertainty_load(const char *path,
 	return u;
 }
 
-/* Returns what comes behind the row. */
-static const double *write_row(FILE *out, const double *row, int n)
-{
-	for (int k = 0; k < n; k++)
-		fprintf(out, "%.17g%c", row[k], k + 1 < n ? ' ' : '\n');
-	return row + n;
-}
-
 int incise_uncertainty_save(const struct incise_uncertainty *uncertainty,
 			    const char *path, struct incise_error *err)
 {
@@ -611,11 +440,11 @@ int incise_uncertainty_save(const struct incise_uncertainty *uncertainty,
 		fprintf(out, "slope %.17g %.17g %.17g\n", shape->slope[i], shape->low[i],
 			shape->high[i]);
 	fprintf(out, "common %d\nrig %d\n", uncertainty->n_common, uncertainty->n_rig);
-	for (int i = 0; i < uncertainty->n; i++)
-		from = write_row(out, from, uncertainty->n - i);
+	for (int n = uncertainty->n; n > 0; from += n--)
+		incise_companion_write_row(out, from, n);
 	from = uncertainty->calibration;
-	for (int i = 0; i < calibrations(uncertainty); i++)
-		from = write_row(out, from, uncertainty->n);
+	for (int i = 0; i < calibrations(uncertainty); i++, from += uncertainty->n)
+		incise_companion_write_row(out, from, uncertainty->n);
 	incise_c_locale_end(locale);
 	return incise_outfile_commit(file, err);
 }

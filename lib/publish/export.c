@@ -25,7 +25,7 @@ struct bin {
 	uint64_t n;
 	double t_s, depth_mm, velocity_mm_s, force_N; /* means … */
 	double acceleration_mm_s2, tilt_deg, time_in_tissue_s;
-	double mean_speed_mm_s, deepest_mm;
+	double mean_speed_mm_s, deepest_mm, way_mm;
 	double m2;    /* sum of squared deviations of the force */
 	int64_t cuts; /* that have samples here */
 	int last;     /* the cut counted last */
@@ -138,6 +138,7 @@ static void bin_add(struct bin *bin, size_t at, const struct pass *pass,
 	bin->mean_speed_mm_s +=
 		share * (pass->blade.mean_speed_mm_s - bin->mean_speed_mm_s);
 	bin->deepest_mm += share * (pass->blade.deepest_mm - bin->deepest_mm);
+	bin->way_mm += share * (pass->blade.way_mm - bin->way_mm);
 	bin->force_N += share * delta;
 	bin->m2 += delta * (sample->force_N - bin->force_N);
 	bin->clipped |= sample->clipped;
@@ -290,6 +291,7 @@ static const struct incise_table_column raw_columns[] = {
 	COLUMN(bin.time_in_tissue_s, SINGLE, 4, INCISE_TIME_COLUMN),
 	COLUMN(bin.mean_speed_mm_s, SINGLE, 3, INCISE_MEAN_SPEED_COLUMN),
 	COLUMN(bin.deepest_mm, SINGLE, 4, INCISE_DEEPEST_COLUMN),
+	COLUMN(bin.way_mm, SINGLE, 4, INCISE_WAY_COLUMN),
 };
 
 struct raw {

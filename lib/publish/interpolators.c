@@ -369,6 +369,7 @@ static int more_depth(struct incise_blade_pose *blade, struct incise_error *err)
 		blade->stay.began_ns,
 		incise_stay_mean_speed_mm_s(&blade->stay),
 		blade->stay.deepest_mm,
+		blade->progress.highest_mm,
 	};
 	if (deep[0].t_ns != INCISE_TIME_NONE)
 		blade->rate_mm_s = (deep[1].depth_mm - deep[0].depth_mm) /
@@ -477,19 +478,24 @@ static void set_history(const struct incise_blade_pose *blade, int64_t t_ns, dou
 {
 	const struct incise_blade_depth *before = &blade->deep[0],
 					*after = &blade->deep[1], *of = after;
+	bool both =
+		before->inside && after->inside && before->began_ns == after->began_ns;
 
 	value->time_in_tissue_s = value->mean_speed_mm_s = value->deepest_mm =
-		isnan(share) ? NAN : 0;
+		value->way_mm = isnan(share) ? NAN : 0;
 	if (!after->inside || after->began_ns > t_ns)
 		of = before;
 	if (isnan(share) || !of->inside)
 		return;
 	value->time_in_tissue_s = (double)(t_ns - of->began_ns) * 1e-9;
-	value->mean_speed_mm_s =
-		before->inside && after->inside && before->began_ns == after->began_ns
-			? mix_interpolators(before->mean_speed_mm_s,
-					    after->mean_speed_mm_s, share)
-			: of->mean_speed_mm_s;
+	value->mean_speed_mm_s = both ? mix_interpolators(before->mean_speed_mm_s,
+							  after->mean_speed_mm_s, share)
+				      : of->mean_speed_mm_s;
+	/* The record after the end of a cut starts again. */
+	value->way_mm =
+		both ? fmax(mix_interpolators(before->way_mm, after->way_mm, share),
+			    before->way_mm)
+		     : of->way_mm;
 	value->deepest_mm = fmax(of == before || before->began_ns == after->began_ns
 					 ? before->deepest_mm
 					 : 0,

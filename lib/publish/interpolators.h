@@ -105,7 +105,7 @@ struct incise_blade_depth {
 	bool advancing;
 	bool inside;	  /* the tissue … */
 	int64_t began_ns; /* … since then */
-	double mean_speed_mm_s, deepest_mm;
+	double mean_speed_mm_s, deepest_mm, way_mm;
 };
 
 /*
@@ -144,6 +144,7 @@ struct incise_blade_pose_value {
 	/* As in the haptic loop; see ../../control/model_input.h. Outside of tissue the last three are 0. */
 	double acceleration_mm_s2, tilt_deg, time_in_tissue_s;
 	double mean_speed_mm_s, deepest_mm;
+	double way_mm;	      /* progress of the cut, which never falls within it */
 	int64_t station, cut; /* 0: not known; outside cuts */
 	bool button, interpolated, error;
 	bool advancing; /* at both records around; false where depth is not known */

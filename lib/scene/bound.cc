@@ -65,6 +65,8 @@ struct T(plan) {
 	struct errors poses; /* of what is shown, by their rounding */
 	/* The error of a normal at any tick of the contact. */
 	double turned_in, turned_own;
+	const struct incise_fixed_texture *texture; /* or NULL */
+	double steepest;			    /* slope of its τ, 1/mm */
 };
 
 #include "../tissue/predict.proto.c"
@@ -274,6 +276,36 @@ num T(model_force)(const struct T(plan) *plan, int32_t phase, const num *x, bool
 	return num::of(put(force));
 }
 
+/* A texture is as far off as its steepest tooth goes in the error of the way, and no farther than it goes at all. */
+num T(texture_at)(const struct T(plan) *plan, const struct T(way) *way, num *factor)
+{
+	double most = (double)plan->texture->most / INCISE_TEXTURE_ONE;
+	struct bounds s = at(way->most.id);
+
+	*factor = num::of(
+		put({0, ldexp(plan->texture->factor_most, -16), 0, 0, 16, false}));
+	return num::of(
+		put({1 - most, 1 + most, fmin(plan->steepest * s.in, 2 * most),
+		     fmin(plan->steepest * s.own, 2 * most) + lsb_mm() / 2, 16, false}));
+}
+
+static void set_texture(struct T(plan) *plan)
+{
+	const struct incise_fixed_texture *texture = plan->of->texture;
+	int steepest = 0;
+
+	plan->texture = texture;
+	for (int i = 0; texture && i < INCISE_TEXTURE_KNOTS; i++) {
+		int rise =
+			texture->knot[(i + 1) % INCISE_TEXTURE_KNOTS] - texture->knot[i];
+
+		steepest = abs(rise) > steepest ? abs(rise) : steepest;
+	}
+	if (texture)
+		plan->steepest = (double)steepest / INCISE_TEXTURE_ONE /
+				 ldexp(1, texture->step_shift - 16);
+}
+
 /* --- the plan's numbers -------------------------------------------------------------------- */
 
 template <int Bits> static void set(bounded<Bits> &to, double value)
@@ -332,6 +364,7 @@ static void set_numbers(struct T(plan) *plan)
 	set(to->membrane.stiffness, from->membrane.stiffness);
 	set(to->membrane.back_wall, from->membrane.back_wall);
 	plan->has_model = plan->of->doubles.plan.has_model;
+	set_texture(plan);
 }
 
 /* --- poses: the state of a filter ---------------------------------------------------------- */
@@ -685,10 +718,14 @@ static void run_paths(struct tick *t)
 		struct T(tick) tick = t->tick;
 
 		run_contact(&t->plan, &state, &tick);
+		T(stage_texture)(&t->plan, &state, &tick);
 		if (t->plan.has_model && at(t->plan.numbers.unloading.id).high > 0 &&
 		    state.held == INCISE_TOOL_BLADE)
 			take(&t->cutting,
-			     T_JOINED(&state, cutting_force(&t->plan, &state, &tick)).id);
+			     T_JOINED(&state,
+				      texture(&t->plan, &state, &tick,
+					      cutting_force(&t->plan, &state, &tick)))
+				     .id);
 		run_forces(t, &state, &tick);
 		if (paths->dead)
 			continue;
@@ -745,6 +782,19 @@ static void settle_front(struct tick *t)
 	front->cut = num::of(put({0, reach, cut + way, 0, 16, false}));
 	if (more)
 		fail("what it asks for is in no bound");
+}
+
+/*
+ * The way of the front is the largest of sums of a depth, the length of the line and an eighth of a distance, in all
+ * ticks together: no more than their errors add up.
+ */
+static void settle_way(struct tick *t)
+{
+	const struct T(line) *line = &t->state.front.line;
+	double off_mm = t->depth.both + off(at(line->from.id)) + 2 * off(at(line->to.id));
+	num way = num::of(put({0, 4 * t->plan.reach_mm, off_mm, 0, 16, false}));
+
+	t->state.front.way.most = t->state.front.way.before = way;
 }
 
 /*
@@ -856,6 +906,10 @@ static double bound_of(struct tick *t, int32_t held)
 	t->state.tears.tip =
 		num::of(put({-t->plan.reach_mm, t->plan.reach_mm, 0, 0, 16, false}));
 	run_paths(t);
+	if (t->plan.texture) {
+		settle_way(t);
+		run_paths(t);
+	}
 	if (t->cutting.high > 0) {
 		settle_front(t);
 		run_paths(t);

@@ -117,6 +117,7 @@ static void take_tissue(struct incise_plan *plan)
 	const struct incise_scene *scene = plan->scene;
 
 	plan->gain = plan->hold.gain > 0 ? plan->hold.gain : scene->tissue.gain;
+	plan->texture = scene->texture;
 	for (int i = 0; i < incise_n_tissue_forces; i++) {
 		struct incise_acting_force *own = &plan->acting[i];
 		const double *number = scene->tissue.force[i];

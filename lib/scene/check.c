@@ -6,6 +6,7 @@
 #include <limits.h>
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include "../base/units.h"
 #include "../base/vector.h"
@@ -27,14 +28,27 @@ static const enum incise_model_input unmoved[] = {INCISE_INPUT_TILT, INCISE_INPU
 						  INCISE_INPUT_MEAN_SPEED};
 #define UNMOVED ((int)(sizeof(unmoved) / sizeof(*unmoved)))
 
+/* Take another search of the same plan in: the one that swings, or took longer to come to rest, stays. */
+static void add_search(struct incise_rest *rest, const struct incise_rest *other)
+{
+	const struct incise_rest before = *rest;
+
+	if (!other->rests || other->worst.settle_s > rest->worst.settle_s)
+		*rest = *other;
+	rest->weakest = before.weakest;
+	incise_rest_take_weakest(&rest->weakest, &other->weakest);
+	rest->runs = before.runs + other->runs;
+	rest->ticks = before.ticks + other->ticks;
+}
+
 /*
  * Search as the inputs are, then with those unmoved ones held at either end of their supports, in all
  * combinations, until one swings; a blade is not below the deepest depth, which is held at its upper end. Returns 0 or
  * -ENOMEM.
  */
-static int search_check(struct incise_plan *plan,
-			const struct incise_tracker_info *tracker,
-			const struct incise_rest_trial *as_is, struct incise_rest *rest)
+static int search_inputs(struct incise_plan *plan,
+			 const struct incise_tracker_info *tracker,
+			 const struct incise_rest_trial *as_is, struct incise_rest *rest)
 {
 	struct incise_rest_trial own = *as_is, *const trial = &own;
 	enum incise_model_input inputs[UNMOVED];
@@ -62,18 +76,45 @@ static int search_check(struct incise_plan *plan,
 			plan->doubles.plan.holds |= 2U << inputs[i];
 		}
 		rc = incise_plan_rest(plan, tracker, trial, &here);
-		if (rc)
-			break;
-		here.runs += rest->runs;
-		here.ticks += rest->ticks;
-		incise_rest_take_weakest(&here.weakest, &rest->weakest);
-		if (!here.rests || here.worst.settle_s > rest->worst.settle_s)
-			*rest = here;
-		rest->weakest = here.weakest;
-		rest->runs = here.runs;
-		rest->ticks = here.ticks;
+		if (!rc)
+			add_search(rest, &here);
 	}
 	plan->doubles.plan.holds = 0;
+	return rc;
+}
+
+/*
+ * With a texture, first as if its largest factor were constant: while a tool swings in one place, the front stays where
+ * it was deepest, and so does its factor. Then by the texture itself, of the first cut.
+ */
+static int search_check(struct incise_plan *plan,
+			const struct incise_tracker_info *tracker,
+			const struct incise_rest_trial *as_is, struct incise_rest *rest)
+{
+	const struct incise_fixed_texture *texture = plan->texture;
+	struct incise_fixed_texture *constant = NULL;
+	struct incise_rest here;
+	int rc;
+
+	if (!texture)
+		return search_inputs(plan, tracker, as_is, rest);
+	constant = calloc(1, sizeof(*constant));
+	if (!constant)
+		return -ENOMEM;
+	constant->step_shift = texture->step_shift;
+	constant->factor_most =
+		(int32_t)lrint(incise_plan_texture_most(plan) * INCISE_FIXED_ONE);
+	for (int i = 0; i < INCISE_TEXTURE_CUTS; i++)
+		constant->factor[i] = constant->factor_most;
+	plan->texture = constant;
+	rc = search_inputs(plan, tracker, as_is, rest);
+	plan->texture = texture;
+	free(constant);
+	if (rc || !rest->rests)
+		return rc;
+	rc = search_inputs(plan, tracker, as_is, &here);
+	if (!rc)
+		add_search(rest, &here);
 	return rc;
 }
 
@@ -264,7 +305,8 @@ int incise_plan_check_rest(struct incise_plan *plan,
 	return incise_error_set(
 		err, EDOM,
 		"%s: not stable: %s oscillates %s%s, on a device of %g kg and "
-		"%g N s/mm with %s; %s, or describe the device",
+		"%g N s/mm with %s; %s%s, or describe the device",
 		plan->scene->path, run, how, with, s->device.mass_kg,
-		s->device.damping_N_s_mm, delay, text);
+		s->device.damping_N_s_mm, delay, text,
+		plan->texture ? ", leave out its texture" : "");
 }

@@ -48,6 +48,11 @@ static const char *no_membrane(const struct incise_plan *plan)
 						      : "the scene has no membrane";
 }
 
+static const char *no_texture(const struct incise_plan *plan)
+{
+	return plan->texture ? zero(plan, NULL) : "the scene has no texture";
+}
+
 static const char *no_work(const struct incise_plan *plan)
 {
 	return plan->accounts && plan->gain > 0
@@ -67,6 +72,7 @@ static const struct {
 	{"normal", INCISE_STAGE(normal), no_normal, false},
 	{"incision", INCISE_STAGE(incision), no_tool, false},
 	{"membrane", INCISE_STAGE(membrane), no_membrane, false},
+	{"texture", INCISE_STAGE(texture), no_texture, false},
 	{"start", INCISE_STAGE(start), NULL, true},
 	{"work", INCISE_STAGE(work), no_work, false},
 	{"limit", INCISE_STAGE(limit), NULL, false},

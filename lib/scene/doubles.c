@@ -54,6 +54,7 @@ static void set_model(const struct incise_plan *plan, struct incise_double_plan 
 
 	to->has_model = plan->model || plan->fixed;
 	to->compiled = plan->fixed;
+	to->texture = plan->texture;
 	for (int i = 0; i < INCISE_CUTTING_PHASES; i++) {
 		to->model[i] = i == INCISE_CUT ? plan->model : cut[i].model;
 		to->inputs[i] = 0;

@@ -449,6 +449,7 @@ struct incise_integers *incise_integers_new(const struct incise_plan *plan,
 	integers->plan.has_model = plan->fixed;
 	if (plan->fixed)
 		integers->plan.model = *plan->fixed;
+	integers->plan.texture = plan->texture;
 	incise_proxy_init(&integers->proxy, plan->surface, plan->proxy.leave_mm);
 	integers->mesh = (struct incise_fixed_surface){
 		.context = integers,

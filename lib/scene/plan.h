@@ -67,7 +67,7 @@ struct incise_doubles {
 };
 
 /* Stages besides forces; those that no loop has are always left out. */
-#define INCISE_PLAN_OTHER_STAGES 11
+#define INCISE_PLAN_OTHER_STAGES 12
 #define INCISE_PLAN_NO_STAGES 2
 _Static_assert(INCISE_PLAN_OTHER_STAGES + INCISE_FORCES <= INCISE_PLAN_STAGES_MAX,
 	       "raise INCISE_PLAN_STAGES_MAX");
@@ -98,6 +98,11 @@ struct incise_plan_kernel {
 	int64_t life_ns; /* so often, at least */
 	bool follow;	 /* all actuators do */
 	bool fade_told;	 /* the last one said whether to fade as it is */
+};
+
+/* Sums of 1, a mean force, its texture and the force that acts, times each other. */
+struct incise_felt {
+	double sum[4][4];
 };
 
 struct incise_plan {
@@ -143,8 +148,10 @@ struct incise_plan {
 	bool accounts;			  /* for the work of its forces */
 	const struct incise_model *model; /* fuzzy: one of these */
 	const struct incise_fixed *fixed;
-	struct incise_fixed *own_fixed; /* compiled here */
+	struct incise_fixed *own_fixed;		    /* compiled here */
+	const struct incise_fixed_texture *texture; /* of the cut, checked, or NULL */
 	struct incise_acting_force acting[INCISE_FORCES];
+	struct incise_felt felt;
 
 	struct incise_doubles doubles;	  /* by all of the above */
 	struct incise_integers *integers; /* with arithmetic = "fixed"; else NULL */
@@ -194,8 +201,20 @@ bool incise_plan_kind_range(const struct incise_plan *plan, enum incise_model_in
 /* Scale all numbers of a checked plan that go with the gain. incise_plan_set_numbers() takes it over. */
 void incise_plan_set_gain(struct incise_plan *plan, double gain);
 
+/* The most by which the plan's texture multiplies its model's force, (1 + max τ) · factor; 1 without one. */
+double incise_plan_texture_most(const struct incise_plan *plan);
+
 /* Fill in the plan in double, by all that was found of the scene. */
 void incise_plan_set_numbers(struct incise_plan *plan);
+
+/* Take in a tick of new tissue: its model's force and the texture of that, which are along the normal. */
+void incise_plan_feel(struct incise_plan *plan, const struct incise_tick *tick,
+		      double mean_N, double texture_N) INCISE_REALTIME;
+
+/* Add a tick; the share of the texture that acts, NaN: not known. */
+void incise_felt_add(struct incise_felt *felt, double mean_N, double texture_N,
+		     double acting_N) INCISE_REALTIME;
+double incise_felt_share(const struct incise_felt *felt);
 
 /* Take the force away, and keep why. Returns @rc. */
 int incise_plan_fail(struct incise_plan *plan, struct incise_tick *tick,

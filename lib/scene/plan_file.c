@@ -70,7 +70,6 @@ struct incise_plan_file *incise_plan_file_new(const struct incise_plan *plan,
 		rc = incise_integers_file(plan, &head.numbers, &heights, err);
 	if (rc)
 		goto out;
-	head.version = incise_fixed_plan_version(&head.numbers);
 	take_name(head.name, plan->scene->path);
 	strncpy(head.surface,
 		plan->scene->surface_kind ? plan->scene->surface_kind : "plane",
@@ -87,6 +86,11 @@ struct incise_plan_file *incise_plan_file_new(const struct incise_plan *plan,
 				    (uint32_t)heights.frame.rows * 4;
 		head.size += aligned(head.heights_size);
 	}
+	if (plan->texture) {
+		head.texture_at = head.size;
+		head.size += aligned(sizeof(*plan->texture));
+	}
+	head.version = incise_fixed_plan_version(&head);
 	file = calloc(1, sizeof(*file) + head.size);
 	if (!file) {
 		rc = incise_error_set(err, ENOMEM, "no memory for a plan");
@@ -97,6 +101,9 @@ struct incise_plan_file *incise_plan_file_new(const struct incise_plan *plan,
 		memcpy(file->bytes + head.model_at, model->blob, model->size);
 	if (heights.height)
 		memcpy(file->bytes + head.heights_at, heights.height, head.heights_size);
+	if (plan->texture)
+		memcpy(file->bytes + head.texture_at, plan->texture,
+		       sizeof(*plan->texture));
 	memcpy(file->bytes, &head, sizeof(head));
 	head.crc = incise_crc32c(0, file->bytes + INCISE_FIXED_PLAN_CRC_FROM,
 				 head.size - INCISE_FIXED_PLAN_CRC_FROM);

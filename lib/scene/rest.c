@@ -1034,7 +1034,9 @@ static void search_rest(struct search *s, const struct incise_plan *plan,
 					.reserve = RESERVE,
 					.every = guided[i].every};
 
-		if (model && !lean_all(s, plan, trial, &way, number, rest))
+		/* Along teeth a blade goes up and down; along their largest factor it does not. */
+		if (model && (!plan->texture || plan->texture != plan->scene->texture) &&
+		    !lean_all(s, plan, trial, &way, number, rest))
 			return;
 	}
 }

@@ -55,6 +55,16 @@ static void finish_tick(struct incise_plan *plan, struct incise_tick *tick)
 	tick->flags |= from->flags;
 }
 
+/* A tick at which the front met new tissue, where its texture is not 0. */
+static void feel(struct incise_plan *plan, const struct incise_tick *tick)
+{
+	double texture_N = n_to(OWN(plan)->tick.textured);
+	double tau = n_to(OWN(plan)->state.tooth) - 1;
+
+	if (fabs(texture_N) > 0 && fabs(tau) > 0)
+		incise_plan_feel(plan, tick, texture_N / tau, texture_N);
+}
+
 /* Inlined into both, so that the tick without times does not pay for them. */
 static inline __attribute__((always_inline)) int run_stages(struct incise_plan *plan,
 							    int64_t t_ns,
@@ -89,6 +99,8 @@ static inline __attribute__((always_inline)) int run_stages(struct incise_plan *
 	}
 	if (found)
 		finish_tick(plan, tick);
+	if (plan->texture)
+		feel(plan, tick);
 	return 0;
 }
 

@@ -12,6 +12,7 @@
 #include "../base/crc32c.h"
 #include "../base/vector.h"
 #include "../control/pose_loop.h"
+#include "../model/texture.h"
 #include "../tissue/incision.h"
 #include "scene.h"
 
@@ -45,6 +46,10 @@ static const struct incise_setting tissue[] = {
 		       "elastic width of a cut"),
 	SETTING_WHOLE(cuts_most, tissue.cuts_most, "", 1, 1024, "64",
 		      "largest number of straight cuts in an incision, 1.2 KiB each"),
+	SETTING_NUMBER(variation, tissue.variation, "", 0, 1, "0",
+		       "share of the texture's variation of the force from cut to cut"),
+	SETTING_WHOLE(seed, tissue.seed, "", 0, INT32_MAX, "1",
+		      "seed of texture and variation: the same cuts for the same seed"),
 	{0},
 };
 
@@ -521,11 +526,55 @@ static const struct incise_setting model_settings[] = {
 	SETTING_OWN(cut, "", "(required)", "model of a blade that cuts"),
 	SETTING_OWN(puncture, "", "(none)", "of one that opens the skin"),
 	SETTING_OWN(withdraw, "", "(none)", "of one that is drawn out"),
+	SETTING_OWN(texture, "", "(none)", "texture of the cut, .tex"),
 	{0},
 };
 
-/* In the order of enum incise_cutting_phase. */
-static const char *const cutting_phases[] = {"cut", "puncture", "withdraw", NULL};
+/* In the order of enum incise_cutting_phase, and the texture. */
+static const char *const cutting_phases[] = {"cut", "puncture", "withdraw", "texture",
+					     NULL};
+
+/* Keep the tables that ticks read along the way of a front. */
+static int read_texture(struct incise_scene *scene, const config_setting_t *group,
+			struct incise_error *err)
+{
+	struct incise_texture *texture;
+	struct incise_error why = {0};
+	const char *name = NULL;
+	int rc = 0;
+
+	if (!config_setting_get_member(group, "texture"))
+		return 0;
+	if (!config_setting_lookup_string(group, "texture", &name))
+		return incise_conf_error(group, "texture", scene->path, err,
+					 "text in quotes");
+	if (!scene->tissue.dissipates)
+		return incise_conf_error(
+			group, "texture", scene->path, err,
+			"no texture with tissue.withdrawal \"paper\", by which a blade "
+			"that comes out would get back the work of a fall");
+	scene->texture_path = beside(scene, name);
+	scene->texture = calloc(1, sizeof(*scene->texture));
+	if (!scene->texture_path || !scene->texture)
+		return incise_error_set(err, ENOMEM, "%s: no memory", scene->path);
+	texture = incise_texture_load(scene->texture_path, scene->cut[INCISE_CUT].model,
+				      &why);
+	if (!texture)
+		return incise_error_set(err, why.code, "%s: its texture %s", scene->path,
+					why.text);
+	incise_texture_info(texture, &scene->learned);
+	incise_texture_fill(texture, scene->tissue.variation,
+			    (uint64_t)scene->tissue.seed, scene->texture);
+	if (strcmp(scene->learned.unit, "mm"))
+		rc = incise_error_set(err, EINVAL,
+				      "%s: its texture %s is over a way in %.20s; name "
+				      "one over mm",
+				      scene->path, scene->texture_path,
+				      scene->learned.unit);
+	scene->learned.unit = "mm";
+	incise_texture_free(texture);
+	return rc;
+}
 
 static int read_phases(struct incise_scene *scene, const config_setting_t *group,
 		       struct incise_error *err)
@@ -548,7 +597,7 @@ static int read_phases(struct incise_scene *scene, const config_setting_t *group
 			group, "withdraw", scene->path, err,
 			"no model with tissue.withdrawal \"paper\", by which "
 			"a blade comes out with the force of its cut");
-	return rc;
+	return rc ? rc : read_texture(scene, group, err);
 }
 
 static int read_model(struct incise_scene *scene, const config_setting_t *root,
@@ -557,17 +606,23 @@ static int read_model(struct incise_scene *scene, const config_setting_t *root,
 	const config_setting_t *setting = config_setting_get_member(root, "model");
 	const char *name = NULL;
 
+	int rc = 0;
+
 	if (override)
 		return load_model(scene, &scene->cut[INCISE_CUT], strdup(override), err);
-	if (!setting)
-		return 0;
-	if (config_setting_is_group(setting))
-		return read_phases(scene, setting, err);
-	name = config_setting_get_string(setting);
-	if (!name)
-		return incise_conf_error(setting, NULL, scene->path, err,
-					 "text in quotes, or a group { cut = …; }");
-	return load_model(scene, &scene->cut[INCISE_CUT], beside(scene, name), err);
+	if (setting && config_setting_is_group(setting))
+		rc = read_phases(scene, setting, err);
+	else if (setting && !(name = config_setting_get_string(setting)))
+		rc = incise_conf_error(setting, NULL, scene->path, err,
+				       "text in quotes, or a group { cut = …; }");
+	else if (setting)
+		rc = load_model(scene, &scene->cut[INCISE_CUT], beside(scene, name), err);
+	if (!rc && scene->tissue.variation > 0 && !(scene->learned.variation > 0))
+		rc = incise_conf_error(config_setting_get_member(root, "tissue"),
+				       "variation", scene->path, err,
+				       "0 without a model.texture that has one; incise "
+				       "train --texture learns it from several cuts");
+	return rc;
 }
 
 /* --- relations between keys --------------------------------------------------------- */
@@ -708,6 +763,14 @@ void incise_scene_set_full(struct incise_scene *scene, bool full)
 	scene->full = full;
 }
 
+void incise_scene_leave_texture_out(struct incise_scene *scene)
+{
+	free(scene->texture);
+	free(scene->texture_path);
+	scene->texture = NULL;
+	scene->texture_path = NULL;
+}
+
 void incise_scene_free(struct incise_scene *scene)
 {
 	if (!scene)
@@ -717,6 +780,7 @@ void incise_scene_free(struct incise_scene *scene)
 		incise_fixed_free(scene->cut[i].compiled);
 		free(scene->cut[i].path);
 	}
+	incise_scene_leave_texture_out(scene);
 	incise_surface_free(scene->surface);
 	free(scene->path);
 	free(scene->surface_path);
@@ -725,9 +789,12 @@ void incise_scene_free(struct incise_scene *scene)
 
 const char *incise_scene_file(const struct incise_scene *scene, int i)
 {
-	const char *files[] = {scene->path, scene->cut[INCISE_CUT].path,
+	const char *files[] = {scene->path,
+			       scene->cut[INCISE_CUT].path,
 			       scene->cut[INCISE_PUNCTURE].path,
-			       scene->cut[INCISE_WITHDRAW].path, scene->surface_path};
+			       scene->cut[INCISE_WITHDRAW].path,
+			       scene->texture_path,
+			       scene->surface_path};
 	const int n = sizeof(files) / sizeof(*files);
 
 	for (int k = 0; k < n; k++)

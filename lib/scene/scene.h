@@ -10,8 +10,10 @@
 #include <incise/model.h>
 #include <incise/plan.h>
 #include <incise/scene.h>
+#include <incise/texture.h>
 #include "../base/settings.h"
 #include "../control/model_input.h"
+#include "../fixed/texture.h"
 #include "../surface/surface.h"
 #include "forces.h"
 
@@ -43,15 +45,20 @@ struct incise_scene {
 	 */
 	bool unchecked;
 	struct incise_scene_model cut[INCISE_CUTTING_PHASES];
-	struct incise_surface *surface; /* or NULL: the rig's plane */
-	const char *surface_kind;	/* as the file names it */
+	char *texture_path; /* of model.texture, or NULL */
+	struct incise_fixed_texture
+		*texture; /* its tables; NULL: each cut is the mean one */
+	struct incise_texture_info learned; /* 0 without one in the file */
+	struct incise_surface *surface;	    /* or NULL: the rig's plane */
+	const char *surface_kind;	    /* as the file names it */
 	struct incise_scene_surface named;
 	struct {
 		double gain, leave_mm;
 		bool dissipates;	  /* withdrawal = "dissipative"; else "paper" */
 		bool printed_orientation; /* orientation = "paper"; else "eased" */
 		double cut_from_mm, stretch_mm;
-		int cuts_most;
+		int cuts_most, seed;
+		double variation; /* share of the learned one */
 		double force[INCISE_FORCES][INCISE_FORCE_NUMBERS];
 	} tissue;
 	struct incise_scene_membrane membrane;

@@ -14,7 +14,9 @@
 
 /*
  * The unloading is steeper than any slope of the model, so that the force can follow it: by as
- * much that the force may rise with the speed on the work that a cut has taken.
+ * much that the force may rise with the speed on the work that a cut has taken. With a texture it is also as steep as the
+ * model is by the texture's largest factor; a tooth that rises more steeply does not, for the front is a stop, and its
+ * force rises with this stiffness at most.
  */
 #define STEEPER 1.25
 
@@ -141,6 +143,18 @@ static double opening_slope(const struct incise_plan *plan)
 	return rise_N / INCISE_PUNCTURE_MM;
 }
 
+double incise_plan_texture_most(const struct incise_plan *plan)
+{
+	const struct incise_fixed_texture *texture = plan->texture;
+	int most = 0;
+
+	for (int i = 0; texture && i < INCISE_TEXTURE_KNOTS; i++)
+		most = texture->knot[i] > most ? texture->knot[i] : most;
+	return texture ? (1 + (double)most / INCISE_TEXTURE_ONE) * texture->factor_most /
+				 INCISE_FIXED_ONE
+		       : 1;
+}
+
 /* The stiffness with which a model's tissue unloads, and its slope beyond its support. */
 static void set_tissue(struct incise_plan *plan)
 {
@@ -149,8 +163,9 @@ static void set_tissue(struct incise_plan *plan)
 
 	plan->beyond_N_mm = fmin(fmax(plan->gain * plan->edge_N_mm, 0), steepest_N_mm);
 	/* Softer than the model, it could not follow it. */
-	plan->unloading_N_mm = fmax(
-		own > 0 ? fmax(own, steepest_N_mm) : STEEPER * steepest_N_mm, LEAST_N_mm);
+	plan->unloading_N_mm =
+		fmax(fmax(own > 0 ? own : STEEPER * steepest_N_mm, LEAST_N_mm),
+		     incise_plan_texture_most(plan) * steepest_N_mm);
 }
 
 /* Take the slopes of a phase's model into the plan's, where they are larger. */

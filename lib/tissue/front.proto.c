@@ -31,6 +31,9 @@
 /* A blade so far beside the line of its cut is in new tissue: half the width of a blade. */
 #define BESIDE N(1)
 
+/* Share of the way beside a line in the way of the front: a curve is little longer than its chords. */
+#define ASIDE N_OF(1, 8)
+
 /* --- line --- */
 
 void T(line_along)(dir along[3], const dir normal[3], const dir side[3])
@@ -107,6 +110,7 @@ static void keep(struct T(front) *front)
 	front->n = front->n ? front->n : 1;
 	front->kept[front->in].line = front->line;
 	front->kept[front->in].cut = front->cut;
+	front->kept[front->in].way = front->way;
 }
 
 static void begin_cut_of(struct T(front) *front, const num at[3], const dir normal[3],
@@ -137,12 +141,25 @@ bool T(front_enter)(struct T(front) *front, const num at[3], const dir normal[3]
 	front->work2 = front->most2 = 0;
 	if (there < 0) {
 		begin_cut_of(front, at, normal, side);
+		front->way = (struct T(way)){.number = front->begun++};
 		return true;
 	}
 	front->in = there;
 	front->line = front->kept[there].line;
 	front->cut = front->kept[there].cut;
+	front->way = front->kept[there].way;
 	return false;
+}
+
+/* Length of a line, and a share of the way beside it, by its parts: both add up from line to line. */
+static num length_of(const struct T(line) *line, const num at[3])
+{
+	num off[3];
+
+	off_line(off, line, at);
+	return n_add(n_sub(line->to, line->from),
+		     n_times(ASIDE,
+			     n_add(n_add(n_abs(off[0]), n_abs(off[1])), n_abs(off[2]))));
 }
 
 num T(front_advance)(struct T(front) *front, const num at[3], const dir normal[3],
@@ -157,8 +174,20 @@ num T(front_advance)(struct T(front) *front, const num at[3], const dir normal[3
 		return n_sub(n_sub(line->to, line->from), length);
 	/* It left the line sideways; a curved skin does that too. The cut goes on from here. */
 	keep(front);
+	front->way.before += w_of(length_of(line, at));
 	begin_cut_of(front, at, normal, side);
 	return BESIDE;
+}
+
+bool T(front_way)(struct T(front) *front, const num at[3], num depth)
+{
+	wide way = front->way.before +
+		   w_of(n_add(length_of(&front->line, at), n_max(depth, 0)));
+
+	if (!(front->way.most < way))
+		return false;
+	front->way.most = way;
+	return true;
 }
 
 num T(front_force)(struct T(front) *front, num unloading, num friction, num depth,

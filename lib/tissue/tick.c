@@ -98,6 +98,22 @@ double incise_double_model_force(const struct incise_double_plan *plan, int32_t 
 	return incise_fixed_eval_double(compiled, at);
 }
 
+double incise_double_texture_at(const struct incise_double_plan *plan,
+				const struct incise_double_way *way, double *factor)
+{
+	const struct incise_fixed_texture *texture = plan->texture;
+	uint32_t cut = way->number % INCISE_TEXTURE_CUTS, from;
+	double at = way->most * INCISE_FIXED_ONE / (1 << texture->step_shift), a, b;
+
+	/* Nor is NaN below. */
+	at = at < 1e15 ? at : 0;
+	from = texture->start[cut] + (uint32_t)(int64_t)at;
+	a = texture->knot[from % INCISE_TEXTURE_KNOTS];
+	b = texture->knot[(from + 1) % INCISE_TEXTURE_KNOTS];
+	*factor = texture->factor[cut] / (double)INCISE_FIXED_ONE;
+	return 1 + (a + (at - floor(at)) * (b - a)) / INCISE_TEXTURE_ONE;
+}
+
 void incise_double_plan_begin(const struct incise_double_plan *plan,
 			      struct incise_double_state *state)
 {

@@ -39,6 +39,7 @@ struct incise_double_plan {
 	uint32_t inputs[INCISE_CUTTING_PHASES];
 	const struct incise_fixed
 		*compiled; /* in place of the model of the cut, or NULL */
+	const struct incise_fixed_texture *texture; /* of the cut, or NULL */
 	/* Inputs that a search for swings holds: bits 1 << their kinds, and where. */
 	unsigned int holds;
 	double held[INCISE_FIXED_INPUT_KINDS];

@@ -618,6 +618,36 @@ static num front_friction(const struct T(plan) *plan, const struct T(state) *sta
 	return n_below(0, most) ? n_within(n_over(drag, most), 0, N(1)) : 0;
 }
 
+/*
+ * The texture of a cut, a saw-tooth over the way of the front. It scales the force at which the tissue gives way,
+ * before the front: a fall of that loses elastic energy, and a rise is felt no steeper than the tissue unloads.
+ */
+void T(stage_texture)(const struct T(plan) *plan, struct T(state) *state,
+		      struct T(tick) *tick)
+{
+	if (!plan->texture || tick->phase != INCISE_PHASE_CUTTING)
+		return;
+	state->fresh = T_JOINED(state, advance(state));
+	state->goes_on =
+		!state->membrane.hit &&
+		T(front_way)(&state->front, state->proxy.touch.point, state->depth);
+	state->tooth = T(texture_at)(plan, &state->front.way, &state->factor);
+}
+
+static num texture(const struct T(plan) *plan, const struct T(state) *state,
+		   struct T(tick) *tick, num size)
+{
+	num to;
+
+	if (!plan->texture)
+		return size;
+	size = n_times(size, state->factor);
+	to = n_times(size, state->tooth);
+	if (state->goes_on)
+		tick->textured = n_sub(to, size);
+	return to;
+}
+
 void T(stage_reaction)(const struct T(plan) *plan, struct T(state) *state,
 		       struct T(tick) *tick)
 {
@@ -632,8 +662,9 @@ void T(stage_reaction)(const struct T(plan) *plan, struct T(state) *state,
 	} else if (!n_below(0, numbers->unloading)) {
 		size = T_JOINED(state, cutting_force(plan, state, tick));
 	} else {
-		fresh = T_JOINED(state, advance(state));
-		size = T_JOINED(state, cutting_force(plan, state, tick));
+		fresh = plan->texture ? state->fresh : T_JOINED(state, advance(state));
+		size = texture(plan, state, tick,
+			       T_JOINED(state, cutting_force(plan, state, tick)));
 		friction = front_friction(plan, state, tick, size);
 		size = T_JOINED(state,
 				T(front_force)(&state->front, numbers->unloading,

@@ -4,7 +4,7 @@
  * and no_kind.h, by ../fixed/plan.h for the integers of programs and the kernel, by tick.h for double.
  * The .proto.c beside this are the physics, once; they are compiled for each kind.
  *
- *   pose ─▶ predict ─▶ tool ─▶ contact ─▶ normal ─▶ incision ─▶ membrane ─▶ forces ─▶ start ─▶ work ─▶ limit
+ *   pose ─▶ predict ─▶ tool ─▶ contact ─▶ normal ─▶ incision ─▶ membrane ─▶ texture ─▶ forces ─▶ start ─▶ work ─▶ limit
  *
  * A stage that its plan does not need does nothing, and may be left out. Lengths mm, forces N, springs
  * N/mm, speeds mm/s; times ns of CLOCK_MONOTONIC. All functions of a tick are real-time safe, and take
@@ -96,6 +96,13 @@ void T(line_along)(dir along[3], const dir normal[3], const dir side[3]) INCISE_
 
 #define T_FRONT_CUTS 8
 
+/* The way of a front through new tissue; see T(front_way)(). */
+struct T(way) {
+	wide most;	 /* Q16 mm, ≥ 0 */
+	wide before;	 /* on the lines of the cut before this one; Q16 mm */
+	uint32_t number; /* of the cut, from 0 on */
+};
+
 /* The front of a cut; see front.proto.c. Begins with {0}. It remembers this many cuts, with the one in which it is. */
 struct T(front) {
 	num depth, force; /* of the last call */
@@ -107,8 +114,11 @@ struct T(front) {
 	struct {
 		struct T(line) line;
 		num cut;
+		struct T(way) way;
 	} kept[T_FRONT_CUTS]; /* as they were left; that in which it is, as it was entered */
 	int32_t n, in, newest; /* so many there are; it is in this one; this began last */
+	struct T(way) way;
+	uint32_t begun; /* cuts, so far */
 };
 
 /*
@@ -122,6 +132,14 @@ bool T(front_enter)(struct T(front) *front, const num at[3], const dir normal[3]
 /* Length of new tissue since the last call: the way of the blade beyond its own cut. */
 num T(front_advance)(struct T(front) *front, const num at[3], const dir normal[3],
 		     const dir side[3]) INCISE_REALTIME;
+
+/*
+ * Move the way of the front through new tissue on: of all places where the blade was, it is the largest sum of the
+ * length of its cut, until then, and its depth. So it depends on places alone, and not on how often they are looked
+ * at; it stays while the blade rests, draws back or is where it was. Call after T(front_advance)(). Returns whether it
+ * went on.
+ */
+bool T(front_way)(struct T(front) *front, const num at[3], num depth) INCISE_REALTIME;
 
 /*
  * The force on the blade, out of the tissue: -friction × cutting … cutting. Any numbers are safe.
@@ -359,6 +377,9 @@ struct T(state) {
 	wide path;	    /* … and its path, until … */
 	int64_t path_ns;
 	int32_t skin_open; /* it came into a cut that was there */
+	num fresh;	   /* with stage texture: new tissue of this tick … */
+	num factor, tooth; /* … factor of the cut and 1 + τ … */
+	int32_t goes_on;   /* … and whether the front met new tissue */
 	num open;	   /* so deep a spring meets friction only */
 	dir side[3];	   /* of the blade when its contact began: Sx(0) */
 	dir flat[3];	   /* of blade and handle now */
@@ -395,13 +416,14 @@ struct T(tick) {
 	num command[3];
 	num along[T_AXES_MAX];	    /* force of each actuator */
 	int32_t target[T_AXES_MAX]; /* of its nut, steps */
-	uint32_t flags;		    /* INCISE_TICK_… */
-	int32_t phase, held;	    /* enum incise_phase, enum incise_tool */
+	num textured;	     /* N of the cut due to τ, where the front met new tissue */
+	uint32_t flags;	     /* INCISE_TICK_… */
+	int32_t phase, held; /* enum incise_phase, enum incise_tool */
 };
 
 struct T(plan);
 
-/* --- of each kind of plan besides: its surface and its model --- */
+/* --- of each kind of plan besides: its surface, its model and its texture --- */
 
 /* Follow the tool: touching, began; with those the touch, and the first one. */
 void T(surface_move)(const struct T(plan) *plan, struct T(proxy) *proxy,
@@ -419,6 +441,10 @@ uint32_t T(model_inputs)(const struct T(plan) *plan, int32_t phase) INCISE_REALT
 /* Its force, N; sets @outside where an input is beyond its range. */
 num T(model_force)(const struct T(plan) *plan, int32_t phase, const num *x,
 		   bool *outside) INCISE_REALTIME;
+
+/* 1 + τ of the plan's texture, at a way of a cut, and the factor of that cut. */
+num T(texture_at)(const struct T(plan) *plan, const struct T(way) *way,
+		  num *factor) INCISE_REALTIME;
 
 /*
  * Inputs: the rate of change of the speed |v|, mm/s², which below 5 mm/s goes to 0 with the speed, for a
@@ -456,6 +482,7 @@ T(stage_fn) T(stage_contact);
 T(stage_fn) T(stage_normal);
 T(stage_fn) T(stage_incision);
 T(stage_fn) T(stage_membrane);
+T(stage_fn) T(stage_texture);
 #define FORCE(row, name, ...) T(stage_fn) T(stage_##name);
 #define NUMBER(...)
 #define MORE(member)

@@ -418,9 +418,9 @@ class Recording:
 
         Without bins every force sample, or with rate_hz means over 1/rate_hz: cut, t_s, depth_mm,
         velocity_mm_s, force_N, clipped, advancing, acceleration_mm_s2, tilt_deg, time_in_tissue_s,
-        mean_speed_mm_s, deepest_mm.
+        mean_speed_mm_s, deepest_mm, way_mm.
         With bins of depth and velocity (both) the means of each bin with min_count samples or more:
-        [cut,] depth_mm, velocity_mm_s, force_N, sd_N, count, cuts, advancing, and the last five.
+        [cut,] depth_mm, velocity_mm_s, force_N, sd_N, count, cuts, advancing, and acceleration to deepest.
         With tai, rows without bins end with tai_ns and tai_u_ns, the bound of its error.
         With uncertainty "total" or "parts" there are columns of standard uncertainties, see
         incise-export(1); which are of force_N, table.fields says in uncertainty_variables.

@@ -19,6 +19,9 @@ models() {
 	made_pairs >pairs.csv
 	printf '5 20\n' >points
 	report train train pairs.csv -o m.fis
+	report train.texture train tooth.rec -o t.fis --texture
+	report info.texture info t.fis.tex
+	report info.textured info t.fis
 	report train.groups train pairs.csv -o g.fis --group cut --check 0.3
 	incise train <(many_pairs 8) --premises m.fis --group cut -o m.fac >/dev/null
 	report merge merge m.fac -o merged.fis

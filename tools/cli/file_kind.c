@@ -55,6 +55,7 @@ static const struct {
 	 "convert it: tr '\\t' ',' < %1$s > NEW.csv"},
 	{"a factor (.fac)", ".fac",
 	 "'incise info %1$s' describes it, 'incise merge' makes a model of factors"},
+	{"the texture of a model (.tex)", ".tex", "'incise info %1$s' describes it"},
 };
 
 /* The command that makes one kind from another. */
@@ -190,6 +191,8 @@ static enum file_kind kind_of_text(const char *text)
 		return strstr(text, "\"incise_session\"") ? FILE_SESSION : FILE_REPORT;
 	if (!strncmp(text, "incise-sd ", 10))
 		return FILE_DEVIATION;
+	if (!strncmp(text, "incise-tex ", 11))
+		return FILE_TEXTURE;
 	kind = kind_of_settings(text);
 	return kind ? kind : kind_of_table(text);
 }

@@ -27,8 +27,9 @@ enum file_kind {
 	FILE_DATABASE = 1 << 15,   /* SQLite */
 	FILE_SEMICOLONS = 1 << 16, /* a table that is no CSV: its separator */
 	FILE_TABS = 1 << 17,
-	FILE_FACTOR = 1 << 18, /* .fac */
-	FILE_KINDS = 19,
+	FILE_FACTOR = 1 << 18,	/* .fac */
+	FILE_TEXTURE = 1 << 19, /* .tex */
+	FILE_KINDS = 20,
 };
 
 /*

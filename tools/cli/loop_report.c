@@ -81,6 +81,13 @@ json_t *loop_lateness_json(const struct incise_loop_stats *s)
 			 histogram_json(s->lateness_us));
 }
 
+void loop_texture_line(const struct incise_loop_stats *s)
+{
+	if (!isnan(s->texture_felt))
+		printf("texture    %.0f %% of it acted on the hand\n",
+		       100 * s->texture_felt);
+}
+
 void loop_lateness_line(const struct incise_loop_stats *s)
 {
 	char a[32], b[32], c[32];

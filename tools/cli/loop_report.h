@@ -33,6 +33,9 @@ const char *loop_below(char *text, size_t size, double us);
 /* Lateness of the wake-ups, µs, with the histogram. */
 json_t *loop_lateness_json(const struct incise_loop_stats *stats);
 
+/* The line "texture", if there was one. */
+void loop_texture_line(const struct incise_loop_stats *stats);
+
 /* The line "lateness". */
 void loop_lateness_line(const struct incise_loop_stats *stats);
 

@@ -94,7 +94,8 @@ static void note_input(const char *path, const struct stat *st)
 
 void cli_input(const char *path)
 {
-	char *beside = cli_text("%s.sd", path), *whole = file_without_choice(path),
+	char *beside[] = {cli_text("%s.sd", path), cli_text("%s.tex", path)},
+	     *whole = file_without_choice(path),
 	     *within = cli_text("%s/recording.db", whole);
 	struct stat st;
 
@@ -104,11 +105,16 @@ void cli_input(const char *path)
 			note_input("standard input", &st);
 	} else if (!stat(whole, &st) && (S_ISREG(st.st_mode) || !access(within, F_OK))) {
 		note_input(whole, &st);
-		/* The uncertainty of a model belongs to it. */
-		if (S_ISREG(st.st_mode) && !stat(beside, &st) && S_ISREG(st.st_mode))
-			note_input(beside, &st);
+		/* The uncertainty and the texture of a model belong to it. */
+		for (int i = 0; i < 2 && S_ISREG(st.st_mode); i++) {
+			struct stat other;
+
+			if (!stat(beside[i], &other) && S_ISREG(other.st_mode))
+				note_input(beside[i], &other);
+		}
 	}
-	free(beside);
+	free(beside[0]);
+	free(beside[1]);
 	free(whole);
 	free(within);
 }

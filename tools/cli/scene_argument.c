@@ -128,6 +128,8 @@ struct incise_scene *scene_argument_read(const struct scene_argument *argument,
 	struct incise_scene *scene =
 		incise_scene_load(argument->path, argument->model, err);
 
+	if (scene && argument->no_texture)
+		incise_scene_leave_texture_out(scene);
 	if (!scene || !argument->arith)
 		return scene;
 	if (!incise_scene_set_arithmetic(scene, argument->arith, err))

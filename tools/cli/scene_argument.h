@@ -15,12 +15,21 @@ struct scene_argument {
 	const char *path;
 	const char *model; /* --model, or NULL */
 	const char *arith; /* --arith, or NULL */
+	bool no_texture;
 };
 
-/* Rows of the table of options for --model and --arith, without the outer braces. */
+/* A row of its own for programs without the others. */
+#define SCENE_ARGUMENT_NO_TEXTURE(type, member)                                     \
+	{                                                                           \
+		0, "no-texture", NULL, "leave out the texture of the scene's cuts", \
+			CLI_FLAG(type, member.no_texture)                           \
+	}
+
+/* Rows of the table of options that change the scene, without the outer braces. */
 #define SCENE_ARGUMENT_OPTIONS(type, member)                                   \
 	{0, "model", "FILE", "use this model instead of the scene's",          \
 	 CLI_INPUT(type, member.model)},                                       \
+		SCENE_ARGUMENT_NO_TEXTURE(type, member),                       \
 	{                                                                      \
 		0, "arith", "KIND", "fixed or double, instead of the scene's", \
 			CLI_PARSED(type, member.arith, scene_argument_arith)   \

@@ -513,7 +513,7 @@ static void report_run_json(const struct haptic *haptic)
 		json_array_append_new(stages,
 				      json_string(incise_plan_stage(haptic->plan, i)));
 	json_print(json_pack(
-		"{sI sI sI sf so so sI sI sI sI so so sf so so so so so ss so so so so so so}",
+		"{sI sI sI sf so so sI sI sI sI so so sf so so so so so ss so so so so so so so}",
 		"ticks", (json_int_t)s->ticks, "skipped", (json_int_t)s->skipped,
 		"overruns", (json_int_t)s->overruns, "rate_hz", haptic->loop.rate_hz,
 		"lateness_us", real ? loop_lateness_json(s) : json_null(), "tick_ns",
@@ -532,7 +532,8 @@ static void report_run_json(const struct haptic *haptic)
 		cli_stop ? json_string(strsignal(cli_stop)) : json_null(), "kernel",
 		kernel_json(haptic), "calibration",
 		calibration_json(&haptic->calibration), "haptic",
-		haptic_device_json(haptic)));
+		haptic_device_json(haptic), "texture_felt",
+		json_number(s->texture_felt)));
 }
 
 /* Directions that can be felt, and the part of the force that cannot. */
@@ -596,6 +597,7 @@ static void report_run_text(const struct haptic *haptic)
 	       (unsigned long long)ticks_with(s, INCISE_TICK_SLEWED),
 	       (unsigned long long)ticks_with(s, INCISE_TICK_TRAVEL),
 	       (unsigned long long)ticks_with(s, INCISE_TICK_STARTING));
+	loop_texture_line(s);
 	kernel_line(haptic);
 	haptic_device_line(haptic);
 	for (int i = 0; (stepper = incise_rig_axis(haptic->rig, i, NULL)); i++)

@@ -27,6 +27,7 @@ FILE *figure_of_recording(const struct figure *figure);
 FILE *figure_of_session(const struct figure *figure);
 FILE *figure_of_calibration(const struct figure *figure);
 FILE *figure_of_dataset(const struct figure *figure);
+FILE *figure_of_texture(const struct figure *figure);
 
 /*
  * Points of a scatter plot, of which those that would fall on a drawn one are left out: as many

@@ -315,6 +315,7 @@ def render(template, skin, title, data):
 TITLES = {
     "precision": "Force evaluation: error against run time",
     "training": "Training: error on unseen cuts against training time",
+    "realism": "Realism: texture of rendered cuts next to recorded ones",
     "stability": "Stability: how stiff a wall may be",
     "loop": "Haptic loop: run time and wake-up latency",
     "view": "View: error of the image against run time",

@@ -17,6 +17,8 @@
 #include <incise/export.h>
 #include <incise/factor.h>
 #include <incise/ranks.h>
+#include <incise/realism.h>
+#include <incise/texture.h>
 #include <incise/train.h>
 #include <incise/uncertainty.h>
 
@@ -200,6 +202,24 @@ INCISE_API int incise_train_factors(const char *const *paths, int n, double ridg
 				    struct incise_trained *trained,
 				    struct incise_error *err);
 
+/**
+ * Learn the texture of a trained model from the same sources, which need a column cut and rows in their
+ * order at full rate. Not real-time safe.
+ *
+ * @param trained with its corpus, or a model alone; its first input depth_UNIT is the way, where sources have no column
+ *                way_UNIT; cuts that it holds out are not learned from
+ * @param options progress and seed
+ * @param realism measured on the cuts that are held out; or NULL
+ * @return texture, to be freed with incise_texture_free(); NULL with errno EINVAL (no such input or column,
+ *         rows that are means or out of order), ENODATA (too few events), EDOM (none is better
+ *         than the model alone, which realism is of then), ECANCELED (by the progress),
+ *         ENOMEM, or one of the sources
+ */
+INCISE_API struct incise_texture *incise_train_texture(
+	struct incise_train_source *sources, int n, const struct incise_trained *trained,
+	const struct incise_train_options *options, struct incise_realism *realism,
+	struct incise_error *err);
+
 /** Free the members; zeroed results are accepted. */
 INCISE_API void incise_trained_free(struct incise_trained *trained);
 
@@ -222,8 +242,9 @@ struct incise_corpus_survey {
 	int n_groups;
 	struct incise_corpus_group *groups; /**< in order of appearance */
 	double min[INCISE_MODEL_INPUTS_MAX + 1], max[INCISE_MODEL_INPUTS_MAX + 1];
-	char name[200];	 /**< for messages; cut to this length */
-	char group[256]; /**< of all its rows; "": the text of each row */
+	char name[200];	      /**< for messages; cut to this length */
+	char group[256];      /**< of all its rows; "": the text of each row */
+	unsigned int missing; /**< bit i: rows have no number in further input i */
 };
 
 /** Number of sources. */

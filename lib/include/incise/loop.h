@@ -78,6 +78,7 @@ struct incise_loop_stats {
 	double unfelt2;
 	double unfelt_max_N;		 /**< largest of these forces */
 	struct incise_pose_counts poses; /**< at the end of the run */
+	double texture_felt;		 /**< incise_plan_texture_felt() */
 };
 
 /**

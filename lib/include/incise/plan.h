@@ -207,6 +207,29 @@ struct incise_plan_stability {
 INCISE_API void incise_plan_stability(const struct incise_plan *plan,
 				      struct incise_plan_stability *stability);
 
+/** The texture of a plan's cuts; see incise/texture.h. */
+struct incise_plan_texture {
+	double most;			  /**< largest |τ| */
+	double rms;			  /**< of τ */
+	double events_per_mm;		  /**< of such cuts, as they were learned */
+	double factor_least, factor_most; /**< of a cut's force */
+	/**
+	 * Share of it that the limit of slew and the actuators can follow, in a cut at 10 mm/s with half of the
+	 * scene's largest force.
+	 */
+	double follows;
+};
+
+/** Get the texture of the plan. @return false: it has none, and all is 0. */
+INCISE_API bool incise_plan_texture(const struct incise_plan *plan,
+				    struct incise_plan_texture *texture);
+
+/**
+ * Share of the texture that acted on the hand so far, by least squares: 1: all of it, at once. NaN: the plan has no
+ * texture, did not cut with it, or the kernel renders it.
+ */
+INCISE_API double incise_plan_texture_felt(const struct incise_plan *plan);
+
 /**
  * Make a plan read the ticks that the kernel renders: incise_plan_tick() then computes no force.
  * The feeder controls poses, tool and the end of the force.

@@ -53,6 +53,12 @@ INCISE_API int incise_scene_set_arithmetic(struct incise_scene *scene, const cha
 INCISE_API int incise_scene_set_texture(struct incise_scene *scene, int texture_px);
 
 /**
+ * Leave out the texture of the cuts, model.texture, and their variation: plans that are made from now on
+ * render the model's mean force.
+ */
+INCISE_API void incise_scene_leave_texture_out(struct incise_scene *scene);
+
+/**
  * Keep every stage in the plan, with neutral parameters for those that the scene does not
  * need: to measure how much pruning saves. The forces are bit-exact.
  */

@@ -34,7 +34,8 @@ static int open_sealed(uint8_t *bytes, uint32_t size)
 /* All kinds of surfaces, with a model and without, as wide as may be and not. */
 TEST(test_good_plans_are_accepted)
 {
-	int kinds[3] = {0}, models = 0, membranes = 0, tubes = 0, axes[4] = {0};
+	int kinds[3] = {0}, models = 0, membranes = 0, tubes = 0, axes[4] = {0},
+	    textures = 0;
 
 	for (uint64_t seed = 1; seed <= PLANS; seed++) {
 		struct incise_fixed_plan plan;
@@ -46,13 +47,14 @@ TEST(test_good_plans_are_accepted)
 			    plan.numbers.pose_age_ns);
 		kinds[plan.numbers.shape.kind]++;
 		models += plan.has_model;
+		textures += !!plan.texture;
 		membranes += plan.numbers.membrane.thickness > 0;
 		tubes += plan.numbers.tube;
 		axes[plan.numbers.n_axes]++;
 		free(bytes);
 	}
 	assert_true(kinds[0] && kinds[1] && kinds[2] && models && membranes && tubes &&
-		    axes[1] && axes[2] && axes[3]);
+		    axes[1] && axes[2] && axes[3] && textures);
 }
 
 #define AT(field) offsetof(struct incise_fixed_numbers, field)
@@ -153,10 +155,10 @@ static int with(uint8_t *bytes, uint32_t size, size_t at, int64_t value)
 
 	memcpy(&was, place, sizeof(was));
 	memcpy(place, &number, sizeof(number));
-	head_of(bytes)->version = incise_fixed_plan_version(&head_of(bytes)->numbers);
+	head_of(bytes)->version = incise_fixed_plan_version(head_of(bytes));
 	rc = open_sealed(bytes, size);
 	memcpy(place, &was, sizeof(was));
-	head_of(bytes)->version = incise_fixed_plan_version(&head_of(bytes)->numbers);
+	head_of(bytes)->version = incise_fixed_plan_version(head_of(bytes));
 	return rc;
 }
 
@@ -349,9 +351,10 @@ TEST(test_parts)
 		uint32_t size, at;
 		uint8_t *bytes = plan_bytes(seed, &size);
 		struct incise_fixed_plan_header *head = head_of(bytes);
-		uint32_t *part[] = {&head->model_at, &head->heights_at};
+		uint32_t *part[] = {&head->model_at, &head->heights_at,
+				    &head->texture_at};
 
-		for (int i = 0; i < 2; i++) {
+		for (int i = 0; i < 3; i++) {
 			const uint32_t bad[] = {at = *part[i],	at + 4,
 						at - 4,		0,
 						size,		size - 8,
@@ -392,6 +395,15 @@ TEST(test_inputs)
 		struct incise_fixed_plan plan;
 		int n = 0;
 
+		/* So has a texture. */
+		if (head->texture_at) {
+			assert_int_equal(head->version,
+					 INCISE_FIXED_PLAN_VERSION_TEXTURE);
+			head->version = INCISE_FIXED_PLAN_VERSION_MORE;
+			assert_int_equal(open_sealed(bytes, size), -EINVAL);
+			head->texture_at = 0;
+			head->version = incise_fixed_plan_version(head);
+		}
 		/* Forces that came later have a version of their own, which no other takes. */
 		if (head->numbers.skin || head->numbers.skin_friction ||
 		    head->numbers.fracture || head->numbers.gives) {
@@ -420,4 +432,63 @@ TEST(test_inputs)
 		free(bytes);
 	}
 	assert_true(seen[0] && seen[1] && seen[2]);
+}
+
+/* Each number of a texture within its range, and only where a front dissipates. */
+TEST(test_texture)
+{
+	int tried = 0;
+
+	for (uint64_t seed = 1; seed <= PLANS; seed++) {
+		uint32_t size;
+		uint8_t *bytes = plan_bytes(seed, &size);
+		struct incise_fixed_plan_header *head = head_of(bytes);
+		struct incise_fixed_texture *t = (void *)(bytes + head->texture_at),
+					    was = *t;
+		int cut = (int)(seed % INCISE_TEXTURE_CUTS),
+		    knot = (int)(seed * 97 % INCISE_TEXTURE_KNOTS);
+		const struct {
+			int32_t *at, bad[3], good;
+		} wrong[] = {
+			{&t->step_shift, {7, 21, INT32_MIN}, 20},
+			{&t->most,
+			 {-1, INCISE_TEXTURE_MOST + 1, INT32_MAX},
+			 INCISE_TEXTURE_MOST},
+			{&t->factor_most,
+			 {0, INCISE_TEXTURE_FACTOR_MOST + 1, -1},
+			 INCISE_TEXTURE_FACTOR_MOST},
+			{&t->reserved, {1, -1, INT32_MAX}, 0},
+			{&t->factor[cut],
+			 {0, was.factor_most + 1, INT32_MIN},
+			 was.factor_most},
+			{&head->numbers.unloading, {0, 0, -1}, 1},
+		};
+
+		if (head->texture_at) {
+			tried++;
+			for (size_t i = 0; i < sizeof(wrong) / sizeof(*wrong); i++) {
+				int32_t before = *wrong[i].at;
+
+				for (int k = 0; k < 3; k++) {
+					*wrong[i].at = wrong[i].bad[k];
+					assert_int_equal(open_sealed(bytes, size),
+							 -EINVAL);
+				}
+				*wrong[i].at = wrong[i].good;
+				assert_int_equal(open_sealed(bytes, size), 0);
+				*wrong[i].at = before;
+			}
+			t->start[cut] = INCISE_TEXTURE_KNOTS;
+			assert_int_equal(open_sealed(bytes, size), -EINVAL);
+			t->start[cut] = INCISE_TEXTURE_KNOTS - 1;
+			for (int sign = -1; sign <= 1; sign += 2) {
+				t->knot[knot] = (int16_t)(sign * (was.most + 1));
+				assert_int_equal(open_sealed(bytes, size), -EINVAL);
+				t->knot[knot] = (int16_t)(sign * was.most);
+				assert_int_equal(open_sealed(bytes, size), 0);
+			}
+		}
+		free(bytes);
+	}
+	assert_true(tried > PLANS / 20);
 }

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later OR GPL-2.0-only */
 /*
  * Random good plans, and a hand that moves a tool over their surface, for unit tests and a fuzzer:
- * the same from a seed on each machine. A plan has any surface, reaction and membrane, any forces, up to three axes; one in four
- * has numbers anywhere in their ranges, at the ends of them too.
+ * the same from a seed on each machine. A plan has any surface, reaction and membrane, any forces, up to three axes, a
+ * texture or none; one in four has numbers anywhere in their ranges, at the ends of them too.
  *
  *   incise_fx_trial_plan() ─▶ incise_fixed_plan_open() ─▶ _begin()
  *   incise_fx_trial_hand() ─▶ incise_fixed_plan_pose() ─▶ _tick()
@@ -15,13 +15,14 @@
 #include "../../../driver/kunit/trial.h"
 #include "../../../lib/fixed/vector.h"
 
-/* The longest plan: the header, a model of 17 × 17 knots, a grid of 33 × 33. */
+/* The longest plan: the header, a model of 17 × 17 knots, a grid of 33 × 33, a texture. */
 #define INCISE_FX_TRIAL_CELLS 16
 #define INCISE_FX_TRIAL_KNOTS 33
 #define INCISE_FX_TRIAL_PLAN_SIZE                                                    \
 	(sizeof(struct incise_fixed_plan_header) + sizeof(struct incise_fx_header) + \
 	 8 * (INCISE_FX_TRIAL_CELLS + 1) * (INCISE_FX_TRIAL_CELLS + 1) +             \
-	 4 * INCISE_FX_TRIAL_KNOTS * INCISE_FX_TRIAL_KNOTS + 16)
+	 4 * INCISE_FX_TRIAL_KNOTS * INCISE_FX_TRIAL_KNOTS +                         \
+	 sizeof(struct incise_fixed_texture) + 24)
 
 struct incise_fx_trial {
 	uint64_t seed;
@@ -387,10 +388,17 @@ static inline uint32_t incise_fx_trial_plan(uint64_t seed, void *bytes)
 		head->heights_size = 4 * (uint32_t)(frame->columns * frame->rows);
 		incise_fx_trial_heights(&t, frame,
 					(int32_t *)(void *)((uint8_t *)bytes + size));
-		size += head->heights_size;
+		size += (head->heights_size + 7) & ~7u;
+	}
+	if (head->numbers.unloading && incise_fx_trial_one_in(&t, 2)) {
+		head->texture_at = size;
+		incise_fx_trial_texture(&t.seed,
+					incise_fx_trial_in(&t, 0, INCISE_TEXTURE_MOST),
+					(void *)((uint8_t *)bytes + size));
+		size += sizeof(struct incise_fixed_texture);
 	}
 	head->size = size;
-	head->version = incise_fixed_plan_version(&head->numbers);
+	head->version = incise_fixed_plan_version(head);
 	incise_fx_trial_seal(bytes, size);
 	return size;
 }

@@ -444,13 +444,15 @@ TEST(raw_rows_are_the_samples)
 	struct incise_export_options how;
 	struct incise_export_report report;
 	char *text, *rest, *line;
-	int n = 0;
+	double deepest = 0, way;
+	int n = 0, before = 0;
 
 	incise_export_options_init(&how);
 	text = rest = export_liver(&how, &report);
 	assert_string_equal(
 		next_line(&rest),
-		"cut,t_s,depth_mm,velocity_mm_s,force_N,clipped,advancing," INPUTS);
+		"cut,t_s,depth_mm,velocity_mm_s,force_N,clipped,advancing," INPUTS
+		",way_mm");
 	for (; *(line = next_line(&rest)); n++) {
 		const struct truth_sample *s = &truth.samples[n];
 		double t, depth, velocity, force;
@@ -467,6 +469,12 @@ TEST(raw_rows_are_the_samples)
 		assert_true(fabs(depth - s->depth) < 0.51e-4);
 		assert_true(fabs(velocity - s->velocity) < 0.51e-3);
 		assert_true(fabs(force - s->force) < 0.51e-5);
+		/* It never falls in a cut, and each depth is a way. */
+		way = strtod(strrchr(line, ',') + 1, NULL);
+		assert_true(way > depth - 1.1e-4);
+		assert_true(cut != before || way >= deepest);
+		deepest = way;
+		before = cut;
 	}
 	assert_int_equal(n, truth.n);
 	assert_int_equal(report.rows, truth.n);

@@ -31,8 +31,8 @@ static size_t n_all;
 
 static void list_stages(void)
 {
-	static const char *const before[] = {"pose",   "predict",  "tool",    "contact",
-					     "normal", "incision", "membrane"};
+	static const char *const before[] = {"pose",   "predict",  "tool",     "contact",
+					     "normal", "incision", "membrane", "texture"};
 	static const char *const after[] = {"start",   "work",	"limit",
 					    "actuate", "wound", "bleeding"};
 
@@ -179,6 +179,7 @@ static const struct lack lacks[] = {
 	{"tool", "no insertion", {.force = "insertion forces"}, NULL},
 	{"normal", "average_ticks is 1", {.no_average = true}, NULL},
 	{"membrane", "no membrane", {.no_membrane = true}, NULL},
+	{"texture", "no texture", {.no_membrane = true}, NULL},
 	{"plane", "plane_N_mm is 0", {.force = "plane", .model = true}, NULL},
 	/* One that lacks nearly all: paper 1's. */
 	{"normal",
@@ -253,7 +254,9 @@ TEST(test_everything)
 	struct incise_plan *plan = plan_of(scene);
 
 	assert_complete(plan);
-	assert_int_equal(stages(plan), stages_of_a_loop());
+	/* All but the texture. */
+	assert_int_equal(stages(plan), stages_of_a_loop() - 1);
+	assert_false(keeps(plan, "texture"));
 	assert_non_null(strstr(why_not(plan, "wound"), "picture.wound is false"));
 	assert_non_null(strstr(why_not(plan, "bleeding"), "picture.bleeding is false"));
 	incise_plan_free(plan);
@@ -261,7 +264,7 @@ TEST(test_everything)
 	/* On a plane there is nothing to average. */
 	scene = scene_of(&(struct lacking){0}, PLANE, "fixed");
 	plan = plan_of(scene);
-	assert_int_equal(stages(plan), stages_of_a_loop() - 1);
+	assert_int_equal(stages(plan), stages_of_a_loop() - 2);
 	assert_non_null(strstr(why_not(plan, "normal"), "is constant"));
 	incise_plan_free(plan);
 	incise_scene_free(scene);

@@ -367,6 +367,43 @@ static inline void draw(uint64_t seed, struct drawn *d)
 		    rest.all);
 }
 
+/* --- textures ------------------------------------------------------------------------------ */
+
+/*
+ * Give a scene whose model dissipates a texture of its own: teeth that rise from knot to knot, and leap in one
+ * to anywhere, and factors of its cuts. Returns whether it does.
+ */
+static inline bool add_texture(uint64_t seed, struct incise_scene *scene)
+{
+	int most = (int)between(&seed, 500, INCISE_TEXTURE_MOST), at = 0;
+	double falls = sized(&seed, 1e-3, 0.3), rise = sized(&seed, 0.005, 2) * most;
+	double varies = chance(&seed, 0.5) ? 0 : between(&seed, 0, 0.4);
+	struct incise_fixed_texture *to;
+
+	if (!scene->cut[INCISE_CUT].path || !scene->tissue.dissipates)
+		return false;
+	to = calloc(1, sizeof(*to));
+	assert_non_null(to);
+	to->step_shift = 8 + below(&seed, 9);
+	for (int i = 0; i < INCISE_TEXTURE_KNOTS; i++) {
+		at = chance(&seed, falls)
+			     ? (int)between(&seed, -most, most)
+			     : (int)fmin(most, at + between(&seed, 0, rise * falls));
+		to->knot[i] = (int16_t)at;
+		to->most = abs(at) > to->most ? abs(at) : to->most;
+	}
+	for (int i = 0; i < INCISE_TEXTURE_CUTS; i++) {
+		to->start[i] = (uint16_t)below(&seed, INCISE_TEXTURE_KNOTS);
+		to->factor[i] = (int32_t)(INCISE_FIXED_ONE *
+					  exp(between(&seed, -varies, varies)));
+		to->factor_most =
+			to->factor[i] > to->factor_most ? to->factor[i] : to->factor_most;
+	}
+	incise_scene_leave_texture_out(scene);
+	scene->texture = to;
+	return true;
+}
+
 /* --- scenes to lean on -------------------------------------------------------------------- */
 
 /* Half the side of a relief; a lean begins within the second. */

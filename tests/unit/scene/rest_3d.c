@@ -28,6 +28,7 @@
 #define HOSTED_FEW 3
 #define SCENES 500
 #define SCENES_FEW 6
+#define TEXTURED_FEW 3
 #define SEED_FEW 9 /* and on: these search for a gain once, and for not long */
 #define LEANS 6
 
@@ -696,8 +697,8 @@ static bool named_lean(const char *why, const struct incise_plan *plan, struct l
 	return true;
 }
 
-/* As it is drawn, or with the gain of its refusal. */
-static void try_scene(uint64_t seed)
+/* As it is drawn, or with the gain of its refusal; with a texture only if it can have one. */
+static void try_scene_with(uint64_t seed, bool textured)
 {
 	static const char words[] = "set tissue.gain to at most ";
 	struct incise_error why = {0};
@@ -709,6 +710,10 @@ static void try_scene(uint64_t seed)
 	draw_leaned(seed, &l);
 	scene = fed_scene(&folder, l.text.all, &err);
 	succeeds(scene);
+	if (textured && !add_texture(seed, scene)) {
+		incise_scene_free(scene);
+		return;
+	}
 	plan = incise_plan_new_fed(scene, &l.tracker, &why);
 	if (!plan) {
 		sum.refused++;
@@ -732,6 +737,16 @@ static void try_scene(uint64_t seed)
 	}
 	incise_plan_free(plan);
 	incise_scene_free(scene);
+}
+
+static void try_scene(uint64_t seed)
+{
+	try_scene_with(seed, false);
+}
+
+static void try_textured(uint64_t seed)
+{
+	try_scene_with(seed, true);
 }
 
 /* The largest gain up to the scene's in a host with this step; 0: none. */
@@ -909,6 +924,15 @@ TEST(test_an_accepted_scene_rests)
 	for (int i = 0; i < SWUNG && cases_are_all() && !getenv("SEEDS"); i++)
 		if (!swung[i].hold.ticks)
 			try_scene(swung[i].seed);
+	summarize();
+	assert_int_equal(sum.by[SWINGS], 0);
+	assert_int_equal(sum.advised, sum.advice_accepted);
+}
+
+/* Each has its teeth and its cuts' factors: the front stays where it came to, whatever swings. */
+TEST(test_an_accepted_texture_rests)
+{
+	try_all(try_textured, SCENES, TEXTURED_FEW, 1);
 	summarize();
 	assert_int_equal(sum.by[SWINGS], 0);
 	assert_int_equal(sum.advised, sum.advice_accepted);

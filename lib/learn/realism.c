@@ -1,0 +1,437 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * The look of cuts; see realism.h.
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "../base/ascending.h"
+#include "../base/grow.h"
+#include "../base/random.h"
+#include "realism.h"
+
+#define WINDOW 32 /* cells; windows overlap by half */
+
+/* A fall that is an event: in sd of the noise, and as a share of the cut's largest force. */
+#define FALL_SD 6
+#define FALL_SHARE 0.02
+
+/* A part with more cells, of long steps among short ones, is looked at up to there. */
+#define CELLS_PER_ROW 4
+
+/* sd of a normal distribution over the median of |second difference|: 1/(0.6745 √6). */
+#define SD_OF_BENDS 0.60527
+
+/* --- part of a cut, step of the way and noise --- */
+
+/* The part is at least so fast and has such a force, relative to almost the most. */
+#define FAST_SHARE 0.2
+#define FORCE_SHARE 0.5
+#define ALMOST 0.99
+
+static size_t rows_of_cuts(const struct incise_texture_cut *cuts, int n)
+{
+	size_t rows = 0;
+
+	for (int i = 0; i < n; i++)
+		rows += cuts[i].n;
+	return rows;
+}
+
+static double quantile(double *numbers, size_t n, double share)
+{
+	qsort(numbers, n, sizeof(*numbers), ascending);
+	return n ? numbers[(size_t)(share * (double)(n - 1))] : 0;
+}
+
+struct incise_texture_cut incise_look_part(const struct incise_texture_cut *cut,
+					   double *numbers)
+{
+	const double *way = cut->way, *force = cut->force;
+	double fast, strong;
+	size_t from = cut->n, to = 0;
+
+	for (size_t i = 1; i < cut->n; i++)
+		numbers[i - 1] = way[i] - way[i - 1];
+	fast = FAST_SHARE * quantile(numbers, cut->n ? cut->n - 1 : 0, ALMOST);
+	memcpy(numbers, force, cut->n * sizeof(*numbers));
+	strong = FORCE_SHARE * quantile(numbers, cut->n, ALMOST);
+	for (size_t i = 1; i < cut->n; i++)
+		if (way[i] - way[i - 1] >= fast && force[i] >= strong) {
+			from = from < i ? from : i;
+			to = i + 1;
+		}
+	from = from < to ? from : to;
+	return (struct incise_texture_cut){way + from, force + from, cut->model + from,
+					   to - from};
+}
+
+static double median_step(const struct incise_texture_cut *cuts, int n, double *numbers)
+{
+	size_t m = 0;
+
+	for (int c = 0; c < n; c++) {
+		struct incise_texture_cut part = incise_look_part(&cuts[c], numbers + m);
+
+		for (size_t k = 1; k < part.n; k++)
+			numbers[m++] = part.way[k] - part.way[k - 1];
+	}
+	return m ? quantile(numbers, m, 0.5) : 1;
+}
+
+static double median_noise(const struct incise_texture_cut *cuts, int n, double *numbers)
+{
+	size_t m = 0;
+
+	for (int c = 0; c < n; c++) {
+		const double *f = cuts[c].force;
+
+		for (size_t k = 2; k < cuts[c].n; k++)
+			numbers[m++] = fabs(f[k] - 2 * f[k - 1] + f[k - 2]);
+	}
+	return quantile(numbers, m, 0.5) * SD_OF_BENDS;
+}
+
+/* --- one cut --- */
+
+/* The means of the line through the rows over cells of one step; returns their number, @most or fewer. */
+static size_t average_cells(const struct incise_texture_cut *cut, const double *force,
+			    double step, double *cell, size_t most)
+{
+	double at = 0, sum = 0;
+	size_t n = 0;
+
+	for (size_t i = 1; i < cut->n; i++) {
+		double from = at, until = cut->way[i] - cut->way[0];
+		double slope = (force[i] - force[i - 1]) / (until - from);
+
+		while (n < most && at < until) {
+			double edge = (double)(n + 1) * step, to = fmin(edge, until);
+
+			sum += (to - at) *
+			       (force[i - 1] + slope * ((at + to) / 2 - from));
+			at = to;
+			if (to < edge)
+				continue;
+			cell[n++] = sum / step;
+			sum = 0;
+		}
+	}
+	return n;
+}
+
+static int add_drop(struct incise_look *look, double top, double bottom)
+{
+	if (!grow_array(&look->drop, look->n_events, &look->capacity, 64,
+			sizeof(*look->drop)))
+		return -ENOMEM;
+	look->drop[look->n_events++] = bottom > 0 ? (top - bottom) / top : 1;
+	return 0;
+}
+
+/*
+ * A fall ends where the force rises again by as much as makes an event:
+ *
+ *   top ─╮     ╭
+ *        ╰╮   ╭╯  least
+ *         ╰───╯ bottom
+ */
+static int find_events(struct incise_look *look, const double *cell, size_t n,
+		       double least)
+{
+	double top = n ? cell[0] : 0, bottom = top;
+	bool falls = false;
+	int rc = 0;
+
+	for (size_t i = 1; i < n && !rc; i++) {
+		bottom = fmin(bottom, cell[i]);
+		if (!falls && cell[i] > top)
+			top = bottom = cell[i];
+		else if (!falls)
+			falls = top - cell[i] >= least;
+		else if (cell[i] - bottom >= least) {
+			rc = add_drop(look, top, bottom);
+			falls = false;
+			top = bottom = cell[i];
+		}
+	}
+	return falls && !rc ? add_drop(look, top, bottom) : rc;
+}
+
+/* Sums of windows and of differences. */
+struct sums {
+	double power[INCISE_LOOK_OCTAVES], square, force;
+	double difference[3]; /* of its powers 1 … 3 */
+	double windows, spectra, cells;
+};
+
+static void add_rms(struct sums *sums, const double *cell)
+{
+	double mean = 0, slope = 0, square = 0, width = 0;
+
+	for (int i = 0; i < WINDOW; i++)
+		mean += cell[i] / WINDOW;
+	for (int i = 0; i < WINDOW; i++) {
+		double t = i - (WINDOW - 1) / 2.0;
+
+		slope += t * cell[i];
+		width += t * t;
+		square += (cell[i] - mean) * (cell[i] - mean);
+	}
+	sums->square += fmax(square - slope * slope / width, 0) / WINDOW;
+	sums->force += mean;
+	sums->windows++;
+}
+
+/* The power of the differences of WINDOW + 1 cells in the octaves, with the window of Hann. */
+static void add_spectrum(struct sums *sums, const double *cell)
+{
+	double x[WINDOW], mean = (cell[WINDOW] - cell[0]) / WINDOW;
+	int last = WINDOW / 2;
+
+	for (int i = 0; i < WINDOW; i++)
+		x[i] = (cell[i + 1] - cell[i] - mean) *
+		       (0.5 - 0.5 * cos(2 * M_PI * (i + 1) / (WINDOW + 1)));
+	for (int k = 0; k < INCISE_LOOK_OCTAVES; k++) {
+		int first = k ? (last + 1) / 2 : last / 2;
+
+		for (int f = first; f <= last; f++) {
+			double re = 0, im = 0;
+
+			for (int i = 0; i < WINDOW; i++) {
+				re += x[i] * cos(2 * M_PI * f * i / WINDOW);
+				im += x[i] * sin(2 * M_PI * f * i / WINDOW);
+			}
+			sums->power[k] += (re * re + im * im) / (last - first + 1);
+		}
+		last = first - 1;
+	}
+	sums->spectra++;
+}
+
+static int look_at_cells(struct incise_look *look, struct sums *sums, const double *cell,
+			 size_t n, double largest)
+{
+	for (size_t i = 0; i + 1 < n; i++) {
+		double d = cell[i + 1] - cell[i];
+
+		sums->difference[0] += d;
+		sums->difference[1] += d * d;
+		sums->difference[2] += d * d * d;
+		sums->cells++;
+	}
+	for (size_t i = 0; i + WINDOW <= n; i += WINDOW / 2) {
+		add_rms(sums, cell + i);
+		if (i + WINDOW < n)
+			add_spectrum(sums, cell + i);
+	}
+	look->length += (double)n * look->step;
+	return find_events(look, cell, n,
+			   fmax(FALL_SD * look->noise, FALL_SHARE * largest));
+}
+
+/* --- all of them --- */
+
+static void finish_look(struct incise_look *look, const struct sums *sums)
+{
+	double m = fmax(sums->cells, 1), mean = sums->difference[0] / m,
+	       square = sums->difference[1] / m, variance = fmax(square - mean * mean, 0);
+
+	qsort(look->drop, look->n_events, sizeof(*look->drop), ascending);
+	look->rate = look->length > 0 ? (double)look->n_events / look->length : 0;
+	look->rms =
+		sums->force > 0 ? sqrt(sums->square * sums->windows) / sums->force : 0;
+	look->skewness = variance > 0 ? (sums->difference[2] / m - 3 * mean * square +
+					 2 * mean * mean * mean) /
+						pow(variance, 1.5)
+				      : 0;
+	for (int k = 0; k < INCISE_LOOK_OCTAVES; k++)
+		look->octave[k] = sums->power[k] / fmax(sums->spectra, 1);
+}
+
+int incise_look_at(struct incise_look *look, const struct incise_texture_cut *cuts, int n,
+		   double *const *rendered)
+{
+	size_t most = CELLS_PER_ROW * rows_of_cuts(cuts, n) + 1;
+	double *numbers = malloc(most * sizeof(*numbers));
+	struct sums sums = {0};
+	int rc = numbers ? 0 : -ENOMEM;
+
+	if (!rc && !look->step) {
+		look->step = median_step(cuts, n, numbers);
+		look->noise = median_noise(cuts, n, numbers);
+	}
+	for (int i = 0; i < n && !rc; i++) {
+		struct incise_texture_cut part = incise_look_part(&cuts[i], numbers);
+		const double *force = rendered
+					      ? rendered[i] + (part.force - cuts[i].force)
+					      : part.force;
+		double largest = 0;
+		size_t m;
+
+		for (size_t k = 0; k < cuts[i].n; k++)
+			largest = fmax(largest, cuts[i].force[k]);
+		m = average_cells(&part, force, look->step, numbers, most);
+		rc = look_at_cells(look, &sums, numbers, m, largest);
+	}
+	free(numbers);
+	if (!rc)
+		finish_look(look, &sums);
+	return rc;
+}
+
+double incise_look_distance(const struct incise_look *a, const struct incise_look *b)
+{
+	double sum = 0;
+
+	for (int k = 0; k < INCISE_LOOK_OCTAVES; k++)
+		sum += fabs(10 * log10((a->octave[k] + 1e-30) / (b->octave[k] + 1e-30)));
+	return sum / INCISE_LOOK_OCTAVES;
+}
+
+double incise_look_drops(const struct incise_look *a, const struct incise_look *b)
+{
+	double largest = 0;
+	size_t i = 0, j = 0;
+
+	if (!a->n_events || !b->n_events)
+		return 1;
+	while (i < a->n_events && j < b->n_events) {
+		double x = fmin(a->drop[i], b->drop[j]);
+
+		while (i < a->n_events && a->drop[i] <= x)
+			i++;
+		while (j < b->n_events && b->drop[j] <= x)
+			j++;
+		largest = fmax(largest, fabs((double)i / (double)a->n_events -
+					     (double)j / (double)b->n_events));
+	}
+	return largest;
+}
+
+/* --- realism --- */
+
+#define DRAWS 8	   /* seeds of each way to render */
+#define WHITE 1024 /* numbers of white noise behind a knot of the coloured one */
+
+/* τ of a cut; see lib/fixed/texture.h. */
+static double tau_at(const struct incise_fixed_texture *texture, int cut, double way)
+{
+	double knot = texture->start[cut % INCISE_TEXTURE_CUTS] +
+		      way * 65536 / (double)(1 << texture->step_shift);
+	size_t at = (size_t)fmin(fmax(knot, 0), 1e15);
+	double a = texture->knot[at % INCISE_TEXTURE_KNOTS],
+	       b = texture->knot[(at + 1) % INCISE_TEXTURE_KNOTS];
+
+	return (a + (b - a) * (knot - floor(knot))) / INCISE_TEXTURE_ONE;
+}
+
+/* Replace knots by normal noise of the same spectrum: white noise, each number drawing all of them. */
+static void make_noise(struct incise_fixed_texture *texture, uint64_t key)
+{
+	static const int n = INCISE_TEXTURE_KNOTS;
+	int16_t old[INCISE_TEXTURE_KNOTS];
+	double white[WHITE];
+
+	memcpy(old, texture->knot, sizeof(old));
+	for (int i = 0; i < WHITE; i++)
+		white[i] = incise_random_normal(key, (uint64_t)i) / sqrt(WHITE);
+	for (int i = 0; i < n; i++) {
+		double sum = 0;
+
+		for (int k = 0; k < WHITE; k++)
+			sum += white[k] * old[(i + k) % n];
+		texture->knot[i] = (int16_t)lrint(
+			fmax(-INCISE_TEXTURE_MOST, fmin(sum, INCISE_TEXTURE_MOST)));
+	}
+}
+
+double incise_look_render(const struct incise_fixed_texture *knots,
+			  const struct incise_texture_cut *cuts, int n, double noise,
+			  uint64_t key, double *const *force)
+{
+	double sum = 0, model = 0;
+	uint64_t at = 0;
+
+	for (int i = 0; i < n; i++)
+		for (size_t k = 0; k < cuts[i].n; k++) {
+			double f = fmax(cuts[i].model[k], 0);
+
+			model += f;
+			f *= 1 + tau_at(knots, i, cuts[i].way[k] - cuts[i].way[0]);
+			sum += f;
+			force[i][k] = f + noise * incise_random_normal(key, at++);
+		}
+	return model > 0 ? sum / model : 1;
+}
+
+/* Add one draw of one kind to its row. */
+static int add_draw(const struct incise_texture *texture, enum incise_realism_kind kind,
+		    uint64_t seed, const struct incise_texture_cut *cuts, int n,
+		    const struct incise_look *recorded, double *const *force,
+		    struct incise_realism_row *row)
+{
+	struct incise_look look = {.step = recorded->step, .noise = recorded->noise};
+	struct incise_fixed_texture knots;
+	double mean;
+	int rc;
+
+	incise_texture_fill(kind == INCISE_REALISM_NONE ? NULL : texture, 0, seed,
+			    &knots);
+	if (kind == INCISE_REALISM_NOISE)
+		make_noise(&knots, incise_random_mix(seed + 1));
+	mean = incise_look_render(&knots, cuts, n, look.noise, incise_random_mix(~seed),
+				  force);
+	rc = incise_look_at(&look, cuts, n, force);
+	if (!rc) {
+		row->rate += look.rate / recorded->rate / DRAWS;
+		row->drops += incise_look_drops(&look, recorded) / DRAWS;
+		row->spectrum_dB += incise_look_distance(&look, recorded) / DRAWS;
+		row->rms += look.rms / recorded->rms / DRAWS;
+		row->skewness += look.skewness / DRAWS;
+		row->mean_force += (mean - 1) / DRAWS;
+	}
+	free(look.drop);
+	return rc;
+}
+
+/* The interval of Poisson of so many events, relative to them; Breslow and Day (1987), after Byar. */
+static void find_rates(struct incise_realism *realism)
+{
+	double n = realism->events, m = n + 1;
+
+	realism->rate_low = n > 0 ? pow(1 - 1 / (9 * n) - 1.96 / (3 * sqrt(n)), 3) : 0;
+	realism->rate_high =
+		n > 0 ? m / n * pow(1 - 1 / (9 * m) + 1.96 / (3 * sqrt(m)), 3) : 0;
+}
+
+int incise_realism_of(const struct incise_texture *texture,
+		      const struct incise_texture_cut *cuts, int n, uint64_t seed,
+		      struct incise_realism *realism)
+{
+	size_t rows = rows_of_cuts(cuts, n);
+	double *numbers = malloc((rows + 1) * sizeof(*numbers));
+	double **force = malloc((size_t)(n + 1) * sizeof(*force));
+	struct incise_look recorded = {0};
+	int rc = numbers && force ? incise_look_at(&recorded, cuts, n, NULL) : -ENOMEM;
+
+	*realism = (struct incise_realism){.cuts = n,
+					   .length = recorded.length,
+					   .step = recorded.step,
+					   .up_to_cycles = 0.5 / recorded.step,
+					   .noise = recorded.noise,
+					   .events = (int)recorded.n_events,
+					   .rms = recorded.rms,
+					   .skewness = recorded.skewness};
+	find_rates(realism);
+	for (size_t i = 0, at = 0; (int)i < n && !rc; at += cuts[i++].n)
+		force[i] = numbers + at;
+	for (int i = 0; i < INCISE_REALISM_KINDS * DRAWS && !rc; i++)
+		rc = add_draw(texture, i / DRAWS, seed + (uint64_t)(i % DRAWS), cuts, n,
+			      &recorded, force, &realism->kind[i / DRAWS]);
+	free(recorded.drop);
+	free(numbers);
+	free(force);
+	return rc;
+}

@@ -1,0 +1,349 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * Learning of a texture: pieces of τ = F / (k · model) − 1, with a factor k for each cut, between the places
+ * where it rises through 0. Length, rise and falls of a piece stay together as they were recorded, and a
+ * joint of two pieces is no fall.
+ *
+ *   window  τ is taken less its mean over so much of the way: bends of the model are no texture
+ *   gain    τ is scaled: noise of the sensor and bends of the model add to it
+ *
+ * Both are chosen by cross-validation: each half of the cuts is rendered with pieces of the other one, and
+ * its spectrum and its rate of events are compared with the recorded ones. Where the model alone comes as
+ * near, there is no texture.
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include "../base/random.h"
+#include "realism.h"
+
+/* With fewer events, the 95 % interval of their rate is wider than ± a half. */
+#define EVENTS_LEAST 20
+
+/* Where the model has a smaller share of its largest force, the ratio to it is large by chance. */
+#define MODEL_LEAST 0.05
+
+/* Below the most of a tape, whose mean is moved to 0. */
+#define TAU_MOST (INCISE_TEXTURE_MOST * 19 / 20)
+
+/* A part of a cut with more points, of long steps among short ones, is used up to there. */
+#define POINTS_PER_ROW 4
+
+/* An improvement by less, dB, may be chance: there is no texture. */
+#define IMPROVEMENT 0.5
+
+#define DECIBEL(ratio) (10 * log10(fmax(ratio, 1e-30)))
+
+struct candidate {
+	double window; /* steps of the look; 0: all of a cut */
+	double gain;   /* 0: no texture */
+};
+
+static const double windows[] = {0, 64, 16, 4, 2}, gains[] = {1, 0.7, 0.5, 0.35, 0.25};
+
+struct learning {
+	struct incise_texture_cut *cuts; /* in random order */
+	int n;
+	uint64_t seed;
+	struct incise_watch *watch;
+	struct incise_look recorded;
+	double step, *tau, *sum,
+		**force; /* of the points of a cut, of its rows rendered */
+};
+
+/* --- pieces --- */
+
+static size_t count_points(const struct incise_texture_cut *part, double step)
+{
+	double n = part->n ? (part->way[part->n - 1] - part->way[0]) / step : 0;
+
+	return (size_t)fmin(n, (double)(POINTS_PER_ROW * part->n));
+}
+
+/*
+ * τ of part of a cut at each step, that of the nearest row: means of rows would make falls less steep. Returns
+ * the number of points.
+ */
+static size_t find_tau(struct learning *learning, const struct incise_texture_cut *cut)
+{
+	struct incise_texture_cut part = incise_look_part(cut, learning->sum);
+	size_t n = count_points(&part, learning->step), row = 0;
+	double *tau = learning->tau, least = 0, mean = 0;
+
+	for (size_t i = 0; i < part.n; i++)
+		least = fmax(least, MODEL_LEAST * part.model[i]);
+	for (size_t i = 0; i < n; i++) {
+		double at = part.way[0] + (double)i * learning->step;
+
+		while (row + 1 < part.n && part.way[row + 1] - at < at - part.way[row])
+			row++;
+		tau[i] = part.force[row] / fmax(part.model[row], least);
+		mean += tau[i] / (double)n;
+	}
+	if (!(mean > 0 && isfinite(mean)))
+		return 0;
+	for (size_t i = 0; i < n; i++)
+		tau[i] = tau[i] / mean - 1;
+	return n;
+}
+
+/* Take the mean over a window around each point away; towards the ends the window gets smaller. */
+static void take_running_mean(struct learning *learning, size_t n, double window)
+{
+	size_t most = (size_t)(window * learning->recorded.step / learning->step / 2);
+	double *sum = learning->sum;
+
+	sum[0] = 0;
+	for (size_t i = 0; i < n; i++)
+		sum[i + 1] = sum[i] + learning->tau[i];
+	for (size_t i = 0; i < n; i++) {
+		size_t half = i < n - 1 - i ? i : n - 1 - i;
+
+		half = half < most ? half : most;
+		learning->tau[i] -=
+			(sum[i + half + 1] - sum[i - half]) / (double)(2 * half + 1);
+	}
+}
+
+static void add_piece(struct incise_texture *texture, size_t *points, const double *tau,
+		      size_t n, double gain)
+{
+	if (n > INCISE_TEXTURE_PIECE || *points + n > INCISE_TEXTURE_POINTS ||
+	    texture->n_curves == INCISE_TEXTURE_CURVES)
+		return;
+	for (size_t i = 0; i < n; i++) {
+		double point = rint(gain * tau[i] * INCISE_TEXTURE_ONE) + 0.0;
+
+		point = fmax(-TAU_MOST, fmin(point, TAU_MOST));
+		texture->point[(*points)++] = point;
+		texture->info.most =
+			fmax(texture->info.most, fabs(point) / INCISE_TEXTURE_ONE);
+	}
+	texture->n[texture->n_curves++] = (int)n;
+}
+
+/* The pieces of cuts, of all of them a like share if they are too many; NULL: there are none. */
+static struct incise_texture *find_pieces(struct learning *learning,
+					  const struct incise_texture_cut *cuts, int n,
+					  const struct candidate *candidate)
+{
+	struct incise_texture *texture = calloc(1, sizeof(*texture));
+	uint64_t state = incise_random_mix(learning->seed + 1), share;
+	size_t all = 1, points = 0;
+
+	for (int i = 0; i < n; i++) {
+		struct incise_texture_cut part =
+			incise_look_part(&cuts[i], learning->sum);
+
+		all += count_points(&part, learning->step);
+	}
+	share = INCISE_TEXTURE_POINTS < all ? UINT64_MAX / all * INCISE_TEXTURE_POINTS
+					    : UINT64_MAX;
+	if (texture) {
+		texture->step = learning->step;
+		texture->n = calloc(INCISE_TEXTURE_CURVES, sizeof(*texture->n));
+		texture->point = calloc(INCISE_TEXTURE_POINTS, sizeof(*texture->point));
+	}
+	for (int i = 0; i < n && texture && texture->n && texture->point; i++) {
+		const double *tau = learning->tau;
+		size_t m = find_tau(learning, &cuts[i]), from = 0;
+
+		if (candidate->window)
+			take_running_mean(learning, m, candidate->window);
+		for (size_t k = 1; k < m; k++) {
+			if (!(tau[k - 1] < 0 && tau[k] >= 0))
+				continue;
+			if (from && incise_random_next(&state) <= share)
+				add_piece(texture, &points, tau + from, k - from,
+					  candidate->gain);
+			from = k;
+		}
+	}
+	if (points)
+		return texture;
+	incise_texture_free(texture);
+	return NULL;
+}
+
+/* --- cross-validation --- */
+
+/* Look at each half of the cuts, rendered with pieces of the other one. 0, -ENODATA (no pieces), -ENOMEM. */
+static int render_halves(struct learning *learning, const struct candidate *candidate,
+			 struct incise_look *look)
+{
+	int half = learning->n / 2;
+
+	*look = (struct incise_look){.step = learning->recorded.step,
+				     .noise = learning->recorded.noise};
+	for (int i = 0; i < 2; i++) {
+		int from = i ? half : 0, n = i ? learning->n - half : half;
+		struct incise_fixed_texture knots;
+		struct incise_texture *texture = NULL;
+
+		if (candidate->gain) {
+			texture = find_pieces(learning, learning->cuts + half - from,
+					      learning->n - n, candidate);
+			if (!texture)
+				return -ENODATA;
+		}
+		incise_texture_fill(texture, 0, learning->seed, &knots);
+		incise_texture_free(texture);
+		incise_look_render(&knots, learning->cuts + from, n, look->noise,
+				   incise_random_mix(learning->seed + (uint64_t)i),
+				   learning->force + from);
+	}
+	return incise_look_at(look, learning->cuts, learning->n, learning->force);
+}
+
+/* How far rendered cuts are from the recorded ones, dB. */
+static double score_look(const struct incise_look *look,
+			 const struct incise_look *recorded)
+{
+	double ratio = fmax(look->rate, 1e-3 * recorded->rate) / recorded->rate;
+
+	return incise_look_distance(look, recorded) + fabs(DECIBEL(ratio));
+}
+
+/* The candidate with the best score, if it improves on none, which is the first. 0, -ENOMEM or -ECANCELED. */
+static int choose_candidate(struct learning *learning, struct candidate *best)
+{
+	int n_gains = sizeof(gains) / sizeof(*gains),
+	    n = 1 + n_gains * (int)(sizeof(windows) / sizeof(*windows));
+	double least = INFINITY;
+
+	for (int i = 0; i < n; i++) {
+		struct candidate candidate = {0};
+		struct incise_look look;
+		double score;
+		int rc;
+
+		if (i)
+			candidate = (struct candidate){windows[(i - 1) / n_gains],
+						       gains[(i - 1) % n_gains]};
+		rc = render_halves(learning, &candidate, &look);
+		score = rc ? INFINITY : score_look(&look, &learning->recorded);
+		free(look.drop);
+		if (rc == -ENOMEM)
+			return rc;
+		if (learning->watch && incise_watch_ask(learning->watch))
+			return -ECANCELED;
+		if (score < least) {
+			least = score - (i ? 0 : IMPROVEMENT);
+			*best = candidate;
+		}
+	}
+	return 0;
+}
+
+/* --- texture --- */
+
+static void note_look(struct incise_texture_look *to, const struct incise_look *look)
+{
+	to->rate = look->rate;
+	to->rms = look->rms;
+	for (int i = 0; i < INCISE_TEXTURE_DECILES && look->n_events; i++)
+		to->drop[i] = look->drop[look->n_events * (size_t)(i + 1) /
+					 (INCISE_TEXTURE_DECILES + 1)];
+	for (int i = 0; i < INCISE_TEXTURE_OCTAVES; i++)
+		to->octave[i] = DECIBEL(look->octave[i]);
+}
+
+static int note_looks(struct learning *learning, const struct candidate *chosen,
+		      struct incise_texture_info *info)
+{
+	const struct incise_look *recorded = &learning->recorded;
+	int rc = 0;
+
+	info->seed = learning->seed;
+	info->n_cuts = learning->n;
+	info->n_events = (int)recorded->n_events;
+	info->up_to_cycles = 0.5 / recorded->step;
+	note_look(&info->recorded, recorded);
+	for (int i = 0; i < 2 && !rc; i++) {
+		struct incise_look look;
+
+		rc = render_halves(learning, i ? chosen : &(struct candidate){0}, &look);
+		if (!rc)
+			info->error[i] = incise_look_distance(&look, recorded);
+		if (!rc && i)
+			note_look(&info->rendered, &look);
+		free(look.drop);
+	}
+	return rc;
+}
+
+static struct incise_texture *learn_pieces(struct learning *learning,
+					   struct incise_error *err)
+{
+	struct incise_look *recorded = &learning->recorded;
+	struct candidate best = {0};
+	struct incise_texture *texture;
+	int shift = INCISE_TEXTURE_SHIFT_LEAST,
+	    rc = incise_look_at(recorded, learning->cuts, learning->n, NULL);
+
+	if (!rc && (learning->n < 2 || recorded->n_events < EVENTS_LEAST))
+		return INCISE_ERROR_NULL(
+			err, ENODATA,
+			"%zu events (falls of the force by at least 2 %% of its largest and 6 "
+			"sd of the noise) in %d cuts; a texture needs %d in 2 cuts or more, "
+			"so that their rate is known within a half: record more cuts, at "
+			"full rate",
+			recorded->n_events, learning->n, EVENTS_LEAST);
+	while (shift < INCISE_TEXTURE_SHIFT_MOST &&
+	       ldexp(1, shift - 15) <= recorded->step)
+		shift++;
+	learning->step = ldexp(1, shift - 16);
+	rc = rc ? rc : choose_candidate(learning, &best);
+	if (!rc && !best.gain)
+		return INCISE_ERROR_NULL(
+			err, EDOM,
+			"no texture makes cuts that it was not learned from more alike "
+			"the recorded ones than the model alone (cross-validated)");
+	texture = rc ? NULL : find_pieces(learning, learning->cuts, learning->n, &best);
+	if (texture && !note_looks(learning, &best, &texture->info))
+		return texture;
+	incise_texture_free(texture);
+	return INCISE_ERROR_NULL(err, rc ? -rc : ENOMEM, "%s",
+				 rc == -ECANCELED ? "training was stopped"
+						  : "no memory to learn a texture");
+}
+
+struct incise_texture *incise_texture_learn(const struct incise_texture_cut *cuts, int n,
+					    uint64_t seed, struct incise_watch *watch,
+					    struct incise_error *err)
+{
+	struct learning learning = {.n = n, .seed = seed, .watch = watch};
+	size_t rows = 0, most = 0, *order = calloc((size_t)n + 1, sizeof(*order)), room;
+	struct incise_texture *texture = NULL;
+	double *numbers;
+
+	for (int i = 0; i < n; i++) {
+		rows += cuts[i].n;
+		most = most > cuts[i].n ? most : cuts[i].n;
+	}
+	room = POINTS_PER_ROW * most + 1;
+	numbers = calloc(rows + 2 * room, sizeof(*numbers));
+	learning.cuts = calloc((size_t)n + 1, sizeof(*cuts));
+	learning.force = calloc((size_t)n + 1, sizeof(*learning.force));
+	if (numbers && order && learning.cuts && learning.force) {
+		double *at = numbers;
+
+		learning.tau = at;
+		learning.sum = at += room;
+		incise_random_shuffle(order, (size_t)n, seed);
+		at += room;
+		for (int i = 0; i < n; at += learning.cuts[i++].n) {
+			learning.cuts[i] = cuts[order[i]];
+			learning.force[i] = at;
+		}
+		texture = learn_pieces(&learning, err);
+	} else {
+		incise_error_set(err, ENOMEM, "no memory to learn a texture");
+	}
+	free(numbers);
+	free(order);
+	free(learning.cuts);
+	free(learning.force);
+	free(learning.recorded.drop);
+	return texture;
+}
