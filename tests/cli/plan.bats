@@ -68,7 +68,7 @@ setup() {
 @test "a full plan keeps every stage" {
 	incise plan wall.scene --json >few.json
 	incise plan wall.scene --full --json >all.json
-	[ "$(key few.json kept)" = '["pose","predict","contact","texture","reaction","start","limit"]' ]
+	[ "$(key few.json kept)" = '["pose","predict","contact","reaction","start","limit"]' ]
 	stages=$(sqlite3 :memory: "SELECT group_concat(value) FROM json_each(readfile('all.json'), '\$.kept')")
 	[[ "$stages" == pose,predict,tool,contact,normal,incision,membrane,texture,reaction,plane,*,start,work,limit ]]
 	# what is left out of a full plan is no stage of a loop without a stepper

@@ -67,7 +67,7 @@ FILE *figure_of_texture(const struct figure *figure)
 	fprintf(script,
 		"set origin 0.5,0\nset logscale x 2\nset key bottom left\n"
 		"set title 'spectrum: %.2g dB apart, %.2g dB without texture'\n"
-		"set xlabel 'cycles per %s'\nset ylabel 'power / dB'\nplot $octaves%s"
+		"set xlabel 'frequency / (1/%s)'\nset ylabel 'power / dB'\nplot $octaves%s"
 		"unset multiplot\n",
 		info.error[1], info.error[0], info.unit, looks);
 	incise_texture_free(texture);
