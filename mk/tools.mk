@@ -17,7 +17,7 @@ $(O)/obj/tools/incise.o $(O)/obj/tools/cli/features.o: cppflags += -DVIEW_LIBRAR
 $(O)/obj/tools/stepper/%.o: cppflags += -Idriver
 
 # Printed in the head of each bench's report; without the build's own folder.
-$(O)/obj/tools/bench/machine.o: cppflags += -DBUILD_FLAGS='"$(subst ',,$(subst ",,$(filter-out \
+$(O)/obj/tools/cli/machine.o: cppflags += -DBUILD_FLAGS='"$(subst ',,$(subst ",,$(filter-out \
 	-ffile-prefix-map=% -fdebug-prefix-map=% -fmacro-prefix-map=%,$(CFLAGS))))"'
 
 # Frames that incise serve decodes.

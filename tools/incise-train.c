@@ -993,8 +993,11 @@ static void save_factor(const struct train_options *options,
 	print_clamped(trained);
 	if (info.parts < INCISE_FACTOR_FOLDS)
 		printf("%d of %d parts, as small ones would reveal their pairs: a merge "
-		       "cross-validates over these\n",
-		       info.parts, INCISE_FACTOR_FOLDS);
+		       "%s\n",
+		       info.parts, INCISE_FACTOR_FOLDS,
+		       info.parts > 1 ? "cross-validates over these"
+				      : "with it cannot cross-validate; add sources, or "
+					"give incise merge --ridge");
 	cli_written();
 }
 

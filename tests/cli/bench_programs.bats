@@ -5,10 +5,6 @@
 load cli
 load report
 
-setup() {
-	work_folder
-}
-
 # Its quick report, as r.json, which leaves no file behind.
 quick_program() {
 	[ -x "$INCISE_BUILD/tests/bench/$1" ] || complain "$1 is not built: make bench-all" || return

@@ -127,8 +127,7 @@ build_examples() {
 	[[ "$output" == *"tracker: 1 missing, number 120,"* ]]
 	# and what it refuses
 	export INCISE_MODULE_PATH=$PWD/modules
-	run --separate-stderr incise info lines:none
-	failed_with "lines:none:" mkfifo
+	fails incise info lines:none -- "lines:none:" mkfifo
 	sed -i 's/poses:100/poses:0/' rig.conf
 	run --separate-stderr incise capture -o other.rec --duration 1s
 	failed_with 'rig.conf:2: tracker: "lines:poses:0"' "1 to 1000 Hz"

@@ -242,8 +242,9 @@ struct incise_corpus_survey {
 	int n_groups;
 	struct incise_corpus_group *groups; /**< in order of appearance */
 	double min[INCISE_MODEL_INPUTS_MAX + 1], max[INCISE_MODEL_INPUTS_MAX + 1];
-	char name[200];	 /**< for messages; cut to this length */
-	char group[256]; /**< of all its rows; "": the text of each row */
+	char name[200];	      /**< for messages; cut to this length */
+	char group[256];      /**< of all its rows; "": the text of each row */
+	unsigned int missing; /**< bit i: rows have no number in further input i */
 };
 
 /** Number of sources. */
