@@ -35,11 +35,11 @@
 #define DECIBEL(ratio) (10 * log10(fmax(ratio, 1e-30)))
 
 struct candidate {
-	double window; /* steps of the look; 0: all of a cut */
+	double window; /* steps of the look */
 	double gain;   /* 0: no texture */
 };
 
-static const double windows[] = {0, 64, 16, 4, 2}, gains[] = {1, 0.7, 0.5, 0.35, 0.25};
+static const double windows[] = {256, 64, 16, 4, 2}, gains[] = {1, 0.7, 0.5, 0.35, 0.25};
 
 struct learning {
 	struct incise_texture_cut *cuts; /* in random order */
@@ -148,8 +148,7 @@ static struct incise_texture *find_pieces(struct learning *learning,
 		const double *tau = learning->tau;
 		size_t m = find_tau(learning, &cuts[i]), from = 0;
 
-		if (candidate->window)
-			take_running_mean(learning, m, candidate->window);
+		take_running_mean(learning, m, candidate->window);
 		for (size_t k = 1; k < m; k++) {
 			if (!(tau[k - 1] < 0 && tau[k] >= 0))
 				continue;
@@ -207,8 +206,8 @@ static double score_look(const struct incise_look *look,
 /* The candidate with the best score, if it improves on none, which is the first. 0, -ENOMEM or -ECANCELED. */
 static int choose_candidate(struct learning *learning, struct candidate *best)
 {
-	int n_gains = sizeof(gains) / sizeof(*gains),
-	    n = 1 + n_gains * (int)(sizeof(windows) / sizeof(*windows));
+	int n_gains = sizeof(gains) / sizeof(*gains);
+	int n = 1 + n_gains * (int)(sizeof(windows) / sizeof(*windows));
 	double least = INFINITY;
 
 	for (int i = 0; i < n; i++) {

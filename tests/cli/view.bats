@@ -13,7 +13,7 @@ setup() {
 	work_folder
 	[ -x "$INCISE_BUILD/bin/incise-view" ] ||
 		skip "incise view was not built: SDL2, epoxy, cairo or EGL were absent"
-	cp "$root"/scenes/*.scene "$root"/scenes/*.fis .
+	cp "$root"/scenes/* .
 	# Small, so that a drawing processor has little to do.
 	small="--size 160x120 --no-panel"
 	sed -i 's/picture = {/picture = {\n  texture_px = 512;/' neck.scene

@@ -392,7 +392,7 @@ static void figure_prediction(const struct demo *demo)
 	script = plot_begin(demo->folder, "fig5-prediction", 1000, 1100);
 	/* One time axis: that of the cut, whatever the loop ran on for. */
 	fprintf(script,
-		"layout = panels(80, 20, below(1), above(1), 0, between)\n"
+		"layout = panels(80, 20, below(2), above(1), 0, between)\n"
 		"set multiplot layout 3,1 @layout "
 		"title 'New cut at 5 mm (compare figure 5 of Song et al., 2006)'\n"
 		"set xlabel 'time in the cut / s'\nset ylabel 'force / N'\nset key off\n"
