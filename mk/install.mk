@@ -2,8 +2,8 @@
 # install, uninstall, dist.
 
 headers := $(wildcard lib/include/incise/*.h)
-scenes := $(wildcard scenes/*.scene scenes/*.fis)
-report_files := $(addprefix tools/report/,report.py compare.py measure.py bench.j2 assess.j2 document.css)
+scenes := $(wildcard scenes/*.scene scenes/*.fis scenes/*.tex)
+report_files := $(addprefix tools/report/,report.py tables.py compare.py measure.py bench.j2 assess.j2 document.css)
 examples := $(wildcard doc/*.example)
 unit_scripts := udev/stepper-setup
 # All but the main page of the headers' reference, which is in that.

@@ -10,7 +10,7 @@
 #include <unistd.h>
 #include <incise/version.h>
 #include "bench/metrics.h"
-#include "bench/machine.h"
+#include "cli/machine.h"
 #include "cli/cli.h"
 #include "cli/file.h"
 #include "cli/folder.h"

@@ -182,7 +182,6 @@ struct frame_times {
 
 struct frame_row {
 	int texture_px, width, height, triangles, samples, frames;
-	char size[40];
 	struct frame_times ticks; /* wound and blood */
 	struct frame_times texture, draw, whole;
 	struct harness_time time; /* of a whole frame */
@@ -319,8 +318,6 @@ static void measure_frames(const struct view_script *script, bool quick,
 		row->texture_px = size[0];
 		row->width = size[1];
 		row->height = size[2];
-		snprintf(row->size, sizeof(row->size), "%5d %4dx%-4d", size[0], size[1],
-			 size[2]);
 		cli_progress("frames of %d x %d, texture of %d", row->width, row->height,
 			     row->texture_px);
 		measure_size(script, quick ? QUICK_UNTIL_S : UNTIL_S, row, rows);
@@ -338,17 +335,16 @@ static double frame_ms(const struct frame_rows *rows, int texture_px)
 	return NAN;
 }
 
-#define TIMES(part, member)                                                     \
-	COLUMN(frame_row, part "_ms.median", member.median, "%6.2f", "median"), \
-		COLUMN(frame_row, part "_ms.p99", member.p99, "%6.2f", "99 %"), \
-		COLUMN(frame_row, part "_ms.max", member.max, "%6.1f", "   max")
+#define TIMES(part, member)                                    \
+	COLUMN(frame_row, part "_ms.median", member.median),   \
+		COLUMN(frame_row, part "_ms.p99", member.p99), \
+		COLUMN(frame_row, part "_ms.max", member.max)
 
 static const struct bench_table frame_table = {
 	.key = "frames",
 	.row_bytes = sizeof(struct frame_row),
 	.columns =
 		{
-			COLUMN(frame_row, NULL, size, "%s", "texture image"),
 			COLUMN(frame_row, "texture_px", texture_px),
 			COLUMN(frame_row, "width", width),
 			COLUMN(frame_row, "height", height),
@@ -359,27 +355,14 @@ static const struct bench_table frame_table = {
 			TIMES("texture", texture),
 			TIMES("draw", draw),
 			TIMES("whole", whole),
-			COLUMN(frame_row, "in_20_ms_percent", whole.in_time, "%7.1f", ""),
-			COLUMN(frame_row, "frames_hz", hz, "%6.1f", ""),
-			COLUMN(frame_row, "texels", texels, "%9.0f", ""),
+			COLUMN(frame_row, "in_20_ms_percent", whole.in_time),
+			COLUMN(frame_row, "frames_hz", hz),
+			COLUMN(frame_row, "texels", texels),
 			COLUMN(frame_row, "effects_us_tick", tick_us),
 		},
 	.metrics = {METRIC(TIME, frame_row, time, "ms",
 			   "frame {width}x{height}, texture {texture_px}")},
 };
-
-static void report_frames(struct bench_run *run, const struct frame_rows *rows)
-{
-	bench_value(run, "renderer", json_string(rows->renderer));
-	bench_text(
-		run,
-		"ms per frame, %s, %d triangles, %d frames each; %% within %.0f ms, the "
-		"%.0f Hz of Song et al. (2006)\n%-15s %-20s %-20s %-20s %-20s %7s %6s %9s\n",
-		rows->renderer, rows->row[0].triangles, rows->row[0].frames,
-		1e3 / PAPER_HZ, PAPER_HZ, "", " wound, blood", " texture", " drawing",
-		" whole", "% 20 ms", "fps", "texels");
-	bench_table(run, &frame_table, rows->row, rows->n);
-}
 
 /* --- the error of what is shown ---
  *
@@ -541,7 +524,7 @@ static void close_views(struct compared *c)
 
 struct shown_row {
 	int texture_px, fps;
-	char rate[12], shown[20]; /* "60", "60 fps"; or "exact" */
+	char shown[20]; /* "60 fps"; or "exact" */
 	double rms, rms_max, ssim, unlike;
 	double ms;   /* of a frame */
 	double ms_s; /* of run time for a second that is shown; NaN at the moment itself */
@@ -561,7 +544,6 @@ static void add_shown(struct shown_rows *rows, const struct compared *c, int i,
 	*row = (struct shown_row){
 		.texture_px = textures_px[i / RATES],
 		.fps = rates[i % RATES],
-		.rate = "exact",
 		.shown = "exact",
 		.rms = sqrt(c->square[i] / rows->moments),
 		.rms_max = c->max[i],
@@ -575,7 +557,6 @@ static void add_shown(struct shown_rows *rows, const struct compared *c, int i,
 	row->ms = frame_ms(frames, row->texture_px);
 	if (row->fps) {
 		row->ms_s = row->ms * row->fps;
-		snprintf(row->rate, sizeof(row->rate), "%d", row->fps);
 		snprintf(row->shown, sizeof(row->shown), "%d fps", row->fps);
 	}
 	rows->n++;
@@ -610,15 +591,14 @@ static const struct bench_table shown_table = {
 	.row_bytes = sizeof(struct shown_row),
 	.columns =
 		{
-			COLUMN(shown_row, "texture_px", texture_px, "%7.0f", "texture"),
-			COLUMN(shown_row, NULL, rate, "%6s", "fps"),
+			COLUMN(shown_row, "texture_px", texture_px),
 			COLUMN(shown_row, "fps", fps, .optional = true),
 			COLUMN(shown_row, "shown", shown, .data = true),
-			COLUMN(shown_row, "rms_error", rms, "%8.3f", "rms"),
-			COLUMN(shown_row, "rms_error_max", rms_max, "%8.3f", "largest"),
-			COLUMN(shown_row, "ssim", ssim, "%8.5f", "SSIM"),
-			COLUMN(shown_row, "frame_ms", ms, "%9.2f", "ms/frame"),
-			COLUMN(shown_row, "ms_per_s", ms_s, "%9.0f", "ms/s"),
+			COLUMN(shown_row, "rms_error", rms),
+			COLUMN(shown_row, "rms_error_max", rms_max),
+			COLUMN(shown_row, "ssim", ssim),
+			COLUMN(shown_row, "frame_ms", ms),
+			COLUMN(shown_row, "ms_per_s", ms_s),
 		},
 	.metrics =
 		{
@@ -632,17 +612,6 @@ static const struct bench_table shown_table = {
 			       "shown=60 fps|exact"),
 		},
 };
-
-static void report_shown(struct bench_run *run, const struct shown_rows *rows)
-{
-	bench_values(run, "{s{si si}}", "shown", "moments", rows->moments,
-		     "exact_texture_px", rows->exact_px);
-	bench_text(run,
-		   "\ndisplayed image compared with texture %d at the same moment; %d "
-		   "moments\n",
-		   rows->exact_px, rows->moments);
-	bench_table(run, &shown_table, rows->row, rows->n);
-}
 
 /* --- the benchmark --- */
 
@@ -678,10 +647,11 @@ static void run_view(struct bench_run *run)
 	measure_frames(&script, run->quick, &frames);
 	measure_shown(&script, run->quick, &frames, &shown);
 	view_script_end(&script);
-	bench_text(run, "%s, %s\n\n", bench_machine(run, "cpu"),
-		   bench_machine(run, "kernel"));
-	report_frames(run, &frames);
-	report_shown(run, &shown);
+	bench_value(run, "renderer", json_string(frames.renderer));
+	bench_rows(run, &frame_table, frames.row, frames.n);
+	bench_values(run, "{s{si si}}", "shown", "moments", shown.moments,
+		     "exact_texture_px", shown.exact_px);
+	bench_rows(run, &shown_table, shown.row, shown.n);
 }
 
 static const struct bench bench_view = {

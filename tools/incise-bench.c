@@ -5,7 +5,6 @@
 #include <stdio.h>
 #include <string.h>
 #include "bench/bench.h"
-#include "bench/wakeup.h"
 #include "cli/file_kind.h"
 #include "cli/json.h"
 
@@ -24,7 +23,7 @@ static const struct cli_option options[] = {
 	{0, "load", "NAME",
 	 "loop: wake-up latency under one load only: idle, cpu, memory, disk or "
 	 "view",
-	 CLI_TEXT(struct bench_run, load), .names = load_names},
+	 CLI_TEXT(struct bench_run, load), .names = bench_loads},
 	{0, "quick", NULL, "smoke test with fewer points and repeats",
 	 CLI_FLAG(struct bench_run, quick)},
 	{0},

@@ -202,7 +202,8 @@ static void write_scene(const struct demo *demo)
 	if (!out)
 		cli_fail("%s: %s", path, strerror(errno));
 	fputs("# Written by incise demo; see incise-scene(5).\n"
-	      "rate_hz = 1000.0;\nmodel = \"liver.fis\";\narithmetic = \"fixed\";\n"
+	      "rate_hz = 1000.0;\narithmetic = \"fixed\";\n"
+	      "model = { cut = \"liver.fis\"; texture = \"liver.fis.tex\"; };\n"
 	      "device = { damping_N_s_mm = " DAMPING "; };\n"
 	      "limits = { force_N = 4.0; slew_N_s = 400.0; pose_age_ms = 50.0; };\n",
 	      out);
@@ -258,7 +259,9 @@ static void walk(struct demo *demo, const char *loop_time)
 	     *scene = demo_path(demo, "liver.scene");
 	char *history = demo_path(demo, "paper-epochs.csv"),
 	     *log = demo_path(demo, "haptic.csv");
-	char *replay = demo_path(demo, "new-cut-replay.csv");
+	char *replay = demo_path(demo, "new-cut-replay.csv"),
+	     *felt = demo_path(demo, "new-cut-texture.csv");
+	char *texture = demo_path(demo, "liver.fis.tex");
 	char *sim = cli_text("sim:seed=%ld,clock=simulated", demo->seed);
 	char *seed_text = cli_text("%ld", demo->seed);
 	/* Another liver: the boundary effect of its cut is not that of any cut above. */
@@ -297,6 +300,9 @@ static void walk(struct demo *demo, const char *loop_time)
 	json_object_set_new(demo->summary, "train_unseen_cuts",
 			    RUN(demo, "train", by_cut, "-o", model, "--group", "cut",
 				"--check", "0.3", "--seed", seed_text, "--json"));
+	print_step(demo, "Learn the texture of cutting, which averages do not have");
+	json_object_set_new(demo->summary, "train_texture",
+			    RUN(demo, "train", raw, "-o", texture, "--json"));
 	print_step(demo, "Cut another liver once, 5 mm deep, to compare with");
 	json_object_set_new(demo->summary, "capture_new_cut",
 			    RUN(demo, "capture", "-o", new_rec, "--rig", new_sim, "-c",
@@ -307,15 +313,18 @@ static void walk(struct demo *demo, const char *loop_time)
 	write_scene(demo);
 	json_object_set_new(demo->summary, "replay_new_cut",
 			    RUN(demo, "replay", new_rec, scene, "--poses", "acquisition",
-				"-o", replay, "--json"));
+				"--no-texture", "-o", replay, "--json"));
+	json_object_set_new(demo->summary, "replay_new_cut_with_texture",
+			    RUN(demo, "replay", new_rec, scene, "--poses", "acquisition",
+				"-o", felt, "--json"));
 	print_step(demo, "Run the haptic loop in real time, in fixed point");
 	json_object_set_new(demo->summary, "haptic",
 			    RUN(demo, "haptic", scene, "--rig", live, "-c", "none",
 				"--no-rt", "--duration", duration, "-o", log, "--json"));
 	free(rec), free(new_rec), free(raw), free(pairs), free(by_cut), free(new_csv);
 	free(paper), free(model), free(initial), free(scene), free(history), free(log);
-	free(replay), free(sim), free(seed_text), free(new_sim), free(live),
-		free(duration);
+	free(replay), free(felt), free(texture), free(sim), free(seed_text),
+		free(new_sim), free(live), free(duration);
 }
 
 /* --- paper 2 ------------------------------------------------------------------------- */

@@ -20,7 +20,7 @@
 #include <incise/recorder.h>
 #include <incise/rig.h>
 #include <incise/scan.h>
-#include "bench/machine.h"
+#include "cli/machine.h"
 #include "cli/calibration.h"
 #include "cli/child.h"
 #include "cli/cli.h"

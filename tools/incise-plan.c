@@ -9,7 +9,7 @@
 #include <stdio.h>
 #include <string.h>
 #include <incise/plan.h>
-#include "bench/tick_cost.h"
+#include "plan/tick_cost.h"
 #include "cli/cli.h"
 #include "cli/json.h"
 #include "cli/loop_report.h"

@@ -993,8 +993,11 @@ static void save_factor(const struct train_options *options,
 	print_clamped(trained);
 	if (info.parts < INCISE_FACTOR_FOLDS)
 		printf("%d of %d parts, as small ones would reveal their pairs: a merge "
-		       "cross-validates over these\n",
-		       info.parts, INCISE_FACTOR_FOLDS);
+		       "%s\n",
+		       info.parts, INCISE_FACTOR_FOLDS,
+		       info.parts > 1 ? "cross-validates over these"
+				      : "with it cannot cross-validate; add sources, or "
+					"give incise merge --ridge");
 	cli_written();
 }
 
@@ -1028,16 +1031,15 @@ static void train_texture_alone(const struct train_options *options)
 	struct incise_trained trained = {
 		.model = cli_require(incise_model_load(path, &err), &err)};
 	struct incise_texture *texture = train_texture(options, sources, &trained);
-	json_t *report = texture_json(texture);
 
 	if (texture)
 		cli_check(incise_texture_save(texture, options->tex, &err), &err);
-	if (options->json)
-		json_print(json_incref(report));
-	else if (texture)
+	if (options->json) {
+		json_print(json_pack("{so}", "texture", texture_json(texture)));
+	} else if (texture) {
 		texture_print(texture);
-	cli_written();
-	json_decref(report);
+		cli_written();
+	}
 	incise_texture_free(texture);
 	incise_trained_free(&trained);
 	sources_free(sources, options->n_paths);

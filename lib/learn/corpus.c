@@ -312,8 +312,11 @@ static int survey_row(void *user, const double *row, const char *name,
 		group->sum[i] += row[i];
 		c.values[i] = row[i];
 	}
-	for (int i = 0; i < corpus->n_further; i++)
+	for (int i = 0; i < corpus->n_further; i++) {
 		c.values[corpus->columns + i] = row[corpus->further_at + i];
+		if (isnan(row[corpus->further_at + i]))
+			survey->missing |= 1u << i;
+	}
 	group->rows++;
 	survey->rows++;
 	survey->digest = incise_random_bits(survey->digest ^ c.group, c.hash);
@@ -384,7 +387,7 @@ static size_t size_of_bins(const struct incise_corpus *corpus)
 
 void *incise_corpus_encode(struct incise_corpus *corpus, size_t *size)
 {
-	struct header header = {.magic = "survey5",
+	struct header header = {.magic = "survey6",
 				.columns = corpus->columns,
 				.n_surveys = corpus->n_surveys};
 	char *bytes, *at;
@@ -434,7 +437,7 @@ int incise_corpus_add(struct incise_corpus *corpus, const void *bytes, size_t si
 		return incise_error_set(err, EINVAL, "%s", damaged);
 	memcpy(&header, at, sizeof(header));
 	at += sizeof(header);
-	if (memcmp(header.magic, "survey5", 8) || header.columns != corpus->columns ||
+	if (memcmp(header.magic, "survey6", 8) || header.columns != corpus->columns ||
 	    header.size != size || header.n_surveys < 0 ||
 	    (size_t)(end - at) < size_of_bins(corpus) ||
 	    ((size_t)(end - at) - size_of_bins(corpus)) / sizeof(struct candidate) <
@@ -659,8 +662,13 @@ double *incise_corpus_extend(const struct incise_corpus *corpus, int i)
 {
 	const struct incise_pairs *fit = &corpus->sides[0].sample.pairs;
 	size_t n = fit->n_inputs, size = (n + 2) * sizeof(double);
-	double *rows = malloc((fit->n + 1) * size), *to = rows;
+	double *rows, *to;
 
+	/* Also a row outside the sample, or held out, would be left out of a training with it. */
+	for (int s = 0; s < corpus->n_surveys; s++)
+		if (corpus->surveys[s].missing >> i & 1)
+			return NULL;
+	rows = to = malloc((fit->n + 1) * size);
 	for (size_t r = 0; r < corpus->n_rows && rows; r++) {
 		const struct candidate *c = &corpus->rows[r];
 

@@ -50,7 +50,10 @@ void incise_corpus_weigh(struct incise_corpus *corpus,
 /* Keep n further columns of the sample, which rows have from number @at. */
 void incise_corpus_keep(struct incise_corpus *corpus, int at, int n);
 
-/* The rows of the training's sample with further column i as their last input; free(3). NULL: no memory. */
+/*
+ * The rows of the training's sample with further column i as their last input; free(3). NULL: no memory,
+ * or any row of a source, held out or not, is NaN there.
+ */
 double *incise_corpus_extend(const struct incise_corpus *corpus, int i);
 
 /*

@@ -31,8 +31,9 @@ static double find_student(double n)
 /* The slopes are held down as if by so many pairs of the whole range. */
 #define SLOPE_PAIRS 1
 
-/* As many shares of the slopes are tried, from 0 on. */
-#define SHARES 5
+/* Shares of the slopes that are tried; above 1, as small errors count as ERROR_LEAST and flatten them. */
+#define SHARES 9
+#define SHARE_STEP 0.25
 
 /* Fewer units than these have no quantile: Student's t widens the one of so many. */
 #define UNITS_MANY 18
@@ -213,11 +214,11 @@ static int fit_interval(struct held *h, struct incise_interval *interval)
 	if (!rc)
 		rc = fit_slopes(h, -1, least, slope);
 	for (int i = 0; i < SHARES && !rc; i++) {
-		double score = score_share(h, (double)i / (SHARES - 1));
+		double score = score_share(h, SHARE_STEP * i);
 
 		if (score < lowest) {
 			lowest = score;
-			share = (double)i / (SHARES - 1);
+			share = SHARE_STEP * i;
 		}
 	}
 	if (rc)

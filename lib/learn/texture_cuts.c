@@ -214,6 +214,7 @@ static struct incise_texture *learn_cuts(const struct cuts *cuts, uint64_t seed,
 	struct incise_texture_cut *list = calloc(cuts->n_cuts + 1, sizeof(*list));
 	struct incise_texture *texture = NULL;
 	double length = 0;
+	bool alone;
 	int n;
 
 	if (!list)
@@ -223,20 +224,24 @@ static struct incise_texture *learn_cuts(const struct cuts *cuts, uint64_t seed,
 		if (list[i].n)
 			length += list[i].way[list[i].n - 1] - list[i].way[0];
 	texture = incise_texture_learn(list, n, seed, watch, err);
+	alone = !texture && errno == EDOM;
 	if (texture) {
 		texture->checksum = incise_model_checksum(cuts->trained->model);
 		texture->info.length = length;
 		texture->info.variation = find_variation(list, n);
 	}
-	if (texture &&
-	    (isnan(texture->info.variation) ||
-	     (realism && incise_realism_of(texture, list, list_cuts(cuts, true, list),
-					   seed, realism)))) {
+	/* Where no texture helps, the model alone is compared. */
+	if ((texture && isnan(texture->info.variation)) ||
+	    ((texture || alone) && realism &&
+	     incise_realism_of(texture, list, list_cuts(cuts, true, list), seed,
+			       realism))) {
 		incise_texture_free(texture);
 		texture = NULL;
 		no_cuts_memory(err);
 	}
 	free(list);
+	if (alone)
+		errno = EDOM;
 	return texture;
 }
 

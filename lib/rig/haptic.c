@@ -102,7 +102,7 @@ int incise_haptic_read(struct incise_haptic *haptic, struct incise_haptic_sample
 int incise_haptic_push(struct incise_haptic *haptic, const double force_N[3],
 		       const double torque_N_mm[3])
 {
-	static const double none[3];
+	const double none[3] = {0};
 	const double *torque = torque_N_mm ? torque_N_mm : none;
 
 	if (!v3_finite(force_N) || !v3_finite(torque))

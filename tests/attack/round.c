@@ -26,14 +26,6 @@ uint64_t draw(uint64_t below)
 	return random_state % below;
 }
 
-int64_t now_ns(void)
-{
-	struct timespec now;
-
-	clock_gettime(CLOCK_MONOTONIC, &now);
-	return now.tv_sec * 1000000000LL + now.tv_nsec;
-}
-
 void nap(int64_t ns)
 {
 	struct timespec time = {ns / (1000 * MS), ns % (1000 * MS)};

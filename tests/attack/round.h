@@ -11,6 +11,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 #include <sys/types.h>
+#include "../clock.h"
 #include "watch.h"
 
 #define MS 1000000LL
@@ -27,7 +28,6 @@ int round_begin(struct round *round, int argc, char **argv, int first);
 
 /* From the seed, below a number. */
 uint64_t draw(uint64_t below);
-int64_t now_ns(void);
 void nap(int64_t ns);
 
 void fail(const struct round *round, const char *fmt, ...)

@@ -8,6 +8,7 @@ load ../cli/cli
 load ../cli/fastrak
 
 setup() {
+	! judged || watch_machine
 	memory_folder
 	export INCISE_MODULE_PATH=$INCISE_BUILD/lib/incise
 	cat >rig.conf <<-END
@@ -21,8 +22,8 @@ setup() {
 }
 
 # Buffers hold a second more than the stalls here. A machine that lets others wait for long has no time
-# to compress what they hold, and arrivals are late: that nothing is lost and times are straight is
-# judged by a full attack only, which has the machine to itself.
+# to compress what they hold, and arrivals are late: a full attack alone judges that nothing is lost and
+# times are straight, and repeats a test during which the machine stood still.
 judged() {
 	[ "$ATTACK" = full ]
 }
@@ -30,6 +31,7 @@ judged() {
 teardown() {
 	pull_away
 	left_memory
+	machine_watched 100
 }
 
 ask() {

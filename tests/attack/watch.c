@@ -22,9 +22,9 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
-#include <time.h>
 #include <unistd.h>
 #include <sqlite3.h>
+#include "../clock.h"
 #include "watch.h"
 
 static struct {
@@ -66,14 +66,6 @@ __attribute__((constructor)) static void begin(void)
 }
 
 /* --- what is committed ------------------------------------------------------------ */
-
-static int64_t now_ns(void)
-{
-	struct timespec now;
-
-	clock_gettime(CLOCK_MONOTONIC, &now);
-	return now.tv_sec * 1000000000LL + now.tv_nsec;
-}
 
 static int64_t greatest(sqlite3 *db, const char *sql)
 {

@@ -5,8 +5,8 @@
 
 Of each set 60 % of the cuts are for training, drawn by the printed seed; the rest is unseen. A
 method selects its settings on the training cuts only, by cross-validation over cuts, and inputs are
-clamped to the range of those cuts, as the loop clamps them. Each runs on one processor. What it
-predicted is kept in build/tests/bench/learned by set, split and method, until this file, scikit-learn or LightGBM changes.
+clamped to the range of those cuts, as the loop clamps them. Each runs on one processor. Predictions
+of peers are kept in build/tests/bench/learned until this file, scikit-learn or LightGBM changes.
 """
 
 import hashlib
@@ -107,8 +107,13 @@ def incise_train(x, y, cut):
 
 
 def run(*command, text=None):
+    """Return the output. Warnings, for example of rules that never fire, would interrupt the table."""
     command = os.path.join(BUILD, "bin/incise"), *command
-    return subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True, input=text).stdout
+    done = subprocess.run(command, capture_output=True, text=True, input=text)
+    if done.returncode:
+        raise SystemExit(done.stderr)
+    return done.stdout
+
 
 scaled = partial(make_pipeline, StandardScaler())
 

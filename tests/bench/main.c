@@ -25,7 +25,7 @@ static const struct cli_option options[] = {
 
 int main(int argc, char **argv)
 {
-	static struct bench_run run = {.bench = &bench_program, .tabs = true};
+	static struct bench_run run = {.bench = &bench_program};
 	const struct cli_command command = {
 		.name = bench_program.name,
 		.synopsis = "[OPERAND...] [OPTIONS]",

@@ -200,7 +200,8 @@ static struct incise_model *learn(struct rig *rigs, int n, bool with,
 				     incise_corpus_new(2, true, 1, INCISE_CORPUS_SAMPLE),
 			     .n = n,
 			     .scatter = 0.1};
-	const struct incise_train_sums all = {all_sums, &l, with};
+	const struct incise_train_sums all = {
+		.find = all_sums, .user = &l, .weighted = with};
 	struct incise_train_report report;
 	struct incise_error err = {0};
 	const struct incise_corpus_side *fit;

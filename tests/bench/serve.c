@@ -24,7 +24,6 @@
 #include "../../tools/cli/folder.h"
 #include "../../tools/cli/stopwatch.h"
 #include "program.h"
-#include "../../tools/bench/wakeup.h"
 
 #define RATE_HZ 1000
 #define PERIOD_NS (1000000000LL / RATE_HZ)
@@ -471,7 +470,7 @@ static void run(struct bench_run *run)
 			 : run->quick	  ? QUICK_SECONDS
 					  : SECONDS;
 	int rounds = run->quick ? QUICK_ROUNDS : ROUNDS;
-	struct incise_realtime *granted = wakeup_realtime(INCISE_REALTIME_ANY_CPU);
+	struct incise_realtime *granted = bench_realtime(INCISE_REALTIME_ANY_CPU);
 	bool realtime = granted;
 
 	cli_catch_signals();

@@ -47,22 +47,16 @@ static struct grid_row {
 static const struct bench_table grid_table = {
 	.key = "heights",
 	.row_bytes = sizeof(struct grid_row),
-	.failed_after = 3,
-	.columns = {COLUMN(grid_row, "name", name, "%14s", "surface"),
-		    COLUMN(grid_row, "wanted_mm", wanted_mm, "%9g", "asked, mm",
-			   .optional = true),
-		    COLUMN(grid_row, "cell_mm", cell_mm, "%8.3g", "cell, mm",
-			   .optional = true),
-		    COLUMN(grid_row, "bound_mm", bound_mm, "%9.2g", "bound, mm",
-			   .optional = true),
-		    COLUMN(grid_row, "reach_mm", reach_mm, "%8.2g", "to, mm"),
-		    COLUMN(grid_row, "depth_error_mm", depth_mm, "%9.2g", "depth, mm"),
-		    COLUMN(grid_row, "normal_error_rad", normal_rad, "%11.2g",
-			   "normal, rad"),
-		    COLUMN(grid_row, "force_error_N", force_N, "%9.2g", "force, N"),
-		    COLUMN(grid_row, "size_kB", kB, "%8.1f", "kB", .optional = true),
-		    QUANTILES(grid_row, "ns", time, "%8.1f"),
-		    COLUMN(grid_row, "failed", failed)},
+	.columns = {COLUMN(grid_row, "name", name),
+		    COLUMN(grid_row, "wanted_mm", wanted_mm, .optional = true),
+		    COLUMN(grid_row, "cell_mm", cell_mm, .optional = true),
+		    COLUMN(grid_row, "bound_mm", bound_mm, .optional = true),
+		    COLUMN(grid_row, "reach_mm", reach_mm),
+		    COLUMN(grid_row, "depth_error_mm", depth_mm),
+		    COLUMN(grid_row, "normal_error_rad", normal_rad),
+		    COLUMN(grid_row, "force_error_N", force_N),
+		    COLUMN(grid_row, "size_kB", kB, .optional = true),
+		    QUANTILES(grid_row, "ns", time), COLUMN(grid_row, "failed", failed)},
 	.metrics = {METRIC(TIME, grid_row, time, "ns", "{name} of heights, {wanted_mm}"),
 		    METRIC(EXACT, grid_row, force_N, "N",
 			   "error of heights, {name} {wanted_mm}")},
@@ -196,13 +190,7 @@ static void measure_heights(struct bench_run *run)
 	for (int i = 0; i < n; i++)
 		prepare_grid(&grids[i], incise_plan_surface(plan));
 	bench_times(&grid_table, grids, n, run_places, PLACES, REPEATS(run));
-	bench_text(
-		run,
-		"a mesh of a sphere of %g mm, %d triangles, and its grids of heights: cells "
-		"by the bound that is asked for; largest errors, and run time of a place\n",
-		RADIUS_MM, 2 * CELLS * CELLS);
-	bench_table(run, &grid_table, grids, n);
-	bench_text(run, "\n");
+	bench_rows(run, &grid_table, grids, n);
 	for (int i = 0; i < n; i++)
 		incise_heights_free(&grids[i].heights);
 	incise_plan_free(plan);
@@ -228,12 +216,12 @@ static struct tracker_row {
 static const struct bench_table tracker_table = {
 	.key = "trackers",
 	.row_bytes = sizeof(struct tracker_row),
-	.columns = {COLUMN(tracker_row, "rate_hz", rate_hz, "%7g", "Hz"),
-		    COLUMN(tracker_row, "latency_ms", latency_ms, "%6g", "ms"),
-		    COLUMN(tracker_row, "held_rms_mm", held_mm, "%9.2g", "held, mm"),
-		    COLUMN(tracker_row, "rms_error_mm", rms_mm, "%8.2g", "rms, mm"),
-		    COLUMN(tracker_row, "max_error_mm", most_mm, "%8.2g", "most, mm"),
-		    QUANTILES(tracker_row, "ns", time, "%7.1f")},
+	.columns = {COLUMN(tracker_row, "rate_hz", rate_hz),
+		    COLUMN(tracker_row, "latency_ms", latency_ms),
+		    COLUMN(tracker_row, "held_rms_mm", held_mm),
+		    COLUMN(tracker_row, "rms_error_mm", rms_mm),
+		    COLUMN(tracker_row, "max_error_mm", most_mm),
+		    QUANTILES(tracker_row, "ns", time)},
 	.metrics = {METRIC(TIME, tracker_row, time, "ns",
 			   "predictor at {rate_hz} Hz, {latency_ms} ms"),
 		    METRIC(EXACT, tracker_row, rms_mm, "mm",
@@ -305,15 +293,11 @@ static void measure_trackers(struct bench_run *run)
 	for (int i = 0; i < n; i++)
 		measure_tracker(&trackers[i]);
 	bench_times(&tracker_table, trackers, n, run_track, TRACKED_TICKS, REPEATS(run));
-	bench_text(
-		run,
-		"pose of now by the tracker: error of the last pose and of the predictor\n");
-	bench_table(run, &tracker_table, trackers, n);
+	bench_rows(run, &tracker_table, trackers, n);
 }
 
 static void run_settings(struct bench_run *run)
 {
-	run->tabs = false; /* its tables have headings */
 	measure_heights(run);
 	measure_trackers(run);
 }

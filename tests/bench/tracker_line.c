@@ -139,8 +139,8 @@ int main(int argc, char **argv)
 	for (size_t i = 0; i < LINES; i++)
 		if (begin(&lines[i], seconds))
 			return 1;
-	end_ns = pty_now_ns() + seconds * INT64_C(1000000000);
-	while (!rc && pty_now_ns() < end_ns) {
+	end_ns = now_ns() + seconds * INT64_C(1000000000);
+	while (!rc && now_ns() < end_ns) {
 		usleep(20000);
 		for (size_t i = 0; i < LINES; i++)
 			if (take(&lines[i]) < 0) {

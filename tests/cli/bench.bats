@@ -7,10 +7,6 @@ load report
 names="double_libm double_separable double_library fixed_direct fixed_table_64 \
 	fixed_table_1024 fixed_table force_table_32 force_table batch batch_force"
 
-setup() {
-	work_folder
-}
-
 @test "bench precision measures a model of its own, and says where" {
 	run -0 --separate-stderr incise bench precision --quick
 	[ -z "$stderr" ]
@@ -127,10 +123,8 @@ setup() {
 	echo "{\"figures\": [{$good}]}" >good.json
 	try() {
 		printf '%s' "$1" >bad.json
-		run --separate-stderr incise bench compare bad.json good.json
-		failed_with bad.json "$2"
-		run --separate-stderr incise bench compare good.json bad.json
-		failed_with bad.json "$2"
+		fails incise bench compare bad.json good.json -- bad.json "$2"
+		fails incise bench compare good.json bad.json -- bad.json "$2"
 	}
 	try '' "not JSON"
 	try '{' "not JSON"
@@ -153,25 +147,20 @@ setup() {
 	try '{"figures": [{"name": "x", "unit": "s", "kind": "time", "value": 1}]}' "'yardsticks' is missing"
 	try "{\"figures\": [{$good}, {$good}]}" "'x' occurs twice"
 	try '{"figures": [{"name": "y", "unit": "N", "kind": "exact", "value": 1}]}' "no metric in common"
-	run --separate-stderr incise bench compare good.json none.json
-	failed_with none.json "No such file"
-	run --separate-stderr incise bench compare . good.json
-	failed_with "."
-	run --separate-stderr incise bench compare good.json /dev/zero
-	failed_with "/dev/zero: not a regular file"
+	fails incise bench compare good.json none.json -- none.json "No such file"
+	fails incise bench compare . good.json -- "."
+	fails incise bench compare good.json /dev/zero -- "/dev/zero: not a regular file"
 	# Short, and a gibibyte once it is read.
 	{ echo '[{}'; yes ',{}' | head -n 4000000 | tr -d '\n'; echo ']'; } >many.json
 	(
 		ulimit -v 500000
-		run --separate-stderr incise bench compare good.json many.json
-		failed_with "many.json: out of memory"
+		fails incise bench compare good.json many.json -- "many.json: out of memory"
 	)
 	echo "{\"quick\": true, \"figures\": [{$good}]}" >quick.json
 	echo "{\"quick\": false, \"figures\": [{$good}]}" >full.json
 	run --separate-stderr incise bench compare quick.json full.json
 	failed_with "quick.json was made with --quick and full.json was not"
-	run --separate-stderr incise bench compare good.json
-	bad_usage "'compare' and two reports"
+	misused incise bench compare good.json -- "'compare' and two reports"
 	run --separate-stderr incise bench compare good.json good.json --quick
 	bad_usage "'compare' takes no option but --json"
 }
@@ -187,10 +176,8 @@ setup() {
 	[ "$(key both.json quick)" = 1 ]
 	# said before the work
 	echo '{}' >bad.json
-	run --separate-stderr incise bench training --against bad.json
-	failed_with bad.json "no metrics"
-	run --separate-stderr incise bench training --against r.json --load cpu
-	bad_usage "--load"
+	fails incise bench training --against bad.json -- bad.json "no metrics"
+	misused incise bench training --against r.json --load cpu -- "--load"
 }
 
 @test "bench precision lists what fails, and why" {
@@ -246,11 +233,9 @@ setup() {
 	incise bench precision m.fis --quick --json >r.json
 	[ "$(key r.json rules)" = 20 ]
 	holds "$(row r.json fixed_table max_error_N) < 1e-4"
-	run --separate-stderr incise bench precision none.fis
-	failed_with none.fis
+	fails incise bench precision none.fis -- none.fis
 	incise train pairs.csv --search type=gbellmf -o bell.fis 2>/dev/null
-	run --separate-stderr incise bench precision bell.fis
-	failed_with gbellmf
+	fails incise bench precision bell.fis -- gbellmf
 }
 
 @test "bench precision measures a model of one input" {
@@ -263,19 +248,13 @@ setup() {
 	done
 }
 
-@test "bench: bad usage" {
-	run --separate-stderr incise bench
-	bad_usage "'precision'"
-	run --separate-stderr incise bench nothing
-	bad_usage "unknown benchmark 'nothing'"
-	run --separate-stderr incise bench presision
-	bad_usage "unknown benchmark 'presision'; did you mean 'precision'?"
-	run --separate-stderr incise bench precision a b
-	bad_usage "'precision' takes at most 1 operand, got 2"
+@test "bench: names of plots and operands that are none" {
 	for name in "" -a - a/ a/.png "a'b" 'a;b' '$(id)' 'a b'; do
-		run --separate-stderr incise bench precision --quick -o "$name"
-		bad_usage "--output"
+		misused incise bench precision --quick -o "$name" -- "--output"
 	done
+	fails incise bench loop none.scene -- none.scene
+	fails incise bench stability a -- "a: No such file"
+	[ -z "$output" ] # before any work
 }
 
 @test "bench training gives error on unseen cuts over time, by method and epochs" {
@@ -307,6 +286,38 @@ setup() {
 			holds "$(row r.json $name rms_error_N) < $(row r.json linear rms_error_N)"
 		fi
 	done
+}
+
+# Row of a kind of texture in r.json.
+realism() { jq -e ".rows[] | select(.kind == \"$1\") | .$2" r.json; }
+
+# bats test_tags=check
+@test "bench realism: teeth that a model learned, next to noise and to none, on cuts that were held out" {
+	quick_report realism
+	[ "$(jq -c '[.rows[].kind]' r.json)" = '["none","noise","texture"]' ]
+	holds "$(realism texture events) > 100 && $(realism texture cuts) == 7"
+	# the same on each machine, but for rounding: the issue's bounds of a simulated rig
+	holds "$(realism texture event_rate) > $(realism texture event_rate_low)"
+	holds "$(realism texture event_rate) < $(realism texture event_rate_high)"
+	holds "$(realism texture spectrum_dB) < 3 && $(realism none spectrum_dB) > 10"
+	holds "$(realism texture rms) > 0.8 && $(realism texture rms) < 1.2"
+	holds "$(realism texture mean_force) ^ 2 < 0.01 ^ 2 && $(realism none mean_force) == 0"
+	# noise of the same spectrum is no saw-tooth: it falls too often, and as it rises
+	holds "$(realism noise event_rate) > 2 && $(realism noise spectrum_dB) < 3"
+	holds "$(realism noise skewness) ^ 2 < 0.3 ^ 2 && $(realism texture skewness) < -2"
+}
+
+@test "bench realism of data: forces without teeth, and files that have no cuts" {
+	awk 'BEGIN { print "cut,depth_mm,velocity_mm_s,force_N"
+		for (c = 1; c <= 8; c++) for (i = 0; i < 400; i++)
+			printf "%d,%.4f,%.3f,%.5f\n", c, i / 50, 10 + c, (0.1 + 0.01 * c) * i / 50 + 0.001 * ((i * 7919 % 101) / 101 - 0.5) }' >smooth.csv
+	run --separate-stderr incise bench realism smooth.csv --quick
+	failed_with smooth.csv "a texture needs 20"
+	sed 's/^cut,/group,/' smooth.csv >none.csv
+	run --separate-stderr incise bench realism none.csv --quick
+	failed_with none.csv cut
+	run --separate-stderr incise bench realism a b
+	bad_usage "'realism' takes at most 1 operand"
 }
 
 # bats test_tags=slow
@@ -395,18 +406,6 @@ in_order() {
 	bench_interrupted loop --quick --load disk --duration 1min "$root/scenes/wall.scene"
 }
 
-@test "bench loop: bad usage" {
-	run -2 --separate-stderr incise bench loop a b
-	run --separate-stderr incise bench loop -o a
-	bad_usage "--output"
-	run --separate-stderr incise bench loop --load much
-	bad_usage "--load: expected idle, cpu, memory, disk or view, found 'much'"
-	run --separate-stderr incise bench training --load cpu
-	bad_usage "--load does not go with 'training'"
-	run --separate-stderr incise bench loop none.scene
-	failed_with none.scene
-}
-
 @test "bench stability finds in time what theory says" {
 	quick_report stability
 	# the tolerances of the manual
@@ -479,15 +478,5 @@ in_order() {
 	[ -n "${plot[*]}" ] || skip "gnuplot is not installed, it draws the chart"
 	[ "$(head -c 8 "a folder/w-map.png" | od -An -tx1 | tr -d ' \n')" = 89504e470d0a1a0a ]
 	grep -q 'delay of 2 ticks' "a folder/w-map.svg"
-}
-
-@test "bench stability: bad usage" {
-	run --separate-stderr incise bench stability a b
-	bad_usage "'stability'"
-	run --separate-stderr incise bench stability a
-	failed_with "a: No such file"
-	[ -z "$output" ] # before any work
-	run --separate-stderr incise bench stability -o a/
-	bad_usage "--output"
 }
 

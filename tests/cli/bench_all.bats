@@ -183,8 +183,7 @@ report_of() {
 	cp -r "$r" again
 	rm again/report.html again/report.md
 	run -0 --separate-stderr incise bench all --from again
-	run --separate-stderr incise bench all --from again
-	failed_with again/report.html exists --overwrite
+	fails incise bench all --from again -- again/report.html exists --overwrite
 	run -0 --separate-stderr incise bench all --from again --overwrite
 	[ -z "$stderr" ]
 	for file in report.html report.md report.json; do
@@ -198,8 +197,7 @@ report_of() {
 		ulimit -n 18
 		incise bench all --quick -o r --only precision,scenes
 	)
-	run --separate-stderr few_files
-	failed_with "1 of 2 benchmarks failed" r/report.md
+	fails few_files -- "1 of 2 benchmarks failed" r/report.md
 	grep -qE "^- scenes: failed: .*Too many open files" r/report.md
 	grep -qE "see “Failures and omissions”" r/report.md
 	[ "$(key r/report.json 'failed[0]')" = scenes ]
@@ -207,8 +205,7 @@ report_of() {
 	grep -q "^## Force evaluation" r/report.md
 	run ! grep "^## Stability" r/report.md
 	# it is replaced by the next one
-	run --separate-stderr incise bench all --quick -o r --only training
-	failed_with r/report.html exists --overwrite
+	fails incise bench all --quick -o r --only training -- r/report.html exists --overwrite
 	incise bench all --quick -o r --overwrite --only training --json >r.json
 	cmp r.json r/report.json
 	[ "$(ls r)" = "$(printf '%s\n' data plots report.html report.json report.md)" ]
@@ -246,11 +243,8 @@ report_of() {
 	grep -qE "^\| training \| .* \| 1.000×10⁻⁹ \| .* \| yes \|$" r/report.md
 	# what is none is said before anything is measured
 	echo '{}' >none.json
-	run --separate-stderr incise bench all --quick -o new --against none.json
-	failed_with none.json
+	fails incise bench all --quick -o new --against none.json -- none.json
 	[ ! -e new ]
-	run --separate-stderr incise bench all --from r --against old.json
-	bad_usage "--from measures nothing"
 }
 
 @test "what a report holds is shown as it is, whatever it is" {
@@ -275,36 +269,19 @@ report_of() {
 @test "what is no report is refused, and stays" {
 	mkdir other
 	echo mine >other/report.json
-	run --separate-stderr incise bench all -o other
-	failed_with "other: not empty and not a report; give another -o DIR"
+	fails incise bench all -o other -- "other: not empty and not a report; give another -o DIR"
 	[ "$(cat other/report.json)" = mine ]
 	[ "$(ls -A other)" = report.json ]
 	touch file
-	run --separate-stderr incise bench all -o file
-	failed_with "file: Not a directory"
-	run --separate-stderr incise bench all --from other
-	failed_with other/report.json
-	run --separate-stderr incise bench all --from nowhere
-	failed_with nowhere/report.json
+	fails incise bench all -o file -- "file: Not a directory"
+	fails incise bench all --from other -- other/report.json
+	fails incise bench all --from nowhere -- nowhere/report.json
 	echo '{"rows": []}' >other/report.json
-	run --separate-stderr incise bench all --from other
-	failed_with "other/report.json: not a report"
+	fails incise bench all --from other -- "other/report.json: not a report"
 }
 
-@test "bad usage of bench all" {
-	run --separate-stderr incise bench all
-	bad_usage "expected -o DIR, or --from DIR"
-	run --separate-stderr incise bench all -o a --from b
-	bad_usage "expected -o DIR, or --from DIR"
-	run --separate-stderr incise bench all -o a --only precision,nosuch
-	bad_usage "found 'nosuch'"
-	run --separate-stderr incise bench all --from b --quick
-	bad_usage "--from measures nothing"
-	run --separate-stderr incise bench all -o ""
-	bad_usage "the folder has no name"
-	run --separate-stderr incise bench all -o a precision
-	bad_usage "takes options only"
-	[ ! -e a ]
+@test "bench all: a folder without a name" {
+	misused incise bench all -o "" -- "the folder has no name"
 }
 
 @test "an interrupted one leaves what was there, and ends what it started" {

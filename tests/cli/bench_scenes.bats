@@ -4,10 +4,6 @@
 load cli
 load report
 
-setup() {
-	work_folder
-}
-
 # A list of incise plan's report as the text that it is in a row.
 in_plan() {
 	sqlite3 :memory: "SELECT group_concat($2, ', ') FROM json_each(readfile('p.json'), '\$.$1')"

@@ -132,7 +132,7 @@ setup_file() {
 setup() {
 	work_folder
 	export INCISE_MODULE_PATH=$BATS_FILE_TMPDIR/modules
-	cp "$root/scenes/liver.scene" "$root/scenes/liver.fis" .
+	cp "$root"/scenes/liver.{scene,fis,fis.tex} .
 }
 
 rig() { # ARGUMENTS
@@ -186,8 +186,7 @@ rig() { # ARGUMENTS
 		failed_with "bench:empty: no answer" power "node id" "120 ohm"
 		[ -z "$output" ]
 		# shellcheck disable=SC2086
-		run --separate-stderr incise info bench:dead $json
-		failed_with "bench:dead: it is down; set it up"
+		fails incise info bench:dead $json -- "bench:dead: it is down; set it up"
 		[ -z "$output" ]
 	done
 }
@@ -209,8 +208,7 @@ rig() { # ARGUMENTS
 	run -0 --separate-stderr incise info ./bench:bus0
 	[[ "$output" == "model "* ]]
 	for name in 12:30.rec a:b.fx; do
-		run --separate-stderr incise info $name
-		failed_with "$name: "
+		fails incise info $name -- "$name: "
 		[[ "$stderr" != *backend* ]]
 	done
 }
@@ -244,14 +242,12 @@ rig() { # ARGUMENTS
 	[ "$(key s.json 'faults[1].fault')" = lost ]
 	run -0 --separate-stderr incise stepper status --follow --duration 0.1s
 	[[ "$output" == *"; over-voltage (3210h): see the supply, then clear" ]]
-	run --separate-stderr incise stepper move 1
-	failed_with "move:" ": over-voltage (3210h): see the supply, then clear"
+	fails incise stepper move 1 -- "move:" ": over-voltage (3210h): see the supply, then clear"
 	run -0 --separate-stderr incise stepper clear
 	[ "$output" = "drive faulty: cleared; it was over-voltage (3210h): see the supply" ]
 	# One that says who it is: it is said once. Its name says more than that.
 	rig "named, faulty"
-	run --separate-stderr incise stepper move 1
-	failed_with "move:"
+	fails incise stepper move 1 -- "move:"
 	[[ "$stderr" != *"drive named: "* ]]
 	incise stepper status --json >s.json
 	[ "$(key s.json cause)" = "drive named: over-voltage (3210h): see the supply, then clear" ]

@@ -13,10 +13,6 @@ need_recording() {
 	incise capture -o "$recording" -r "$BATS_FILE_TMPDIR/rig.conf"
 }
 
-setup() {
-	work_folder
-}
-
 # An entry of the history: kind, key, value, date, pass.
 entry() {
 	printf '{ kind = "%s"; date = "%s"; pass = %s; verdict = "said so";
@@ -73,8 +69,7 @@ today=$(date -u +%Y-%m-%dT00:00:00Z)
 }
 
 @test "a file that is named has to exist" {
-	run --separate-stderr incise calibrate check -c typo.conf
-	failed_with "typo.conf:"
+	fails incise calibrate check -c typo.conf -- "typo.conf:"
 	[ -z "$output" ]
 }
 
@@ -144,9 +139,7 @@ altered() {
 	incise capture -o n.rec --rig sim:clock=simulated,cut_s=1 --duration 3s
 	run --separate-stderr incise calibrate check --recording n.rec
 	failed_with "n.rec:" "record a few slow cuts with the camera"
-	run --separate-stderr incise calibrate check --recording none.rec
-	failed_with "none.rec"
+	fails incise calibrate check --recording none.rec -- "none.rec"
 	echo 'history = 1;' >calibration.conf
-	run --separate-stderr incise calibrate check
-	failed_with "calibration.conf:1: history:"
+	fails incise calibrate check -- "calibration.conf:1: history:"
 }

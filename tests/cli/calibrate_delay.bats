@@ -6,10 +6,6 @@ load cli
 
 rig=sim:clock=simulated,motion=2
 
-setup() {
-	work_folder
-}
-
 @test "a tracker's delay that is wrong by 4 ms is found" {
 	for latency in 4.2 11; do
 		echo 'tracker_delay_ms = 1.5;' >calibration.conf
@@ -54,9 +50,7 @@ setup() {
 	[ "$status" -eq 1 ]
 	[ "$(cat zero.conf)" = 'tracker_delay_ms = 0.0;' ]
 	incise capture -o short.rec --rig $rig --duration 5s
-	run --separate-stderr incise calibrate delay --from short.rec
-	failed_with "in common"
-	run --separate-stderr incise calibrate delay --from none.rec
-	failed_with "none.rec"
+	fails incise calibrate delay --from short.rec -- "in common"
+	fails incise calibrate delay --from none.rec -- "none.rec"
 	[ ! -e calibration.conf ]
 }

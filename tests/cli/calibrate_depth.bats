@@ -112,8 +112,7 @@ pairs() {
 	# three lengths about 361.4; vision is right to 0.1 px
 	holds "($(key report.json full_px) - 361.4)^2 < 0.1^2"
 	holds "$(key report.json vision.value[1]) > 20 && $(key report.json vision.value[1]) < 80"
-	run --separate-stderr incise calibrate depth two-point --from 361.2.ppm
-	bad_usage "--pick X,Y"
+	misused incise calibrate depth two-point --from 361.2.ppm -- "--pick X,Y"
 	# liver is no handle
 	run --separate-stderr incise calibrate depth two-point --from 361.2.ppm --pick 30,30
 	[ "$status" -eq 1 ]
@@ -143,8 +142,7 @@ pairs() {
 	refused() {
 		local text=$1
 		shift
-		run --separate-stderr incise calibrate depth "$@"
-		failed_with "$text"
+		fails incise calibrate depth "$@" -- "$text"
 		cmp before.conf calibration.conf
 	}
 	pairs 2 >swapped.csv
@@ -178,8 +176,7 @@ pairs() {
 	[ "$(grep -c 'kind = "depth"' calibration.conf)" -eq 2 ]
 	# pairs on a curve
 	pairs | awk -F, 'NR > 1 { $0 = $1 + 0.005 * ($1 - 10)^2 "," $2 } { print }' >bent.csv
-	run --separate-stderr incise calibrate depth line --from bent.csv
-	failed_with "lie on a curve"
+	fails incise calibrate depth line --from bent.csv -- "lie on a curve"
 }
 
 @test "a scale far from the nominal one does not pass" {
@@ -258,11 +255,9 @@ pairs() {
 	cp "$BATS_FILE_TMPDIR"/board/view*.pgm .
 	run --separate-stderr incise calibrate depth board --from view1.pgm view2.pgm
 	failed_with "2 views of the board: expected 3"
-	run --separate-stderr incise calibrate depth board --from view1.pgm view1.pgm view1.pgm
-	failed_with "tilt the board"
+	fails incise calibrate depth board --from view1.pgm view1.pgm view1.pgm -- "tilt the board"
 	run --separate-stderr incise calibrate depth board --from view1.pgm view2.pgm view3.pgm --board 8x7
 	failed_with "no chessboard of 8 x 7 inner corners"
 	export INCISE_MODULE_PATH=$PWD
-	run --separate-stderr incise calibrate depth board --from view1.pgm
-	failed_with "no module board_opencv.so in $PWD"
+	fails incise calibrate depth board --from view1.pgm -- "no module board_opencv.so in $PWD"
 }

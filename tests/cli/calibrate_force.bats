@@ -3,10 +3,6 @@
 
 load cli
 
-setup() {
-	work_folder
-}
-
 # Pairs of three ascending series and a descending one, 1250 mV/N and 180 mV, noise of 1 mV
 # or so that is the same in each run; lines can be changed by an awk condition on i.
 made_weights() {
@@ -98,8 +94,7 @@ made_weights() {
 	made_weights "m /= 1000" >kg.csv
 	made_weights "r = 5000 - r" >falls.csv
 	while read -r file said; do
-		run --separate-stderr incise calibrate force --from "$file.csv"
-		failed_with "refused" "$said"
+		fails incise calibrate force --from "$file.csv" -- "refused" "$said"
 	done <<-END
 		swapped the columns of loads and readings are swapped
 		one have the same load
@@ -114,8 +109,7 @@ made_weights() {
 @test "files that are no pairs are named with their line" {
 	while IFS='|' read -r text said; do
 		printf '%b' "$text" >w.csv
-		run --separate-stderr incise calibrate force --from w.csv
-		failed_with "w.csv" "$said"
+		fails incise calibrate force --from w.csv -- "w.csv" "$said"
 	done <<-'END'
 		mass,reading_mV\n1,2\n|w.csv:1: expected a line of column names
 		mass_g,reading_mV\n1,2\n1,x\n|w.csv:3: reading_mV: expected a number, found 'x'
@@ -128,12 +122,10 @@ made_weights() {
 		mass_g,reading_mV,series\n1,1,1.5\n|w.csv:2: series: expected a whole number
 		|w.csv: no pairs; expected a line of column names
 	END
-	run --separate-stderr incise calibrate force --from none.csv
-	failed_with "none.csv:"
+	fails incise calibrate force --from none.csv -- "none.csv:"
 	echo 'force_mV_N = "x";' >calibration.conf
 	made_weights "" >w.csv
-	run --separate-stderr incise calibrate force --from w.csv
-	failed_with "calibration.conf:1: force_mV_N:"
+	fails incise calibrate force --from w.csv -- "calibration.conf:1: force_mV_N:"
 }
 
 @test "stopped in the middle, the old calibration stays" {

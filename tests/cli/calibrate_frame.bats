@@ -45,20 +45,15 @@ setup() {
 # bats test_tags=check
 @test "points that cannot tell the frame are refused, and nothing is changed" {
 	head -n 3 p.csv >few.csv
-	run --separate-stderr incise calibrate frame --from few.csv
-	failed_with "2 points" "3 to 6"
+	fails incise calibrate frame --from few.csv -- "2 points" "3 to 6"
 	awk -F, -v OFS=, 'NR == 3 { $5 += 20 } { print }' p.csv >far.csv
-	run --separate-stderr incise calibrate frame --from far.csv
-	failed_with "miss each other" "order"
+	fails incise calibrate frame --from far.csv -- "miss each other" "order"
 	awk -F, -v OFS=, 'NR > 1 { $1 *= -1 } { print }' p.csv >mirror.csv
-	run --separate-stderr incise calibrate frame --from mirror.csv
-	failed_with "mirrored" "sign of an axis"
+	fails incise calibrate frame --from mirror.csv -- "mirrored" "sign of an axis"
 	sed '5s/.*/30,0.5,0,-100,-25,30,0/; 4d' p.csv >line.csv
-	run --separate-stderr incise calibrate frame --from line.csv
-	failed_with "nearly on a line"
+	fails incise calibrate frame --from line.csv -- "nearly on a line"
 	sed '4s/-50.05,5/-100,5/' p.csv >twice.csv
-	run --separate-stderr incise calibrate frame --from twice.csv
-	failed_with "points 1 and 3" "the device's frame"
+	fails incise calibrate frame --from twice.csv -- "points 1 and 3" "the device's frame"
 	sed '1s/device_z_mm/z/' p.csv >name.csv
 	run --separate-stderr incise calibrate frame --from name.csv
 	failed_with "name.csv:1: there is no column 'device_z_mm'"

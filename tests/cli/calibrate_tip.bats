@@ -6,10 +6,6 @@ load cli
 
 rig=sim:clock=simulated,motion=1,tip_x_mm=3,tip_y_mm=-20,tip_z_mm=60
 
-setup() {
-	work_folder
-}
-
 # By how many of its expanded uncertainties a value of r.json is off.
 within() {
 	local left u
@@ -83,23 +79,17 @@ within() {
 	failed_with "one axis only"
 	incise calibrate tip --rig $rig --duration 10s -o p.csv --dry-run </dev/null
 	head -n 10 p.csv >few.csv
-	run --separate-stderr incise calibrate tip --from few.csv
-	failed_with "too few"
+	fails incise calibrate tip --from few.csv -- "too few"
 	sed '1s/x_mm,y_mm/y_mm,x_mm/' p.csv >swapped.csv
-	run --separate-stderr incise calibrate tip --from swapped.csv
-	failed_with "order of the columns"
+	fails incise calibrate tip --from swapped.csv -- "order of the columns"
 	sed '1s/qw,qx,qy,qz/qx,qy,qz,qw/' p.csv >last.csv
-	run --separate-stderr incise calibrate tip --from last.csv
-	failed_with "quaternion w first"
+	fails incise calibrate tip --from last.csv -- "quaternion w first"
 	awk -F, -v OFS=, 'NR > 500 { $2 += 3 } { print }' p.csv >moved.csv
-	run --separate-stderr incise calibrate tip --from moved.csv
-	failed_with "pivot moved"
+	fails incise calibrate tip --from moved.csv -- "pivot moved"
 	sed '7s/,[^,]*$/,nan/' p.csv >nan.csv
-	run --separate-stderr incise calibrate tip --from nan.csv
-	failed_with "nan.csv:7: qz:" "'nan'"
+	fails incise calibrate tip --from nan.csv -- "nan.csv:7: qz:" "'nan'"
 	sed '1s/qz/foo/' p.csv >name.csv
-	run --separate-stderr incise calibrate tip --from name.csv
-	failed_with "no column 'qz'"
+	fails incise calibrate tip --from name.csv -- "no column 'qz'"
 	[ ! -e calibration.conf ]
 	# every tenth pose is wrong: found, listed, left out
 	awk -F, -v OFS=, 'NR % 10 == 5 { $3 += 2 } { print }' p.csv >outliers.csv

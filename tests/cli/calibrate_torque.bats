@@ -4,10 +4,6 @@
 
 load cli
 
-setup() {
-	work_folder
-}
-
 # bats test_tags=check
 @test "the friction of a device is found, and its cogging" {
 	free=sim:haptic,clock=simulated,motion=still,hand_N_mm=0,hand_kg=0,hand_N_s_mm=0,damping_N_s_mm=1e-5
@@ -23,8 +19,7 @@ setup() {
 	free=clock=simulated,motion=still,hand_N_mm=0,hand_kg=0,hand_N_s_mm=0,coulomb_N=0.3
 	# before the force has grown by 0.3 N, in 100 ms, to half of peak_N
 	while read -r keys words; do
-		run --separate-stderr incise calibrate torque --rig "sim:haptic,$free,peak_N=1.2,$keys"
-		failed_with "$words"
+		fails incise calibrate torque --rig "sim:haptic,$free,peak_N=1.2,$keys" -- "$words"
 	done <<-END
 		dies_s=1.3 its dies_s has passed
 		late_s=1.3 its late_s has passed
@@ -37,8 +32,7 @@ setup() {
 			haptic = "sim:${free#*,},button1_to_s=$to";
 			haptic_setup = { enable = 1; };
 		END
-		run --separate-stderr incise calibrate torque
-		failed_with "button 1, haptic_setup.enable, is not pressed"
+		fails incise calibrate torque -- "button 1, haptic_setup.enable, is not pressed"
 	done
 	sed -i 's/button1_to_s=[0-9.]*/button1_to_s=100/' rig.conf
 	run -0 incise calibrate torque
@@ -52,8 +46,7 @@ setup() {
 	run --separate-stderr incise calibrate torque \
 		--rig sim:haptic,clock=simulated,motion=still,hand_N_mm=0,not_ready_s=2
 	failed_with "its not_ready_s has passed"
-	run --separate-stderr incise calibrate torque --rig sim:
-	failed_with "no haptic device"
+	fails incise calibrate torque --rig sim: -- "no haptic device"
 	run --separate-stderr incise calibrate torque --direction 0,0,0 --rig sim:haptic
 	[ "$status" -eq 2 ]
 }

@@ -288,8 +288,7 @@ under() {
 
 @test "a limit switch stops it, and away from it it may go" {
 	rig --homed --span=-20000:64000
-	run --separate-stderr incise stepper move 8 --rig rig.conf
-	failed_with "limit switch"
+	fails incise stepper move 8 --rig rig.conf -- "limit switch"
 	drive_stopped
 	holds "$(drive_value shaft) >= 64000 && $(drive_value shaft) < 64000 + 25600"
 	run -0 --separate-stderr incise stepper clear --rig rig.conf
@@ -301,14 +300,11 @@ under() {
 @test "a fault is cleared by a person, and only when its cause is gone" {
 	rig --homed
 	drive_tell fault 0x4210 stays
-	run --separate-stderr incise stepper enable --duration 100ms --rig rig.conf
-	failed_with "4210h"
-	run --separate-stderr incise stepper clear --rig rig.conf
-	failed_with "4210h"
+	fails incise stepper enable --duration 100ms --rig rig.conf -- "4210h"
+	fails incise stepper clear --rig rig.conf -- "4210h"
 	drive_is fault
 	drive_tell calm
-	run --separate-stderr incise stepper enable --duration 100ms --rig rig.conf
-	failed_with "clear"
+	fails incise stepper enable --duration 100ms --rig rig.conf -- "clear"
 	drive_is fault
 	run -0 --separate-stderr incise stepper clear --rig rig.conf
 	drive_is "switch-on disabled"
@@ -333,8 +329,7 @@ under() {
 @test "one program drives it; who looks meanwhile is told or shown" {
 	rig --homed
 	begin stepper enable --duration 1h --rig rig.conf
-	run --separate-stderr incise stepper move 1 --rig rig.conf
-	failed_with "another program"
+	fails incise stepper move 1 --rig rig.conf -- "another program"
 	run --separate-stderr incise info "$drive"
 	[ "$status" -le 1 ]
 	drive_is "operation enabled"

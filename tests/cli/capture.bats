@@ -6,10 +6,6 @@ load cli
 
 quick=sim:clock=simulated
 
-setup() {
-	work_folder
-}
-
 teardown() {
 	[ -z "$mounted" ] || umount "$mounted"
 }
@@ -95,8 +91,7 @@ until_it_runs() {
 		"$(ask a.rec.part 'SELECT count(*) FROM force')" ]
 
 	# It is not lost by the next capture of that name, only by --overwrite.
-	run --separate-stderr incise capture -o a.rec --rig $quick --duration 1s
-	failed_with "a.rec.part:"
+	fails incise capture -o a.rec --rig $quick --duration 1s -- "a.rec.part:"
 	[ -d a.rec.part ]
 	incise capture -o a.rec --rig $quick --duration 1s --overwrite
 	[ -d a.rec ]
@@ -135,8 +130,7 @@ until_it_runs() {
 @test "capture refuses an existing recording, --overwrite replaces it" {
 	incise capture -o a.rec --rig $quick --duration 1s
 	before=$(sha256sum <a.rec/recording.db)
-	run --separate-stderr incise capture -o a.rec --rig $quick --duration 2s
-	failed_with "a.rec: exists"
+	fails incise capture -o a.rec --rig $quick --duration 2s -- "a.rec: exists"
 	[ "$(sha256sum <a.rec/recording.db)" = "$before" ]
 	incise capture -o a.rec --rig $quick --duration 2s --overwrite
 	[ "$(ask a.rec 'SELECT count(*) FROM force')" -ge 20000 ]
@@ -164,8 +158,7 @@ until_it_runs() {
 
 @test "capture without a rig says how to get one" {
 	[ ! -e /etc/incise/rig.conf ] || skip "this machine has /etc/incise/rig.conf"
-	run --separate-stderr incise capture -o a.rec
-	failed_with "--rig sim:"
+	fails incise capture -o a.rec -- "--rig sim:"
 	[ -z "$(ls)" ]
 }
 
@@ -196,8 +189,7 @@ small_disk() {
 @test "capture asks for room before it begins" {
 	small_disk 40m
 	# 16 MB and 5 s are kept back; an hour at 10 kHz takes some 140 MB
-	run --separate-stderr incise capture -o disk/a.rec --rig $quick --duration 1h
-	failed_with "enough for "
+	fails incise capture -o disk/a.rec --rig $quick --duration 1h -- "enough for "
 	[ -z "$(ls disk)" ]
 	incise capture -o disk/a.rec --rig $quick --duration 5s
 	small=$(stat -c %s disk/a.rec/recording.db)

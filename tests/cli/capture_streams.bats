@@ -92,8 +92,7 @@ END
 	incise verify a.rec
 	incise capture -o b.rec --rig sim:clock=simulated --duration 600ms -c none
 	[ "$(ask b.rec "SELECT count(*) FROM meta WHERE key = 'calibration_conf'")" = 0 ]
-	run --separate-stderr incise capture -o c.rec --rig $quick --calibration none.conf
-	failed_with none.conf
+	fails incise capture -o c.rec --rig $quick --calibration none.conf -- none.conf
 }
 
 @test "a camera that is not there" {

@@ -22,6 +22,11 @@ work_folder() {
 	run_folder
 }
 
+# Of the files that have none of their own.
+setup() {
+	work_folder
+}
+
 # The same in memory, where there is room: a disk that others keep busy can stand still for
 # seconds, and a test of what is lost in real time is not about that one. left_memory() at
 # the end.
@@ -40,6 +45,12 @@ memory_folder() {
 left_memory() {
 	cd /
 	[ -z "$in_memory" ] || rm -rf "$in_memory"
+}
+
+# The shipped liver without its texture, for a model that is put beside it.
+smooth_liver() {
+	sed 's/^model = .*/model = "liver.fis";/' "$root/scenes/liver.scene" >liver.scene
+	grep -q '^model = "liver.fis";' liver.scene
 }
 
 # For tests in real time, in which programs have to answer each other within so many ms:
@@ -194,6 +205,24 @@ bad_usage() {
 	[[ "${stderr_lines[0]}" == "incise "* ]] || complain "no verb is named: $stderr" || return
 	[[ "${stderr_lines[1]}" == "Try 'incise "*" --help'." ]] || complain "$stderr" || return
 	holds_pieces "${stderr_lines[0]}" "$@"
+}
+
+# fails COMMAND… -- PIECE…: run it, and then as failed_with; misused, as bad_usage.
+fails() {
+	judge_refusal failed_with "$@"
+}
+
+misused() {
+	judge_refusal bad_usage "$@"
+}
+
+judge_refusal() {
+	local verdict=$1 words=()
+	while shift && [ "$1" != -- ]; do
+		words+=("$1")
+	done
+	run --separate-stderr "${words[@]}"
+	"$verdict" "${@:2}"
 }
 
 # One value of a JSON file, by path: key report.json check.rmse_N. Fails without it.

@@ -59,11 +59,9 @@ setup() {
 # bats test_tags=check
 @test "compile refuses by name" {
 	sed "s/'gaussmf',\[[^]]*\]/'gbellmf',[2 2 5]/" m.fis >bell.fis
-	run --separate-stderr incise compile bell.fis -o x.fx
-	failed_with bell.fis gbellmf
+	fails incise compile bell.fis -o x.fx -- bell.fis gbellmf
 	[ ! -e x.fx ]
-	run --separate-stderr incise compile absent.fis -o x.fx
-	failed_with absent.fis
+	fails incise compile absent.fis -o x.fx -- absent.fis
 }
 
 @test "the C that is exported computes what the compiled model does" {

@@ -20,6 +20,13 @@ complete_words() {
 	_incise
 }
 
+# offers TEXT WORD…: these are all that it offers.
+offers() {
+	complete_words "${@:2}"
+	[[ "${COMPREPLY[*]}" == "$1" && (-n "$1" || "${#COMPREPLY[@]}" -eq 0) ]] ||
+		complain "$*: ${COMPREPLY[*]}"
+}
+
 sorted() {
 	printf '%s\n' "${COMPREPLY[@]}" | LC_ALL=C sort | tr '\n' ' ' | sed 's/ $//'
 }
@@ -34,60 +41,42 @@ sorted() {
 	for verb in $({ incise --help && incise help advanced; } | awk '/^  [a-z]/ { print $1 }') help --help --version; do
 		[[ " ${COMPREPLY[*]} " == *" $verb "* ]] || complain "no $verb"
 	done
-	complete_words incise tr
-	[ "${COMPREPLY[*]}" = train ]
-	complete_words incise help ev
-	[ "${COMPREPLY[*]}" = eval ]
-	complete_words incise help rig
-	[ "${COMPREPLY[*]}" = "rig.conf" ]
-	complete_words incise nosuch
-	[ "${#COMPREPLY[@]}" -eq 0 ]
-	complete_words incise nosuch --
-	[ "${#COMPREPLY[@]}" -eq 0 ]
+	offers train incise tr
+	offers eval incise help ev
+	offers "rig.conf" incise help rig
+	offers "" incise nosuch
+	offers "" incise nosuch --
 }
 
 # That each command offers its options and their values is in option_tables.py.
 # bats test_tags=check
 @test "options and values, as bash takes the words apart" {
-	complete_words incise train --m
-	[ "${COMPREPLY[*]}" = "--mf" ]
+	offers "--mf" incise train --m
 	# letters, too
 	complete_words incise train -
 	[[ " ${COMPREPLY[*]} " == *" -o "* ]]
-	complete_words incise haptic neck --policy f
-	[ "${COMPREPLY[*]}" = fifo ]
-	complete_words incise bench loop --load ""
-	[ "${COMPREPLY[*]}" = "idle cpu memory disk view" ]
+	offers fifo incise haptic neck --policy f
+	offers "idle cpu memory disk view" incise bench loop --load ""
 	# lists: the item behind the last comma
-	complete_words incise bench all --only loop,stab
-	[ "${COMPREPLY[*]}" = loop,stability ]
+	offers loop,stability incise bench all --only loop,stab
 	# as bash takes "--policy=fi" apart
-	complete_words incise haptic neck --policy=fi
-	[ "${COMPREPLY[*]}" = fifo ]
+	offers fifo incise haptic neck --policy=fi
 	# a number has none
-	complete_words incise train --epochs ""
-	[ "${#COMPREPLY[@]}" -eq 0 ]
+	offers "" incise train --epochs ""
 }
 
 # bats test_tags=check
 @test "operands are completed as the synopsis has them" {
-	complete_words incise calibrate ""
-	[ "${COMPREPLY[*]}" = "force depth tip delay stepper frame torque check" ]
-	complete_words incise calibrate depth ""
-	[ "${COMPREPLY[*]}" = "two-point line board" ]
+	offers "force depth tip delay stepper frame torque check" incise calibrate ""
+	offers "two-point line board" incise calibrate depth ""
 	complete_words incise bench ""
 	[ "${COMPREPLY[*]}" = "$(incise bench --help | awk '/^  [a-z]/ { printf "%s ", $1 } /^compare/ { print $1; exit }')" ]
-	complete_words incise bench st
-	[ "${COMPREPLY[*]}" = stability ]
-	complete_words incise stepper mo
-	[ "${COMPREPLY[*]}" = move ]
-	complete_words incise stepper move ""
-	[ "${#COMPREPLY[@]}" -eq 0 ]
-	complete_words incise tool neck ""
-	[ "${COMPREPLY[*]}" = "blade handle tube auto" ]
+	offers stability incise bench st
+	offers move incise stepper mo
+	offers "" incise stepper move ""
+	offers "blade handle tube auto" incise tool neck ""
 	# options in between are no operands, and their arguments neither
-	complete_words incise tool --json neck tu
-	[ "${COMPREPLY[*]}" = tube ]
+	offers tube incise tool --json neck tu
 	complete_words incise replay -o ticks.csv a.rec ne
 	[[ " ${COMPREPLY[*]} " == *" neck "* ]]
 }
@@ -99,10 +88,8 @@ sorted() {
 	for scene in mine liver neck wall mine.scene; do
 		[[ " ${COMPREPLY[*]} " == *" $scene "* ]]
 	done
-	complete_words incise plan mi
-	[ "${COMPREPLY[*]}" = "mine mine.scene" ]
-	complete_words incise bench scenes liver ne
-	[ "${COMPREPLY[*]}" = neck ]
+	offers "mine mine.scene" incise plan mi
+	offers neck incise bench scenes liver ne
 }
 
 # bats test_tags=check
@@ -160,12 +147,9 @@ sorted() {
 }
 
 @test "buses of info are completed: their word, then what there is of them" {
-	complete_words incise info can
-	[ "${COMPREPLY[*]}" = can: ]
-	complete_words incise info sl
-	[ "${COMPREPLY[*]}" = slcan: ]
-	complete_words incise info slcan:/dev/ttyNONE
-	[ "${#COMPREPLY[@]}" -eq 0 ]
+	offers can: incise info can
+	offers slcan: incise info sl
+	offers "" incise info slcan:/dev/ttyNONE
 	unshare -rm true 2>/dev/null || skip "no user namespaces"
 	mkdir -p net/{can0,can1,eth0,vcan0}
 	echo 280 | tee net/{can0,can1,vcan0}/type

@@ -115,8 +115,7 @@ pictures="fig2-force fig3a-membership fig3b-surface fig5-prediction tick-latenes
 @test "demo does not write into a folder that exists" {
 	need_demo
 	before=$(sha256sum <"$demo/summary.json")
-	run --separate-stderr incise demo -o "$demo" --duration 1s
-	failed_with "my demo's" "File exists" --overwrite
+	fails incise demo -o "$demo" --duration 1s -- "my demo's" "File exists" --overwrite
 	[ -z "$output" ]
 	[ "$(sha256sum <"$demo/summary.json")" = "$before" ]
 }
@@ -152,25 +151,20 @@ interrupted_in() {
 	interrupted_in capture
 	# A folder of something else is none of its own, and one that is whole is no part.
 	mkdir other
-	run --separate-stderr incise demo -o other
-	failed_with other "File exists"
+	fails incise demo -o other -- other "File exists"
 	[ ! -e "$demo/.unfinished" ]
 }
 
 # bats test_tags=check
 @test "demo without gnuplot says what to install, and leaves nothing" {
 	mkdir empty
-	run --separate-stderr env PATH="$PWD/empty" "$INCISE_BUILD/bin/incise" demo -o x
-	failed_with gnuplot-nox
+	fails env PATH="$PWD/empty" "$INCISE_BUILD/bin/incise" demo -o x -- gnuplot-nox
 	[ ! -e x ]
 }
 
 @test "demo where it cannot write" {
-	run --separate-stderr incise demo -o no/such/folder
-	failed_with no/such/folder "No such file"
+	fails incise demo -o no/such/folder -- no/such/folder "No such file"
 	touch file
-	run --separate-stderr incise demo -o file
-	failed_with file
-	run --separate-stderr incise demo -o file --overwrite
-	failed_with file
+	fails incise demo -o file -- file
+	fails incise demo -o file --overwrite -- file
 }

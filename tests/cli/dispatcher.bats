@@ -3,10 +3,6 @@
 
 load cli
 
-setup() {
-	work_folder
-}
-
 # bats test_tags=check
 @test "--help and help list the verbs, in groups, twenty at most" {
 	run -0 --separate-stderr incise help advanced
@@ -170,10 +166,8 @@ setup() {
 	incise bench precision "$root/scenes/liver.fis" --quick --json >r.json 2>/dev/null
 	run -0 --separate-stderr incise bench compare r.json r.json
 	[ -z "$stderr" ]
-	run --separate-stderr incise bench compare r.json "$root/scenes/liver.fis"
-	failed_with liver.fis
-	run --separate-stderr incise bench nosuch
-	bad_usage "unknown benchmark 'nosuch'"
+	fails incise bench compare r.json "$root/scenes/liver.fis" -- liver.fis
+	misused incise bench nosuch -- "unknown benchmark 'nosuch'"
 }
 
 # bats test_tags=check

@@ -181,26 +181,19 @@ rig() { # DRIVER, KEY...
 
 @test "refused: no chip, not homed, too fast, no line, settings" {
 	touch lost
-	run --separate-stderr incise stepper tune 2
-	failed_with "mine is not homed" --unhomed
+	fails incise stepper tune 2 -- "mine is not homed" --unhomed
 	run -0 --separate-stderr incise stepper tune 2 --unhomed
-	run --separate-stderr incise stepper tune 2,20 --unhomed
-	failed_with "20 mm/s is faster than 10 mm/s" mine
+	fails incise stepper tune 2,20 --unhomed -- "20 mm/s is faster than 10 mm/s" mine
 	kill -9 "$pid"
-	run --separate-stderr incise stepper tune 2
-	failed_with rig.conf:2 driver "$(cat path)"
+	fails incise stepper tune 2 -- rig.conf:2 driver "$(cat path)"
 	rig "tmc2209:/nowhere:1"
-	run --separate-stderr incise stepper tune 2
-	failed_with rig.conf:2 driver /nowhere
+	fails incise stepper tune 2 -- rig.conf:2 driver /nowhere
 	rig "tmc2209:/nowhere:1" "microsteps = 24;"
-	run --separate-stderr incise stepper tune 2
-	failed_with actuator.microsteps "a power of two"
+	fails incise stepper tune 2 -- actuator.microsteps "a power of two"
 	sed 's/.attach = attach, //' stepper.c >other.c
 	$CC -shared -fPIC -w -I"$root/lib/include" -o modules/stepper_mine.so other.c
 	rig "tmc2209:/nowhere:1"
-	run --separate-stderr incise stepper tune 2
-	failed_with rig.conf:2 "remove the key driver"
+	fails incise stepper tune 2 -- rig.conf:2 "remove the key driver"
 	sed -i '/driver/d' rig.conf
-	run --separate-stderr incise stepper tune 2 --unhomed
-	failed_with "names no driver chip"
+	fails incise stepper tune 2 --unhomed -- "names no driver chip"
 }

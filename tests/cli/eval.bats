@@ -99,13 +99,11 @@ refuses() {
 @test "eval answers up to the bad line, then names it" {
 	for bad in "1 x" "1" "nan 1" "1 inf" "1 2 3" "1 2 x" "1e999 2"; do
 		printf '5 20\n# note\n%s\n5 20\n' "$bad" >points
-		run --separate-stderr incise eval m.fis points
-		failed_with "points:3: column "
+		fails incise eval m.fis points -- "points:3: column "
 		[ "${#lines[@]}" -eq 1 ]
 	done
 	printf '5 20\n1 x\n' >points
-	run --separate-stderr incise eval m.fis points
-	failed_with "points:2: column 2 (velocity_mm_s)" "'x'"
+	fails incise eval m.fis points -- "points:2: column 2 (velocity_mm_s)" "'x'"
 	run --separate-stderr incise eval m.fis <points
 	failed_with "standard input:2: column 2"
 }

@@ -4,10 +4,6 @@
 
 load cli
 
-setup() {
-	work_folder
-}
-
 # bats test_tags=check
 @test "a scene becomes a plan, which info explains" {
 	run -0 --separate-stderr incise compile neck -o n.plan
@@ -49,8 +45,7 @@ setup() {
 	{ cat hill.obj; sed 's/^v \(.*\) \(.*\) \(.*\)/v \1 \2 -30/' hill.obj | sed -n '/^v/p'
 		awk '/^f/ { print "f", $2 + 1681, $4 + 1681, $3 + 1681 }' hill.obj; } >floors.obj
 	sed 's/hill.obj/floors.obj/' hill.scene >floors.scene
-	run --separate-stderr incise compile floors.scene -o floors.plan
-	failed_with overhang
+	fails incise compile floors.scene -o floors.plan -- overhang
 	[ ! -e floors.plan ]
 }
 
@@ -67,22 +62,18 @@ setup() {
 	END
 	echo hello >none.plan
 	for file in bit short none; do
-		run --separate-stderr incise info $file.plan
-		failed_with "$file.plan:"
+		fails incise info $file.plan -- "$file.plan:"
 	done
-	run --separate-stderr incise info other.plan
-	failed_with "other.plan:"
+	fails incise info other.plan -- "other.plan:"
 }
 
 @test "an actuator that measures its handle stays in a program" {
-	run --separate-stderr incise compile wall --rig sim: -o w.plan
-	failed_with "it measures its handle"
+	fails incise compile wall --rig sim: -o w.plan -- "it measures its handle"
 }
 
 # bats test_tags=check
 @test "without a stepper of the kernel module nothing is fed, and nothing is left" {
-	run --separate-stderr incise feed wall --rig sim: --state "$PWD/wall.state"
-	failed_with "it cannot run plans"
+	fails incise feed wall --rig sim: --state "$PWD/wall.state" -- "it cannot run plans"
 	run --separate-stderr incise haptic wall --in-kernel --rig sim: --state "$PWD/wall.state"
 	[ "$status" -eq 1 ]
 	[[ "$stderr" == *"incise feed ended before it sent a pose" ]]

@@ -33,7 +33,7 @@ DESCENDS = set("gjpqy,;()[]{}|_Q/µ@$")
 TOLERANCE_PX = 0.5
 
 UNITS = (r"1|µm|mm|px|mrad|s|ms|µs|ns|N|mN|mV|Hz|kHz|%|texel|SD|\(mm/s\)|\(N/m\)|\(N/mm\)|\(mV/N\)|"
-         r"\(mm/s²\)|\(mN s/mm\)|\(N s/mm\)|\(mm/px\)|°")
+         r"\(mm/s²\)|\(mN s/mm\)|\(N s/mm\)|\(mm/px\)|°|\(°/s\)|dB|\(1/mm\)")
 LABEL = re.compile(r".*[^ ] / (%s)" % UNITS)
 NUMBER = re.compile(r"[−-]?[\d.]+")
 PROGRAM = re.compile(r"(?<![\w.])\d[\d.]*e[-+−]?\d|\d us\b|/ us\b|\bnan\b|\b[a-z]+_[a-z0-9]")

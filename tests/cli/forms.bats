@@ -48,8 +48,7 @@ sums() { awk -F, 'NR > 1 { n++; f += $5; d += $3 } END { printf "%d %.3f %.2f", 
 	# of a joined recording they are those of a member
 	incise join 4.rec 5.rec -o j.rec >/dev/null
 	rm -r j.rec/4 && cp -r 3.rec j.rec/4
-	run --separate-stderr incise info j.rec
-	failed_with "j.rec/4: has format 3" "\`incise recover j.rec/4 -o NEW.rec\`"
+	fails incise info j.rec -- "j.rec/4: has format 3" "\`incise recover j.rec/4 -o NEW.rec\`"
 }
 
 # bats test_tags=check
@@ -86,8 +85,7 @@ sums() { awk -F, 'NR > 1 { n++; f += $5; d += $3 } END { printf "%d %.3f %.2f", 
 	# a row of it that changed is still found
 	for form in 3 4 5; do
 		"$INCISE_BUILD/tests/sql" $form.rec/recording.db "UPDATE force SET code = code + 1 WHERE seq = 90"
-		run --separate-stderr incise verify $form.rec
-		failed_with "$form.rec:"
+		fails incise verify $form.rec -- "$form.rec:"
 	done
 }
 

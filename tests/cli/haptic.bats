@@ -12,7 +12,7 @@ setup_file() {
 setup() {
 	work_folder
 	cp "$BATS_FILE_TMPDIR/liver.fis" .
-	cp "$root/scenes/liver.scene" .
+	smooth_liver
 	# contact from 0.1 s on
 	quick=sim:clock=simulated,depth_mm=10,times=1,pause_s=0.1,cut_s=4
 }
@@ -161,8 +161,7 @@ beside_the_model() {
 }
 
 @test "a log that cannot be is said before the run, and so is one that does not fit" {
-	run --separate-stderr incise haptic liver.scene --rig sim: --no-rt --duration 1h -o none/l.csv
-	failed_with none/l.csv
+	fails incise haptic liver.scene --rig sim: --no-rt --duration 1h -o none/l.csv -- none/l.csv
 	# the most ticks that there can be: 1.7 billion of some 200 bytes
 	sed 's/^rate_hz.*/rate_hz = 20000.0;/' liver.scene >quick.scene
 	[ "$(awk '/^MemTotal/ { print $2 }' /proc/meminfo)" -lt 600000000 ] || skip "the longest log fits"
@@ -174,10 +173,8 @@ beside_the_model() {
 
 # bats test_tags=check
 @test "haptic: files that are not there, or not what they should be" {
-	run --separate-stderr incise haptic none.scene --rig $quick
-	failed_with none.scene "No such file"
-	run --separate-stderr incise haptic . --rig $quick
-	failed_with "Is a directory"
+	fails incise haptic none.scene --rig $quick -- none.scene "No such file"
+	fails incise haptic . --rig $quick -- "Is a directory"
 	printf 'model = "none.fis";\n' >bad.scene
 	refuses none.fis "No such file"
 	head -n 30 liver.fis >cut.fis
@@ -193,19 +190,15 @@ beside_the_model() {
 
 # bats test_tags=check
 @test "haptic: rigs that cannot be" {
-	run --separate-stderr incise haptic liver.scene --rig sim:colour=red
-	failed_with colour
-	run --separate-stderr incise haptic liver.scene --rig none.conf
-	failed_with none.conf "No such file"
+	fails incise haptic liver.scene --rig sim:colour=red -- colour
+	fails incise haptic liver.scene --rig none.conf -- none.conf "No such file"
 	printf 'clock = "simulated";\ntracker = "sim:";\n' >rig.conf
-	run --separate-stderr incise haptic liver.scene --duration 100ms
-	failed_with rig.conf stepper
+	fails incise haptic liver.scene --duration 100ms -- rig.conf stepper
 	echo 'stepper = "sim:";' >>rig.conf
 	incise haptic liver.scene --duration 100ms # ./rig.conf is the default
 	rm rig.conf
 	[ ! -e /etc/incise/rig.conf ] || skip "this machine has /etc/incise/rig.conf"
-	run --separate-stderr incise haptic liver.scene
-	failed_with "--rig sim:"
+	fails incise haptic liver.scene -- "--rig sim:"
 }
 
 @test "haptic: a full disk loses the log, not the summary of the run" {
@@ -228,8 +221,7 @@ beside_the_model() {
 @test "an @include is refused by line, a folder's too" {
 	mkdir folder
 	printf 'rate_hz = 1000.0;\n  @include "folder"\n' >inc.scene
-	run --separate-stderr incise haptic inc.scene --rig sim:
-	failed_with "inc.scene:2: " "@include"
+	fails incise haptic inc.scene --rig sim: -- "inc.scene:2: " "@include"
 }
 
 # A blade that is turned towards its way, so that its plane constraint pulls aside.

@@ -108,6 +108,5 @@ largest() {
 	incise serve --rig sim:haptic -c none --igtl 0 --duration 1s --json >r.json
 	holds "$(key r.json poses) > 0" "$(key r.json forces) == 0"
 	echo 'tracker = "sim:";' >rig.conf
-	run -1 --separate-stderr incise serve --rig rig.conf -c none --duration 1s
-	failed_with rig.conf "force:" "missing"
+	fails incise serve --rig rig.conf -c none --duration 1s -- rig.conf "force:" "missing"
 }

@@ -148,8 +148,7 @@ is_drained() {
 	incise capture -o a.rec -r rig.conf 2>/dev/null
 	rm a.rec/camera.mkv
 	mkfifo a.rec/camera.mkv
-	run --separate-stderr timeout -k 1 60 incise verify a.rec
-	failed_with a.rec "camera.mkv"
+	fails timeout -k 1 60 incise verify a.rec -- a.rec "camera.mkv"
 }
 
 # bats test_tags=check
@@ -157,13 +156,10 @@ is_drained() {
 	run --separate-stderr incise eval m.fis <<<'0x5 20'
 	failed_with "standard input:1: column 1" "'0x5' is not a number"
 	printf 'depth_mm,velocity_mm_s,force_N\n0x10,1,1\n' >hex.csv
-	run --separate-stderr incise train hex.csv -o out.fis
-	failed_with "hex.csv:2: column 1 (depth_mm):"
+	fails incise train hex.csv -o out.fis -- "hex.csv:2: column 1 (depth_mm):"
 	printf 'mass_g,reading_mV\n0x10,1\n' >hex.csv
-	run --separate-stderr incise calibrate force --from hex.csv
-	failed_with "hex.csv:2: mass_g:" "'0x10'"
-	run --separate-stderr incise train pairs.csv --check 0x1p-2 -o out.fis
-	bad_usage "--check:" "'0x1p-2'"
+	fails incise calibrate force --from hex.csv -- "hex.csv:2: mass_g:" "'0x10'"
+	misused incise train pairs.csv --check 0x1p-2 -o out.fis -- "--check:" "'0x1p-2'"
 	[ ! -e out.fis ]
 }
 

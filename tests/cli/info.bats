@@ -127,8 +127,7 @@ setup() {
 	done
 	[ "$(key r.json cells)" = "$(key c.json cells)" ]
 	head -c 1000 m.fx >short.fx
-	run --separate-stderr incise info short.fx
-	failed_with short.fx
+	fails incise info short.fx -- short.fx
 }
 
 @test "names that are not UTF-8 leave JSON valid" {
@@ -154,11 +153,9 @@ setup() {
 	printf 'force_mV_N = 1200\n' >c.conf
 	cp -r b.rec c.rec
 	incise recalibrate c.rec -c c.conf >/dev/null 2>&1
-	run --separate-stderr incise info c.rec
-	failed_with "c.rec: not as it was recorded: tracker: block"
+	fails incise info c.rec -- "c.rec: not as it was recorded: tracker: block"
 	sqlite3 b.rec/recording.db "UPDATE events SET text = 'x' WHERE kind = 'zero'"
-	run --separate-stderr incise info b.rec
-	failed_with "b.rec:"
+	fails incise info b.rec -- "b.rec:"
 	[[ "${lines[0]}" == "recording b.rec: "* ]]
 	run -1 --separate-stderr incise info b.rec --json
 	echo "$output" >r.json
@@ -220,11 +217,9 @@ setup() {
 	seq 1000 >folder/recording.db
 	head -c 5000 "$INCISE_BUILD/bin/incise" >binary
 	for file in a.txt empty.fis folder binary none none.rec none.fis; do
-		run --separate-stderr incise info $file
-		failed_with $file
+		fails incise info $file -- $file
 		[ -z "$output" ]
-		run --separate-stderr incise info --json $file
-		failed_with $file
+		fails incise info --json $file -- $file
 		[ -z "$output" ]
 	done
 }

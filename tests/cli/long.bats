@@ -3,10 +3,6 @@
 
 load cli
 
-setup() {
-	work_folder
-}
-
 # BYTES-READ MEMORY-KB of a command, which must succeed; what it prints is in output.txt.
 cost() {
 	python3 - "$@" <<'PY'

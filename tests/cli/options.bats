@@ -3,10 +3,6 @@
 
 load cli
 
-setup() {
-	work_folder
-}
-
 # bats test_tags=check
 @test "each option of each command takes what is legal, and refuses what is not by its name" {
 	cp "$root/scenes/liver.fis" a.fis

@@ -134,8 +134,7 @@ spares_inputs() {
 	done
 	touch a.fis.sd
 	ln -s a.fis.sd history.csv
-	run --separate-stderr incise train pairs.csv -o a.fis -o history.csv --overwrite
-	failed_with a.fis.sd "written twice"
+	fails incise train pairs.csv -o a.fis -o history.csv --overwrite -- a.fis.sd "written twice"
 	[ ! -e a.fis ]
 }
 
@@ -218,8 +217,7 @@ replaces_when_told() {
 	replaces_when_told strip.png view wall --procedure -o strip.png --at 0s $small
 	replaces_when_told f/frame-000000.png view wall --procedure -o f $small
 	rm f/frame-000000.png
-	run --separate-stderr incise view wall --procedure -o f $small
-	failed_with f/frame-000001.png exists
+	fails incise view wall --procedure -o f $small -- f/frame-000001.png exists
 	incise view wall --procedure -o a.mkv $small 2>why || skip "no film here: $(cat why)"
 	replaces_when_told b.mkv view wall --procedure -o b.mkv $small
 	# A link stays one, and a pipe a pipe.
@@ -372,7 +370,7 @@ full() {
 	done <<-'END'
 		export d.rec -o out.odd|--output: out.odd: unknown extension .odd; give .csv, .h5, .hdf5 or .mcap
 		export d.rec -o out.CSV|--output: out.CSV: unknown extension .CSV; give .csv, .h5, .hdf5 or .mcap
-		train pairs.csv -o out.odd|--output: out.odd: unknown extension .odd; give .fis, .initial.fis, .csv or .fac
+		train pairs.csv -o out.odd|--output: out.odd: unknown extension .odd; give .fis, .initial.fis, .csv, .fac or .fis.tex
 		compile m.fis -o out.odd|--output: out.odd: unknown extension .odd; give .fx, .plan or .c
 		compile m.fis -o out.plan|--output: out.plan: unknown extension .plan; give .fx
 		compile m.scene -o out.fx|--output: out.fx: unknown extension .fx; give .plan
@@ -384,8 +382,7 @@ full() {
 		capture -o out.odd|expected a name that ends in .rec
 	END
 	if [ -x "$INCISE_BUILD/bin/incise-view" ]; then
-		run --separate-stderr incise view wall --procedure -o a.mp4
-		bad_usage "--output: a.mp4:"
+		misused incise view wall --procedure -o a.mp4 -- "--output: a.mp4:"
 	fi
 	# No extension is none that is wrong.
 	incise export d.rec -o out

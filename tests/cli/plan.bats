@@ -5,7 +5,7 @@ load cli
 
 setup() {
 	work_folder
-	cp "$root"/scenes/*.scene "$root"/scenes/*.fis .
+	cp "$root"/scenes/* .
 }
 
 @test "plan shows what each shipped scene runs and leaves out" {
@@ -22,7 +22,7 @@ setup() {
 # bats test_tags=check
 @test "plan reports as JSON: every stage is kept or left out" {
 	incise plan liver.scene --json >r.json
-	[ "$(key r.json kept)" = '["pose","predict","contact","reaction","fracture","start","limit"]' ]
+	[ "$(key r.json kept)" = '["pose","predict","contact","texture","reaction","fracture","start","limit"]' ]
 	holds "$(key r.json margin) > 1 && $(key r.json margin) == $(key r.json weakest.margin)"
 	holds "$(key r.json weakest.states) >= 3 && $(key r.json weakest.hz) > 5"
 	holds "$(key r.json tick_ns) > 0"
@@ -97,16 +97,14 @@ setup() {
 	# a part in reserve; found within some hundredths, and named with three digits
 	holds "$(key r.json margin) >= 1.02 && $(key r.json margin) < 1.07"
 	echo 'tissue = { reaction_N_mm = 0.1; }; device = { damping_N_s_mm = 0.0; };' >loose.scene
-	run --separate-stderr incise plan loose.scene
-	failed_with loose.scene "of at least 0.001"
+	fails incise plan loose.scene -- loose.scene "of at least 0.001"
 }
 
 @test "poses that are always too old are refused before there is no force" {
 	printf 'tissue = { reaction_N_mm = 0.1; };\nlimits = { pose_age_ms = 12.0; };\n' >old.scene
 	for verb in plan "haptic --rig sim:clock=simulated --duration 1s"; do
 		# shellcheck disable=SC2086
-		run --separate-stderr incise $verb old.scene
-		failed_with old.scene limits.pose_age_ms "12 ms" "12.6 or more"
+		fails incise $verb old.scene -- old.scene limits.pose_age_ms "12 ms" "12.6 or more"
 	done
 	sed -i 's/= 12.0/= 12.6/' old.scene
 	incise haptic --rig sim:clock=simulated,tracker_jitter_ms=0 --duration 1s --json old.scene >r.json
@@ -115,39 +113,33 @@ setup() {
 }
 
 @test "plan: another model, another arithmetic" {
-	incise plan liver.scene --json >fixed.json
+	incise plan liver.scene --no-texture --json >fixed.json
 	incise plan liver.scene --arith double --json >double.json
 	holds "$(key fixed.json bound_N) > 0"
 	[ "$(key double.json bound_N)" = 0.0 ]
 	mv liver.fis other.fis
-	run --separate-stderr incise plan liver.scene
-	failed_with liver.scene liver.fis
+	fails incise plan liver.scene -- liver.scene liver.fis
 	incise plan liver.scene --model other.fis --json >other.json
 	[ "$(key other.json stiffness_N_mm)" = "$(key fixed.json stiffness_N_mm)" ]
 }
 
 # bats test_tags=check
 @test "plan: bad scenes" {
-	run --separate-stderr incise plan none.scene
-	failed_with none.scene
+	fails incise plan none.scene -- none.scene
 	mkfifo pipe.scene
 	for file in pipe.scene /dev/zero; do
-		run --separate-stderr timeout 60 incise plan $file
-		failed_with $file "regular file"
+		fails timeout 60 incise plan $file -- $file "regular file"
 	done
 	printf 'surface = { kind = "mesh"; file = "pipe.scene"; };\ntissue = { reaction_N_mm = 0.1; };\n' >p.scene
-	run --separate-stderr timeout 60 incise plan p.scene
-	failed_with p.scene pipe.scene "regular file"
+	fails timeout 60 incise plan p.scene -- p.scene pipe.scene "regular file"
 	printf 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n' >small.obj
 	printf 'surface = { kind = "mesh"; file = "small.obj"; at_mm = [0.0, 0.0, -90.0]; };\ntissue = { reaction_N_mm = 0.1; };\n' >s.scene
 	run -0 --separate-stderr incise plan s.scene
 	[[ "${lines[0]}" == "s.scene: "* ]]
 	printf 'surface = { kind = "mesh";\n file = "none.obj"; };\ntissue = { reaction_N_mm = 0.1; };\n' >m.scene
-	run --separate-stderr incise plan m.scene
-	failed_with m.scene none.obj
+	fails incise plan m.scene -- m.scene none.obj
 	printf 'tissue = {\n reaction_N_m = 500.0; };\n' >u.scene
-	run --separate-stderr incise plan u.scene
-	failed_with u.scene:2 tissue.reaction_N_m reaction_N_mm unit
+	fails incise plan u.scene -- u.scene:2 tissue.reaction_N_m reaction_N_mm unit
 }
 
 # bats test_tags=check
@@ -203,8 +195,7 @@ sheet() {
 @test "a mesh that is turned inside out is refused, unless it is a cavity" {
 	printf 'v 0 0 0\nv 40 0 0\nv 0 40 0\nv 0 0 40\nf 1 2 3\nf 1 4 2\nf 2 4 3\nf 3 4 1\n' >m.obj
 	printf 'surface = { kind = "mesh"; file = "m.obj"; };\ntissue = { reaction_N_mm = 0.1; };\n' >m.scene
-	run --separate-stderr incise plan m.scene
-	failed_with "m.obj:5:" "turned inside out"
+	fails incise plan m.scene -- "m.obj:5:" "turned inside out"
 	sed -i 's/file/cavity = true; file/' m.scene
 	run -0 --separate-stderr incise plan m.scene
 }

@@ -50,6 +50,12 @@ shows() {
 	! grep -q residual texts
 	# a curve for each function: 5 over the depth and 4 over the velocity
 	[ "$(grep -cxE '(very )?(shallow|medium|deep|slow|fast)' texts)" = 9 ]
+	# both intervals; no calibration of a rig is stated, and degrees have their unit
+	shows "a new cut" "the mean of all cuts" "95 % intervals; other inputs at the middle of their support"
+	sed '1s/_mm/_deg/g' pairs.csv >deg.csv
+	incise train deg.csv --inputs depth_deg,velocity_deg_s -o deg.fis >/dev/null 2>&1
+	draws deg.fis
+	shows "depth / °" "velocity / (°/s)"
 }
 
 @test "residuals are those of incise eval" {
@@ -129,31 +135,23 @@ shows() {
 	incise plot m.fis -o a.pdf
 	[ "$(head -c 5 a.pdf)" = %PDF- ]
 	for name in png a; do
-		run -2 --separate-stderr incise plot m.fis -o $name
-		bad_usage "-o:"
+		misused incise plot m.fis -o $name -- "-o:"
 	done
 }
 
 # bats test_tags=check
 @test "files that it does not draw" {
-	run --separate-stderr incise plot nothing.fis -o a.png
-	failed_with "nothing.fis:"
+	fails incise plot nothing.fis -o a.png -- "nothing.fis:"
 	printf 'a,b\n1,2\n' >other.csv
-	run --separate-stderr incise plot other.csv -o a.png
-	failed_with "other.csv:1:"
-	run --separate-stderr incise plot m.fis --data other.csv -o a.png
-	failed_with "other.csv:1:"
+	fails incise plot other.csv -o a.png -- "other.csv:1:"
+	fails incise plot m.fis --data other.csv -o a.png -- "other.csv:1:"
 	head -n 20 m.fis >half.fis
-	run --separate-stderr incise plot half.fis -o a.png
-	failed_with half.fis
+	fails incise plot half.fis -o a.png -- half.fis
 	printf '\177ELF\2\1\0\0no file of incise' >noise
-	run --separate-stderr incise plot "$root/scenes/liver.scene" -o a.png
-	failed_with "liver.scene:" "'incise plan "
-	run --separate-stderr incise plot m.fis --data m.fx -o a.png
-	failed_with "m.fx:"
+	fails incise plot "$root/scenes/liver.scene" -o a.png -- "liver.scene:" "'incise plan "
+	fails incise plot m.fis --data m.fx -o a.png -- "m.fx:"
 	for file in noise "$root/README.md" /dev/null .; do
-		run --separate-stderr incise plot "$file" -o a.png
-		failed_with "$file: "
+		fails incise plot "$file" -o a.png -- "$file: "
 	done
 	run -2 --separate-stderr incise plot pairs.csv --data pairs.csv -o a.png
 	bad_usage "--data is for a model, and pairs.csv is none"
@@ -282,8 +280,7 @@ keep_data() {
 	[ "$(awk 'NF { print int($1); exit }' kept/force.dat)" = 5 ]
 	keep_data a.rec --range ..1s
 	[ "$(awk 'NF && $2 != "NaN" { last = $1 } END { printf "%.1f", last }' kept/force.dat)" = 1.0 ]
-	run --separate-stderr incise plot a.rec --range 7s..8s -o b.png
-	failed_with "a.rec:" "--range is beside that"
+	fails incise plot a.rec --range 7s..8s -o b.png -- "a.rec:" "--range is beside that"
 	run -2 --separate-stderr incise plot m.fis --range 1s..2s -o b.png
 	bad_usage "--range is for a recording, and m.fis is none"
 }
@@ -296,8 +293,7 @@ keep_data() {
 	grep -q "interrupted$" texts
 	draws a.rec.part
 	sqlite3 a.rec.part/recording.db "UPDATE tracker SET z_mm = 9e999 WHERE seq = 7"
-	run --separate-stderr incise plot a.rec -o b.png
-	failed_with "stream tracker, block 0"
+	fails incise plot a.rec -o b.png -- "stream tracker, block 0"
 	[ ! -e b.png ]
 }
 
@@ -316,8 +312,7 @@ keep_data() {
 	! grep -qxE 'handle|tube|membrane' texts
 	sed 's/"incise_session": *1/"incise_session": 2/' a.session >broken.session
 	! cmp -s a.session broken.session
-	run --separate-stderr incise plot broken.session -o b.png
-	failed_with broken.session
+	fails incise plot broken.session -o b.png -- broken.session
 }
 
 # An entry of a history: kind, date, key, unit, value, u, pass.
@@ -348,15 +343,14 @@ entry() {
 		$(date -ud 2026-07-05 +%s) 1238.5 3 1
 	END
 	echo "force_mV_N = 1238.5;" >c.conf
-	run --separate-stderr incise plot c.conf -o c.png
-	failed_with "c.conf:"
+	fails incise plot c.conf -o c.png -- "c.conf:"
 }
 
 @test "without -o it is a window, which ends when it is closed" {
 	local pid id seen=
 	command -v Xvfb >/dev/null && command -v xdotool >/dev/null || skip "Xvfb or xdotool are not installed"
 	gnuplot -e "set print '-'; print GPVAL_TERMINALS" | grep -qwE 'qt|wxt|x11' || skip "gnuplot has no windows"
-	Xvfb -displayfd 5 -screen 0 1280x1024x24 5>display >/dev/null 2>&1 3>&- &
+	Xvfb -displayfd 5 -noreset -screen 0 1280x1024x24 5>display >/dev/null 2>&1 3>&- &
 	server=$!
 	await test -s display
 	DISPLAY=:$(cat display)

@@ -108,8 +108,7 @@ train() {
 		bad_usage "cannot take uncertainties, which a.csv has; give --uncertainty none"
 	done
 	cut -d, -f1-4 b.csv >plain.csv
-	run --separate-stderr incise train a.csv plain.csv -o x.fis
-	failed_with "plain.csv:"
+	fails incise train a.csv plain.csv -o x.fis -- "plain.csv:"
 	run --separate-stderr incise train plain.csv --uncertainty parts -o x.fis
 	failed_with "plain.csv:" "--uncertainty parts"
 	sed '2,$s/-0.01,/nan,/' a.csv >nan.csv
@@ -119,8 +118,7 @@ train() {
 	run --separate-stderr incise train late.csv --group cut -o y.fis
 	[[ "$stderr" == *"late.csv:9: column 6 (force_u_zero_N): nan is not finite"* ]]
 	incise capture -o r.rec --rig sim:clock=simulated,cut_s=2,pause_s=1 --duration 8s >/dev/null
-	run --separate-stderr incise train r.rec --uncertainty parts -o z.fis
-	failed_with "r.rec:" "is not stated: "
+	fails incise train r.rec --uncertainty parts -o z.fis -- "r.rec:" "is not stated: "
 }
 
 @test "recordings state the same as their export does" {

@@ -79,8 +79,7 @@ setup() {
 	run -0 --separate-stderr incise provenance away/m.fis --recording "a b;.rec"
 	[ "${lines[2]}" = "    $found: a b;.rec has this head" ]
 	echo "# changed" >>p.csv
-	run --separate-stderr incise provenance m.fis
-	failed_with "m.fis:"
+	fails incise provenance m.fis -- "m.fis:"
 	[[ "${lines[1]}" == *": p.csv is another file, or was changed" ]]
 	rm p.csv
 	sqlite3 "a b;.rec/recording.db" "UPDATE seal SET head = zeroblob(32)"
@@ -91,15 +90,11 @@ setup() {
 	mkfifo p.csv "a b;.rec"
 	run -0 --separate-stderr timeout 60 incise provenance m.fis
 
-	run --separate-stderr incise provenance away
-	failed_with "away:"
+	fails incise provenance away -- "away:"
 	incise export "$made/a b;.rec" --average 6x6,count=5 --no-lineage -o plain.csv >/dev/null
-	run --separate-stderr incise provenance plain.csv
-	failed_with "plain.csv:"
-	run --separate-stderr incise provenance m.fis.sd
-	failed_with "m.fis.sd:"
-	run --separate-stderr incise provenance none
-	failed_with "none:"
+	fails incise provenance plain.csv -- "plain.csv:"
+	fails incise provenance m.fis.sd -- "m.fis.sd:"
+	fails incise provenance none -- "none:"
 	a=$(printf 'a%.0s' {1..64})
 	printf 'x\0incise:1:model:%s:0:-:%%1B%%5B31m%%2E.fis;incise:1:model:%s:0:-:%%1B%%5B31m.fis;' "$a" "$a" >odd
 	run -1 --separate-stderr incise provenance odd

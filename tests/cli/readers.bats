@@ -85,20 +85,17 @@ state() {
 	done
 	[ "$(wc -l <out/new.csv)" -gt 3000 ]
 	cmp out/{killed,new}.csv
-	run --separate-stderr incise recover killed.rec -o new.rec
-	failed_with new.rec "exists"
+	fails incise recover killed.rec -o new.rec -- new.rec "exists"
 	incise recover journal.rec -o new.rec --overwrite >/dev/null
 	incise verify new.rec >/dev/null
-	run --separate-stderr incise recover hostile.rec -o no.rec
-	failed_with hostile.rec "names another file"
+	fails incise recover hostile.rec -o no.rec -- hostile.rec "names another file"
 	[ ! -e no.rec ] && [ ! -e no.rec.part ]
 }
 
 @test "a recording that is too large for a copy is refused with the command that recovers it" {
 	truncate -s 1025M killed.rec/recording.db-wal
 	state >before
-	run --separate-stderr incise info killed.rec
-	failed_with killed.rec "incise recover killed.rec -o NEW.rec"
+	fails incise info killed.rec -- killed.rec "incise recover killed.rec -o NEW.rec"
 	state | cmp before -
 }
 

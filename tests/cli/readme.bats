@@ -4,10 +4,6 @@
 load cli
 load document
 
-setup() {
-	work_folder
-}
-
 @test "README has at most 900 words" {
 	[ "$(wc -w <"$root/README.md")" -le 900 ] || complain "$(wc -w <"$root/README.md") words"
 }

@@ -62,8 +62,7 @@ rows_of() {
 	cmp <(rows_of a.rec) own
 	run -0 incise verify a.rec
 	[ "${lines[-1]}" = "a.rec: complete, and as it was written" ]
-	run --separate-stderr incise recalibrate a.rec --original
-	failed_with "a.rec:"
+	fails incise recalibrate a.rec --original -- "a.rec:"
 }
 
 @test "values that a calibration does not have stay, and so does a channel's own measured zero" {
@@ -93,8 +92,7 @@ rows_of() {
 	# a joined recording takes them along; each member has its own
 	incise join a.rec b.rec -o both.rec >/dev/null
 	cmp new.conf both.rec/a/calibration/0001-*.conf
-	run --separate-stderr incise recalibrate both.rec -c new.conf
-	failed_with "joined recording" "both.rec/a"
+	fails incise recalibrate both.rec -c new.conf -- "joined recording" "both.rec/a"
 	incise recalibrate both.rec/b -c new.conf >/dev/null
 	incise info --json both.rec | grep -q '"file": "b/calibration/0001-'
 	incise capture -o a.rec --overwrite --rig $rig --duration 1s >/dev/null
@@ -104,8 +102,7 @@ rows_of() {
 # bats test_tags=check
 @test "a calibration that is damaged is named, with the way back" {
 	echo "force_mV_N = none;" >bad.conf
-	run --separate-stderr incise recalibrate a.rec -c bad.conf
-	failed_with "bad.conf:1: "
+	fails incise recalibrate a.rec -c bad.conf -- "bad.conf:1: "
 	[ ! -e a.rec/calibration ]
 	incise recalibrate a.rec -c new.conf >/dev/null
 	echo "force_mV_N = 0.0;" >"$(echo a.rec/calibration/*)"
@@ -133,7 +130,6 @@ rows_of() {
 	[ "$(ls a.rec/calibration | cut -c1-4 | paste -sd' ')" = "0001 0002 0003 0004 0005 0006" ]
 	mkdir other
 	ln -s ../other b.rec/calibration
-	run --separate-stderr incise recalibrate b.rec -c new.conf
-	failed_with "b.rec/calibration: a link"
+	fails incise recalibrate b.rec -c new.conf -- "b.rec/calibration: a link"
 	[ -z "$(ls other)" ]
 }

@@ -16,7 +16,7 @@ setup() {
 	work_folder
 	cp "$BATS_FILE_TMPDIR/liver.fis" .
 	cp -r "$BATS_FILE_TMPDIR/liver.rec" .
-	cp "$root/scenes/liver.scene" .
+	smooth_liver
 }
 
 teardown() {
@@ -121,18 +121,14 @@ teardown() {
 
 # bats test_tags=check
 @test "what cannot be replayed" {
-	run --separate-stderr incise replay none.rec liver.scene -o t.csv
-	failed_with none.rec "no such recording"
-	run --separate-stderr incise replay liver.rec none.scene -o t.csv
-	failed_with none.scene
-	run --separate-stderr incise replay liver.rec liver.scene -o no/folder/t.csv
-	failed_with no/folder
+	fails incise replay none.rec liver.scene -o t.csv -- none.rec "no such recording"
+	fails incise replay liver.rec none.scene -o t.csv -- none.scene
+	fails incise replay liver.rec liver.scene -o no/folder/t.csv -- no/folder
 	sqlite3 liver.rec/recording.db "UPDATE tracker SET x_mm = 9e999 WHERE seq = 100"
 	run --separate-stderr incise replay liver.rec liver.scene -o t.csv
 	failed_with liver.rec "damaged" "stream tracker, block 8"
 	[ ! -e t.csv ]
 	sqlite3 liver.rec/recording.db "DELETE FROM tracker;
 		UPDATE meta SET value = 0 WHERE key = 'tracker_rows'"
-	run --separate-stderr incise replay liver.rec liver.scene
-	failed_with "no pose"
+	fails incise replay liver.rec liver.scene -- "no pose"
 }

@@ -3,10 +3,6 @@
 
 load cli
 
-setup() {
-	work_folder
-}
-
 # The row of a key, with one blank between its columns.
 row() {
 	grep -E "^${1//[/\\[} " <<<"$output" | tr -s ' '
@@ -109,10 +105,8 @@ row() {
 # bats test_tags=check
 @test "a rig.conf with an error is refused with its line, and no device is opened" {
 	printf '\ntrakcer = "sim:";\n' >rig.conf
-	run --separate-stderr incise info rig --all
-	failed_with "rig.conf:2: trakcer:"
-	run --separate-stderr incise info none.conf
-	failed_with "none.conf:"
+	fails incise info rig --all -- "rig.conf:2: trakcer:"
+	fails incise info none.conf -- "none.conf:"
 	# not even a node that would say so
 	printf 'tracker = "tty:/dev/none:115200";\n' >rig.conf
 	run -0 --separate-stderr incise info rig --all

@@ -4,10 +4,6 @@
 
 load cli
 
-setup() {
-	work_folder
-}
-
 # A test program that prints the given lines and exits with a status.
 program() {
 	printf '#!/bin/sh\ncat <<E\n%s\nE\nexit %d\n' "$2" "$3" >"$1"

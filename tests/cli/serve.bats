@@ -3,10 +3,6 @@
 
 load cli
 
-setup() {
-	work_folder
-}
-
 teardown() {
 	[ -z "$server" ] || kill -KILL "$server" 2>/dev/null || :
 }

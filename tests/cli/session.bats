@@ -267,8 +267,7 @@ refused() {
 	refused "No such file"
 	mkdir bad.session
 	refused directory
-	run --separate-stderr incise assess easy.session --reference none.session
-	failed_with none.session
+	fails incise assess easy.session --reference none.session -- none.session
 }
 
 @test "the script meets every criterion of the neck, and without the tube all but one" {

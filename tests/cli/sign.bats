@@ -69,8 +69,7 @@ not_vouched() {
 	incise sign a.rec --key "$lee"
 	run -0 --separate-stderr incise verify a.rec --signers <(cat signers; echo "lee@lab $(cat "$lee.pub")")
 	[ "$(grep -c "signed by" <<<"$output")" = 2 ]
-	run --separate-stderr incise sign a.rec --key "$kim"
-	failed_with "$sig:"
+	fails incise sign a.rec --key "$kim" -- "$sig:"
 	incise sign a.rec --key "$kim" --overwrite
 	[ "$(find a.rec/seal -type f | wc -l)" = 3 ]
 	# its name, which is that of its cuts in an export, was signed too; it is replaced with its seal
@@ -109,11 +108,9 @@ not_vouched() {
 	failed_with "locked:"
 	mkfifo pipe
 	for key in pipe /dev/zero .; do
-		run --separate-stderr timeout 60 incise sign a.rec --key $key
-		failed_with "$key:"
+		fails timeout 60 incise sign a.rec --key $key -- "$key:"
 	done
-	run --separate-stderr incise sign a.rec --key -x
-	failed_with "-x:"
+	fails incise sign a.rec --key -x -- "-x:"
 }
 
 # bats test_tags=check
@@ -132,10 +129,8 @@ not_vouched() {
 	printf 'kim\033[31m\a@lab %s\n' "$(cat "$kim.pub")" >escapes
 	run --separate-stderr incise verify signed.rec --signers escapes
 	[[ "$output$stderr" != *[$'\e\a']* ]]
-	run --separate-stderr incise verify signed.rec --signers /dev/zero
-	failed_with "/dev/zero: "
-	run --separate-stderr incise verify a.rec --signers signers
-	failed_with "a.rec:"
+	fails incise verify signed.rec --signers /dev/zero -- "/dev/zero: "
+	fails incise verify a.rec --signers signers -- "a.rec:"
 }
 
 @test "seals of another recording, changed statements and signatures are named" {
@@ -172,8 +167,7 @@ not_vouched() {
 	run -1 --separate-stderr incise verify signed.rec --signers signers
 	[[ "$output" == *"force: block 0 is altered"* ]]
 	[[ "$output" != *"all of it"* ]]
-	run --separate-stderr incise sign signed.rec --key "$lee"
-	failed_with "signed.rec"
+	fails incise sign signed.rec --key "$lee" -- "signed.rec"
 	[ "$(find signed.rec/seal -name '*.sig' | wc -l)" = 1 ]
 }
 
@@ -261,13 +255,11 @@ not_vouched() {
 	# nothing is written through a link
 	mkdir elsewhere
 	ln -s ../elsewhere a.rec/seal
-	run --separate-stderr incise sign a.rec --key "$kim"
-	failed_with "a.rec/seal:"
+	fails incise sign a.rec --key "$kim" -- "a.rec/seal:"
 	rm a.rec/seal
 	incise sign a.rec --key "$lee"
 	ln -s "$PWD/elsewhere/new" "a.rec/seal/$sig"
-	run --separate-stderr incise sign a.rec --key "$kim"
-	failed_with "a.rec/seal/$sig: "
+	fails incise sign a.rec --key "$kim" -- "a.rec/seal/$sig: "
 	[ -z "$(ls elsewhere)" ]
 }
 
@@ -292,24 +284,19 @@ not_vouched() {
 
 	# by a stranger; changed; for something else; refused; no reply
 	authority other
-	run --separate-stderr incise verify a.rec --signers signers --ca other/ca.pem
-	failed_with "a.rec:"
+	fails incise verify a.rec --signers signers --ca other/ca.pem -- "a.rec:"
 	[[ "$output" == *"not valid: not by an authority that is trusted: "* ]]
 	n=$(grep -obUa Lab own.tsr | tail -1)
 	printf 'Lob' | dd of=a.rec/seal/1.own.tsr bs=1 seek="${n%%:*}" conv=notrunc 2>/dev/null
 	run -1 --separate-stderr incise verify a.rec --signers signers --ca "$made/ca/ca.pem"
 	[[ "$output" == *"seal/1.own.tsr: not valid: "* ]]
-	run --separate-stderr incise sign "signed.rec" --timestamp r.tsr --overwrite
-	failed_with "r.tsr:"
+	fails incise sign "signed.rec" --timestamp r.tsr --overwrite -- "r.tsr:"
 	openssl ts -query -data signers -sha1 -out sha1.tsq 2>/dev/null
 	stamp "$made/ca" sha1.tsq sha1.tsr || :
-	run --separate-stderr incise sign a.rec --timestamp sha1.tsr
-	failed_with "sha1.tsr:"
+	fails incise sign a.rec --timestamp sha1.tsr -- "sha1.tsr:"
 	cp q.tsq no.tsr
-	run --separate-stderr incise sign a.rec --timestamp no.tsr
-	failed_with "no.tsr:"
-	run --separate-stderr incise verify a.rec --signers signers --ca signers
-	failed_with "signers:"
+	fails incise sign a.rec --timestamp no.tsr -- "no.tsr:"
+	fails incise verify a.rec --signers signers --ca signers -- "signers:"
 }
 
 @test "a time-stamp says when a key had to be valid" {
@@ -337,11 +324,9 @@ not_vouched() {
 	incise sign a.rec --key "$kim" --timestamp "$at/tsr"
 	run -0 --separate-stderr incise verify a.rec --signers signers --ca "$made/ca/ca.pem"
 	[[ "$output" == *"time-stamped 20"* ]]
-	run --separate-stderr incise sign a.rec --timestamp "$at/old" --overwrite
-	failed_with "$at/old:"
+	fails incise sign a.rec --timestamp "$at/old" --overwrite -- "$at/old:"
 	for path in large page; do
-		run --separate-stderr incise sign a.rec --timestamp "$at/$path"
-		failed_with "$at/$path:"
+		fails incise sign a.rec --timestamp "$at/$path" -- "$at/$path:"
 	done
 	run --separate-stderr incise sign a.rec --timestamp https://127.0.0.1/tsr
 	failed_with "https://127.0.0.1/tsr: https is not supported, and a time-stamp needs none"
@@ -355,8 +340,7 @@ not_vouched() {
 	capture=$!
 	has_rows() { [ "$(stat -c %s p.rec.part/recording.db-wal)" -gt 200000 ]; }
 	await has_rows
-	run --separate-stderr incise sign p.rec.part --key "$kim"
-	failed_with "p.rec.part:"
+	fails incise sign p.rec.part --key "$kim" -- "p.rec.part:"
 	kill -KILL $capture
 	wait $capture || :
 	run -0 --separate-stderr incise sign p.rec --key "$kim"
@@ -379,11 +363,9 @@ join_signed() {
 @test "a join is signed with its members, which keep their seals" {
 	join_signed
 	cmp a.rec/seal/1.statement day.rec/a/seal/1.statement
-	run --separate-stderr incise verify day.rec --signers signers
-	failed_with "day.rec/b:"
+	fails incise verify day.rec --signers signers -- "day.rec/b:"
 	incise sign day.rec/b --key "$kim"
-	run --separate-stderr incise verify day.rec --signers signers
-	failed_with "day.rec:"
+	fails incise verify day.rec --signers signers -- "day.rec:"
 	[[ "$stderr" == *"the times of the join are not"* ]]
 	run -0 --separate-stderr incise sign day.rec --key "$kim"
 	[ "$(grep -c "signed with" <<<"$output")" = 3 ]
@@ -404,8 +386,7 @@ join_signed() {
 	mv day.rec moved.rec
 	incise verify moved.rec --signers signers
 	rm -r moved.rec/b/seal
-	run --separate-stderr incise verify moved.rec --signers signers
-	failed_with "moved.rec/b:"
+	fails incise verify moved.rec --signers signers -- "moved.rec/b:"
 }
 
 # forged_joins COUNT: so many with one value changed and the right checksum; none is good.

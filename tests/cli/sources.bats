@@ -76,12 +76,9 @@ until_records() {
 	grep -q "^ *tracker *= \"tty:$PWD/tracker:115200\";" told
 	grep -q "^ *family *FASTRAK" told
 	grep -q "^ *firmware " told
-	run --separate-stderr incise info "tty:$PWD/none:115200"
-	failed_with "$PWD/none" "plug in the adapter"
-	run --separate-stderr incise info v4l2:/dev/video99
-	failed_with "v4l2:/dev/video99: no answer" "cable"
-	run --separate-stderr incise info nonsense:x
-	failed_with 'no such backend "nonsense"' "tty" "can" "v4l2"
+	fails incise info "tty:$PWD/none:115200" -- "$PWD/none" "plug in the adapter"
+	fails incise info v4l2:/dev/video99 -- "v4l2:/dev/video99: no answer" "cable"
+	fails incise info nonsense:x -- 'no such backend "nonsense"' "tty" "can" "v4l2"
 }
 
 @test "a module that cannot be loaded is no device" {
@@ -147,8 +144,7 @@ until_records() {
 @test "two sensors of a tracker make no recording of one" {
 	plug_in --stations 12
 	echo 'tracker_setup = { stations = [1, 2]; };' >>rig.conf
-	run --separate-stderr incise capture -o a.rec -c none --duration 1s
-	failed_with "a.rec:" "tracker_setup.stations"
+	fails incise capture -o a.rec -c none --duration 1s -- "a.rec:" "tracker_setup.stations"
 	[ ! -e a.rec ]
 	[ ! -e a.rec.part ]
 	# either of them does
@@ -186,8 +182,7 @@ until_records() {
 	incise capture -o a.rec --duration 600ms
 	# and its settings with it: none that is wrong goes by
 	sed -i 's/rate_hz = 10000.0/rate_hz = 0.5/' rig.conf
-	run --separate-stderr incise capture -o b.rec --duration 600ms
-	failed_with "rig.conf" "force_setup.rate_hz"
+	fails incise capture -o b.rec --duration 600ms -- "rig.conf" "force_setup.rate_hz"
 }
 
 # A scene in which the emulator's sensor is always in the tissue, on a virtual actuator.

@@ -44,15 +44,11 @@ runs() {
 
 @test "without a loop it says how to start one" {
 	! compgen -G "/run/incise/*.state" >/dev/null || skip "a loop has run on this machine"
-	run --separate-stderr incise status
-	failed_with "no loop has run here" "incise haptic SCENE"
-	run --separate-stderr incise status neck
-	failed_with "neck:" "incise haptic neck"
-	run --separate-stderr incise status nosuch/neck.state
-	failed_with "nosuch/neck.state:"
+	fails incise status -- "no loop has run here" "incise haptic SCENE"
+	fails incise status neck -- "neck:" "incise haptic neck"
+	fails incise status nosuch/neck.state -- "nosuch/neck.state:"
 	rmdir incise
-	run --separate-stderr incise status neck
-	failed_with "no loop of that name"
+	fails incise status neck -- "no loop of that name"
 }
 
 # bats test_tags=check
@@ -149,8 +145,7 @@ runs() {
 	wait "$played"
 	# A folder where others may write could be anybody's.
 	chmod 777 "$place"
-	run --separate-stderr incise status wall
-	failed_with "no loop of that name"
+	fails incise status wall -- "no loop of that name"
 	run -0 --separate-stderr incise haptic "$root/scenes/wall.scene" --rig sim: --no-rt \
 		--overruns 0 --duration 100ms
 	[[ "$stderr" == *"no status file: $place belongs to another user, or others may write there"* ]]
@@ -158,8 +153,7 @@ runs() {
 	mv "$place" real
 	chmod 700 real
 	ln -s "$PWD/real" "$place"
-	run --separate-stderr incise status wall
-	failed_with "no loop of that name"
+	fails incise status wall -- "no loop of that name"
 }
 
 # bats test_tags=check
@@ -359,19 +353,15 @@ until_lines() {
 # bats test_tags=check
 @test "a page that is no page, or of another release, is refused" {
 	echo "rate_hz = 1000.0;" >a.state
-	run --separate-stderr incise status a.state
-	failed_with "a.state:"
+	fails incise status a.state -- "a.state:"
 	echo nonsense >a.state
-	run --separate-stderr incise status a.state
-	failed_with "a.state:"
+	fails incise status a.state -- "a.state:"
 	"$loop" incise/neck.state done
 	printf '\2' | dd of=incise/neck.state bs=1 seek=8 conv=notrunc 2>/dev/null
-	run --separate-stderr incise status neck
-	failed_with "a status file of version 2.0" "one release"
+	fails incise status neck -- "a status file of version 2.0" "one release"
 	"$loop" incise/other.state done
 	truncate -s 1000 incise/other.state
-	run --separate-stderr incise status other
-	failed_with "damaged or truncated"
+	fails incise status other -- "damaged or truncated"
 }
 
 # Compiles what the manual says of the bytes, and reads a page by it and nothing else.

@@ -72,8 +72,7 @@ until_it_says() {
 @test "move outside the travel is refused" {
 	for way in 20.1 -1 -0.1mm "-1 --by" "20001um --by"; do
 		# shellcheck disable=SC2086
-		run --separate-stderr incise stepper move $way --rig $quick
-		failed_with "out of the travel" "0 to 20 mm"
+		fails incise stepper move $way --rig $quick -- "out of the travel" "0 to 20 mm"
 		[ -z "$output" ]
 	done
 }
@@ -109,8 +108,7 @@ until_it_says() {
 	failed_with "simulated haptic scalpel cannot jog" "incise stepper move"
 	run --separate-stderr incise stepper home --rig $quick
 	failed_with "simulated haptic scalpel does not support being homed"
-	run --separate-stderr incise stepper jog 31mm/s --rig $quick
-	failed_with "31 mm/s" "30 mm/s"
+	fails incise stepper jog 31mm/s --rig $quick -- "31 mm/s" "30 mm/s"
 }
 
 # bats test_tags=check
@@ -150,11 +148,9 @@ until_it_says() {
 
 # bats test_tags=check
 @test "stepper: rigs that cannot be" {
-	run --separate-stderr incise stepper status --rig none.conf
-	failed_with none.conf "No such file"
+	fails incise stepper status --rig none.conf -- none.conf "No such file"
 	echo 'tracker = "sim:";' >rig.conf
-	run --separate-stderr incise stepper status
-	failed_with rig.conf stepper
+	fails incise stepper status -- rig.conf stepper
 	echo 'stepper = "sim:";' >>rig.conf
 	incise stepper status # ./rig.conf is the default
 	cat >rig.conf <<-'END'
@@ -163,8 +159,7 @@ until_it_says() {
 	END
 	for command in status enable disable "move 1" "jog 1" home clear; do
 		# shellcheck disable=SC2086
-		run --separate-stderr incise stepper $command
-		failed_with /dev/incise-none
+		fails incise stepper $command -- /dev/incise-none
 	done
 }
 
@@ -178,23 +173,18 @@ until_it_says() {
 			actuator = { spring_N_mm = 2.0; travel_mm = 20.0; lead_mm = 4.0; };
 		END
 		for command in status clear; do
-			run --separate-stderr timeout 60 incise stepper $command --rig kernel.conf
-			failed_with "not a device"
+			fails timeout 60 incise stepper $command --rig kernel.conf -- "not a device"
 		done
 	done
 }
 
 @test "info of a controller that is not there, or is none" {
 	compgen -G '/dev/incise-stepper*' >/dev/null && skip "this machine has a controller"
-	run --separate-stderr incise info stepper
-	failed_with "systemctl start incise-stepper"
-	run --separate-stderr incise info stepper --json
-	failed_with "systemctl start incise-stepper"
-	run --separate-stderr incise info /dev/incise-stepper0
-	failed_with /dev/incise-stepper0 "No such file"
+	fails incise info stepper -- "systemctl start incise-stepper"
+	fails incise info stepper --json -- "systemctl start incise-stepper"
+	fails incise info /dev/incise-stepper0 -- /dev/incise-stepper0 "No such file"
 	echo text >stepper
-	run --separate-stderr incise info ./stepper # a file of that name
-	failed_with ./stepper
+	fails incise info ./stepper # a file of that name -- ./stepper
 }
 
 @test "--axis chooses one of the rig's actuators" {

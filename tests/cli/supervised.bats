@@ -8,7 +8,7 @@ load stepper_module
 setup() {
 	watch_machine
 	memory_folder
-	cp "$root/scenes/liver.scene" "$root/scenes/liver.fis" "$root/scenes/wall.scene" .
+	cp "$root"/scenes/liver.{scene,fis,fis.tex} "$root/scenes/wall.scene" .
 	module_folder
 }
 
@@ -167,8 +167,7 @@ ended() {
 	# one that came with the program; that of this folder comes first
 	run -0 incise haptic neck --rig sim:clock=simulated --duration 0.1s
 	echo nonsense >neck.scene
-	run --separate-stderr incise haptic neck --rig sim:clock=simulated --duration 0.1s
-	failed_with neck.scene: syntax
+	fails incise haptic neck --rig sim:clock=simulated --duration 0.1s -- neck.scene: syntax
 	run --separate-stderr incise haptic nothing --rig sim:clock=simulated --duration 0.1s
 	# each name once, though this folder has what came with the program too
 	failed_with "nothing:"

@@ -17,6 +17,23 @@ table() {
 	cat <<-END
 		assess|missing NAME.session
 		assess a.session --json -o csv:-|standard output
+		bench|missing, for example 'precision'
+		bench nothing|unknown benchmark 'nothing'
+		bench presision|unknown benchmark 'presision'; did you mean 'precision'?
+		bench precision a b|'precision' takes at most 1 operand, got 2
+		bench loop a b|'loop' takes at most 1 operand, got 2
+		bench stability a b|'stability' takes at most 1 operand, got 2
+		bench loop -o a|--output
+		bench stability -o a/|--output
+		bench loop --load much|--load: expected idle, cpu, memory, disk or view, found 'much'
+		bench training --load cpu|--load does not go with 'training'
+		bench --json view|'view' must come directly after
+		bench all|expected -o DIR, or --from DIR
+		bench all -o a --from b|expected -o DIR, or --from DIR
+		bench all -o a --only precision,nosuch|found 'nosuch'
+		bench all --from b --quick|--from measures nothing
+		bench all --from r --against old.json|--from measures nothing
+		bench all -o a precision|takes options only
 		calibrate check a.rec|unexpected argument 'a.rec'; did you mean --recording a.rec?
 		calibrate delay --rig $rig|--duration or --from
 		calibrate depth|missing method: two-point, line or board
@@ -117,6 +134,7 @@ table() {
 		verify a.rec --ca ca.pem|--signers
 	END
 	[ ! -x "$INCISE_BUILD/bin/incise-view" ] || cat <<-END
+		bench view a b|at most one scene
 		view|missing SCENE (
 		view neck --procedure --rig sim:|--procedure
 		view neck --procedure --from x.rec|--procedure
@@ -139,8 +157,7 @@ table() {
 	done < <(table)
 	[ "$(ls -A)" = "$before" ]
 	# Arguments that are no words.
-	run --separate-stderr incise train a.csv -o ""
-	bad_usage "-o"
+	misused incise train a.csv -o "" -- "-o"
 	run --separate-stderr incise stepper move --rig $rig -- ""
 	bad_usage ""
 	run --separate-stderr incise stepper move --rig $rig -- --

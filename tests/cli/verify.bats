@@ -22,8 +22,7 @@ tampered() {
 	rm -rf a.rec
 	cp -r "$BATS_FILE_TMPDIR/good.rec" a.rec
 	ask a.rec "$sql"
-	run --separate-stderr incise verify a.rec
-	failed_with "a.rec:"
+	fails incise verify a.rec -- "a.rec:"
 	for text; do
 		[[ "$output" == *"$text"* ]] || complain "$sql: no '$text' in: $output"
 	done
@@ -104,34 +103,29 @@ tampered() {
 	byte=$(od -An -tu1 -j $((size / 2)) -N 1 d.rec/camera.mkv)
 	printf '%b' "\\0$(printf %o $((byte ^ 1)))" |
 		dd of=d.rec/camera.mkv bs=1 seek=$((size / 2)) conv=notrunc 2>/dev/null
-	run --separate-stderr incise verify d.rec
-	failed_with "d.rec:"
+	fails incise verify d.rec -- "d.rec:"
 	[[ "$output" == *"d.rec: camera: 1 altered in camera.mkv, number "*": its bytes are not as written"* ]] ||
 		complain "$output"
 
 	truncate -s $((size / 2)) d.rec/camera.mkv
-	run --separate-stderr incise verify d.rec
-	failed_with "d.rec:"
+	fails incise verify d.rec -- "d.rec:"
 	[[ "$output" == *" missing in camera.mkv, numbers "* ]]
 
 	# its length is known: nothing behind its end, nothing less
 	for change in "printf x" "head -c 5000000 /dev/zero" "cat c.rec/camera.mkv"; do
 		cp c.rec/camera.mkv d.rec/camera.mkv
 		$change >>d.rec/camera.mkv
-		run --separate-stderr incise verify d.rec
-		failed_with "d.rec:"
+		fails incise verify d.rec -- "d.rec:"
 		[[ "$output" == *"d.rec: camera.mkv has $(stat -c %s d.rec/camera.mkv) bytes of $size"* ]] ||
 			complain "$change: $output"
 	done
 	cp c.rec/camera.mkv d.rec/camera.mkv
 	truncate -s -1 d.rec/camera.mkv
-	run --separate-stderr incise verify d.rec
-	failed_with "d.rec:"
+	fails incise verify d.rec -- "d.rec:"
 	[[ "$output" == *"d.rec: camera.mkv has $((size - 1)) bytes of $size"* ]]
 
 	rm d.rec/camera.mkv
-	run --separate-stderr incise verify d.rec
-	failed_with "d.rec:"
+	fails incise verify d.rec -- "d.rec:"
 	[[ "$output" == *"camera.mkv is missing, and $n frames with it"* ]]
 }
 
@@ -148,8 +142,7 @@ tampered() {
 
 @test "verify of a page that went bad" {
 	dd if=/dev/urandom of=a.rec/recording.db bs=4096 seek=20 count=1 conv=notrunc 2>/dev/null
-	run --separate-stderr incise verify a.rec
-	failed_with "a.rec:"
+	fails incise verify a.rec -- "a.rec:"
 	[[ "$output" == *"recording.db is damaged"* ]]
 }
 
@@ -157,13 +150,11 @@ tampered() {
 @test "a recording of a form that is not known yet is told from a damaged one" {
 	ask a.rec "PRAGMA user_version=6"
 	for verb in verify info export; do
-		run --separate-stderr incise $verb a.rec
-		failed_with "a.rec:"
+		fails incise $verb a.rec -- "a.rec:"
 	done
 }
 
 # bats test_tags=check
 @test "verify of nothing" {
-	run --separate-stderr incise verify none.rec
-	failed_with "none.rec:"
+	fails incise verify none.rec -- "none.rec:"
 }

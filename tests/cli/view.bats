@@ -13,7 +13,7 @@ setup() {
 	work_folder
 	[ -x "$INCISE_BUILD/bin/incise-view" ] ||
 		skip "incise view was not built: SDL2, epoxy, cairo or EGL were absent"
-	cp "$root"/scenes/*.scene "$root"/scenes/*.fis .
+	cp "$root"/scenes/* .
 	# Small, so that a drawing processor has little to do.
 	small="--size 160x120 --no-panel"
 	sed -i 's/picture = {/picture = {\n  texture_px = 512;/' neck.scene
@@ -66,10 +66,8 @@ teardown() {
 	[ "$(head -c 24 n.png | tail -c 8 | od -An -tu1 | tr -s ' \n' ' ')" = " 0 0 1 64 0 0 0 120 " ]
 	run --separate-stderr incise view neck --procedure -o no/n.mkv --duration 1s $small
 	failed_with no/n.mkv.part "No such file"
-	run --separate-stderr incise view neck --procedure -o /dev/full/x --duration 1s $small
-	failed_with /dev/full
-	run --separate-stderr incise view neck --procedure -o wall.scene --duration 1s $small
-	failed_with wall.scene
+	fails incise view neck --procedure -o /dev/full/x --duration 1s $small -- /dev/full
+	fails incise view neck --procedure -o wall.scene --duration 1s $small -- wall.scene
 	run --separate-stderr incise view neck --procedure -o n.png --overwrite --at 1s,9s --rate 10 --duration 2s $small
 	[ "$status" -eq 0 ]
 	[[ "$stderr" == *"the run ends before frame 2, at 9 s"* ]]
@@ -126,8 +124,7 @@ wrote s.session" ]
 	grep -q '^\$ incise view wall --procedure -o out/wall.mkv' said
 	[ "$(head -c 4 out/wall.mkv | od -An -tx1 | tr -d ' \n')" = 1a45dfa3 ]
 	[ "$(head -c 24 out/wall.png | tail -c 8 | od -An -tu1 | tr -s ' \n' ' ')" = " 0 0 10 0 0 0 1 224 " ]
-	run --separate-stderr incise demo --scene wall -o out
-	failed_with out --overwrite
+	fails incise demo --scene wall -o out -- out --overwrite
 }
 
 ticks_of() {
@@ -147,8 +144,7 @@ ticks_of() {
 	kill -TERM $pid
 	wait $pid
 	pid=
-	run --separate-stderr incise view neck -o f --overwrite --duration 1s $small
-	failed_with "neck:" "incise haptic neck"
+	fails incise view neck -o f --overwrite --duration 1s $small -- "neck:" "incise haptic neck"
 	# a name that no other loop on this machine has, running or left
 	cp liver.scene "idle-$$.scene"
 	run --separate-stderr incise view "idle-$$" -o f --overwrite --duration 1s $small
@@ -208,13 +204,12 @@ begin_view() {
 	incise view liver.scene --from r.rec -o f --rate 2 --json $small >r.json
 	# the skin of a plane is 120 mm wide, and the cut begins at its middle
 	holds "$(key r.json cut_mm) > 20 && $(key r.json cut_mm) < 60"
-	run --separate-stderr incise view liver.scene --from none.rec -o f --overwrite $small
-	failed_with none.rec
+	fails incise view liver.scene --from none.rec -o f --overwrite $small -- none.rec
 }
 
 @test "a window: the mouse presses the blade in, and draws it through the skin" {
 	command -v Xvfb >/dev/null && command -v xdotool >/dev/null || skip "Xvfb or xdotool are not installed"
-	Xvfb -displayfd 5 -screen 0 800x600x24 5>display >/dev/null 2>&1 3>&- &
+	Xvfb -displayfd 5 -noreset -screen 0 800x600x24 5>display >/dev/null 2>&1 3>&- &
 	server=$!
 	await test -s display
 	DISPLAY=:$(cat display)
@@ -226,9 +221,10 @@ begin_view() {
 	for ((i = 0; i < 9600; i++)); do
 		window=$(xdotool search --name neck.scene 2>/dev/null | head -n 1)
 		[ -n "$window" ] && break
+		kill -0 $pid || complain "no window: $(cat err)"
 		sleep 0.05
 	done
-	[ -n "$window" ] || complain "no window: $(cat err)"
+	[ -n "$window" ] || complain "no window within 8 min: $(cat err)"
 	sleep 1
 	xdotool mousemove --window "$window" 170 170
 	sleep 0.5
@@ -257,8 +253,7 @@ begin_view() {
 
 # bats test_tags=check
 @test "view: a screen that is not there" {
-	run --separate-stderr incise view neck --rig sim:clock=simulated --duration 1s -o f
-	failed_with "simulated time"
+	fails incise view neck --rig sim:clock=simulated --duration 1s -o f -- "simulated time"
 	run --separate-stderr env -u DISPLAY -u WAYLAND_DISPLAY SDL_VIDEODRIVER=x11 incise view neck --procedure
 	failed_with "without a display give -o FILE.mkv"
 }

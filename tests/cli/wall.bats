@@ -34,8 +34,7 @@ setup() {
 	[[ "$output" == *"wall time  none"* ]]
 	run -0 --separate-stderr incise info a.rec --json
 	jq -e '.wall == null' <<<"$output"
-	run -1 --separate-stderr incise export a.rec --resample --tai
-	failed_with "a.rec:"
+	fails incise export a.rec --resample --tai -- "a.rec:"
 }
 
 @test "a recording of a real clock has the time of this computer" {
@@ -155,6 +154,5 @@ setup() {
 		(SELECT min(t_ns) FROM events WHERE kind = 'sync')")" = 1 ]
 	run -1 --separate-stderr incise capture -o b.rec --rig "$real" --trigger sync:/dev/null
 	failed_with "not a controller of the stepper module"
-	run -1 --separate-stderr incise capture -o b.rec --rig "$real" --trigger sync:none
-	failed_with "No such file"
+	fails incise capture -o b.rec --rig "$real" --trigger sync:none -- "No such file"
 }

@@ -3,10 +3,6 @@
 
 load cli
 
-setup() {
-	work_folder
-}
-
 # bats test_tags=check
 @test "wheel: versions, names and files of its metadata are those of the tree" {
 	/usr/bin/python3 - "$root" <<'PYTHON'

@@ -19,22 +19,14 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
+#include "../clock.h"
 #include "emulator.h"
 #include "usb_function.h"
 
 static struct emulator e;
 static const char *link_path, *usb_folder;
 static int master = -1;
-
-static int64_t now_ns(void)
-{
-	struct timespec ts;
-
-	clock_gettime(CLOCK_MONOTONIC, &ts);
-	return ts.tv_sec * INT64_C(1000000000) + ts.tv_nsec;
-}
 
 static void say(const char *text)
 {

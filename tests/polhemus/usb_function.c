@@ -15,6 +15,7 @@
 #include <time.h>
 #include <unistd.h>
 #include <linux/usb/functionfs.h>
+#include "../clock.h"
 #include "usb_function.h"
 
 #define PACKET 64 /* a FASTRAK is full speed */
@@ -27,14 +28,6 @@ struct descriptors {
 static struct emulator *emulator;
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
 static const char *folder;
-
-static int64_t now_ns(void)
-{
-	struct timespec ts;
-
-	clock_gettime(CLOCK_MONOTONIC, &ts);
-	return ts.tv_sec * INT64_C(1000000000) + ts.tv_nsec;
-}
 
 static struct usb_endpoint_descriptor_no_audio endpoint(int address, int type, int size)
 {

@@ -31,7 +31,7 @@ static void fail(const char *what)
 /* Read until @n came, or an error. */
 static int take_some(struct incise_tracker *tracker, int n)
 {
-	int64_t end_ns = pty_now_ns() + PATIENCE_NS;
+	int64_t end_ns = now_ns() + PATIENCE_NS;
 
 	while (n > 0) {
 		struct incise_tracker_sample samples[16];
@@ -40,7 +40,7 @@ static int take_some(struct incise_tracker *tracker, int n)
 		if (m < 0)
 			return m;
 		n -= m;
-		if (pty_now_ns() > end_ns)
+		if (now_ns() > end_ns)
 			fail("nothing came");
 		usleep(1000);
 	}

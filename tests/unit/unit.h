@@ -28,6 +28,7 @@
 #include <string.h>
 #include <unistd.h>
 #include <incise/error.h>
+#include "message.h"
 
 /* Of the calls of a test, at whose start it is clear; assert_error() clears it, too. */
 __attribute__((unused)) static struct incise_error err;

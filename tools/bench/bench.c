@@ -6,10 +6,12 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 #include "bench.h"
 #include "../cli/json.h"
-#include "machine.h"
+#include "../cli/machine.h"
 #include "../cli/plot.h"
+#include "../cli/report_script.h"
 
 #define TEXT_BYTES 600
 
@@ -96,7 +98,7 @@ static void word_of(const struct bench_column *c, const void *row, const char *f
 static const struct bench_column *column_of(const struct bench_table *table,
 					    const char *key, size_t length)
 {
-	for (const struct bench_column *c = table->columns; c->key || c->heading; c++)
+	for (const struct bench_column *c = table->columns; c->key; c++)
 		if (c->key && strlen(c->key) == length && !strncmp(c->key, key, length))
 			return c;
 	cli_fail("%.*s: no such column", (int)length, key);
@@ -105,7 +107,7 @@ static const struct bench_column *column_of(const struct bench_table *table,
 /* NULL of a table in which no row fails. */
 static const char *failed_of(const struct bench_table *table, const void *row)
 {
-	for (const struct bench_column *c = table->columns; c->key || c->heading; c++)
+	for (const struct bench_column *c = table->columns; c->key; c++)
 		if (c->key && !strcmp(c->key, "failed"))
 			return text_of_bench(c, row);
 	return NULL;
@@ -135,94 +137,6 @@ static bool matches(const struct bench_table *table, const char *where, const vo
 static const void *row_at(const struct bench_table *table, const void *rows, int i)
 {
 	return (const char *)rows + (size_t)i * table->row_bytes;
-}
-
-/* --- text --- */
-
-static bool prints_text(const struct bench_run *run)
-{
-	return !run->json && !run->against;
-}
-
-void bench_text(const struct bench_run *run, const char *fmt, ...)
-{
-	va_list args;
-
-	if (!prints_text(run))
-		return;
-	va_start(args, fmt);
-	vprintf(fmt, args);
-	va_end(args);
-}
-
-/* "%-18s" takes 18 characters, "  (%6.3f)" ten; below 0 at the left. */
-static int width_of_bench(const char *format)
-{
-	const char *percent = strchr(format, '%'), *end;
-	bool left = percent[1] == '-';
-	int width =
-		(int)strtol(percent + 1 + strspn(percent + 1, "-+"), (char **)&end, 10);
-
-	end += strcspn(end, "sfge");
-	width += (int)(percent - format) + (*end ? (int)strlen(end + 1) : 0);
-	return left ? -width : width;
-}
-
-static void print_cell(const struct bench_column *c, const void *row)
-{
-	double value = number_of_bench(c, row) * (c->text_scale != 0 ? c->text_scale : 1);
-
-	if (text_of_bench(c, row))
-		printf(c->format, text_of_bench(c, row));
-	else if (isnan(value))
-		printf("%*s", width_of_bench(c->format), "-");
-	else
-		printf(c->format, value);
-}
-
-/* Nothing ends a line behind the last heading that is not empty. */
-static void print_headings(const struct bench_column *columns)
-{
-	int blank = 0;
-
-	for (const struct bench_column *c = columns; c->key || c->heading; c++) {
-		if (!c->heading)
-			continue;
-		if (c != columns && !*c->heading) {
-			blank += 1 + abs(width_of_bench(c->format));
-			continue;
-		}
-		printf("%*s%*s", blank, "", width_of_bench(c->format), c->heading);
-		blank = 1;
-	}
-	putchar('\n');
-}
-
-static void print_line(const struct bench_table *table, const void *row)
-{
-	const char *failed = table->failed_after ? failed_of(table, row) : NULL;
-	int n = 0;
-
-	for (const struct bench_column *c = table->columns; c->key || c->heading; c++) {
-		if (!c->heading)
-			continue;
-		if (failed && n == table->failed_after)
-			break;
-		if (n++)
-			putchar(' ');
-		print_cell(c, row);
-	}
-	printf(failed ? " %s\n" : "\n", failed);
-}
-
-void bench_lines(const struct bench_run *run, const struct bench_table *table,
-		 const void *rows, int n)
-{
-	if (!prints_text(run))
-		return;
-	print_headings(table->columns);
-	for (int i = 0; i < n; i++)
-		print_line(table, row_at(table, rows, i));
 }
 
 /* "{name}, {rate_hz:%g} Hz" of a row's columns. */
@@ -313,7 +227,7 @@ static json_t *row_json(const struct bench_table *table, const void *row)
 {
 	json_t *object = json_object();
 
-	for (const struct bench_column *c = table->columns; c->key || c->heading; c++)
+	for (const struct bench_column *c = table->columns; c->key; c++)
 		if (c->key && !c->data)
 			set_bench(object, c->key, json_of(c, row));
 	return object;
@@ -324,19 +238,16 @@ static void add_metric(json_t *metrics, const struct bench_table *table,
 {
 	const void *member = (const char *)row + metric->offset;
 	char name[TEXT_BYTES];
-	json_t *added;
 
 	expand(table, row, metric->name, name, sizeof(name));
-	added = metrics_add(metrics, metric->kind, member, metric->unit, "%s", name);
-	if (metric->more_is_better)
-		metrics_more_is_better(added);
+	metrics_add(metrics, metric->kind, member, metric->unit, "%s", name);
 }
 
 static void write_line(FILE *out, const struct bench_table *table, const void *row)
 {
 	char word[TEXT_BYTES];
 
-	for (const struct bench_column *c = table->columns; c->key || c->heading; c++)
+	for (const struct bench_column *c = table->columns; c->key; c++)
 		if (c->key) {
 			if (row)
 				word_of(c, row, "%.10g", word, sizeof(word));
@@ -362,23 +273,10 @@ void bench_rows(struct bench_run *run, const struct bench_table *table, const vo
 			if (matches(table, m->where, row))
 				add_metric(run->metrics, table, m, row);
 	}
-	if (run->tabs && !run->json) {
-		printf("\n%s\n", table->key);
-		write_line(stdout, table, NULL);
-		for (int i = 0; i < n; i++)
-			write_line(stdout, table, row_at(table, rows, i));
-	}
 	if (table->key)
 		bench_value(run, table->key, list);
 	else
 		json_decref(list);
-}
-
-void bench_table(struct bench_run *run, const struct bench_table *table, const void *rows,
-		 int n)
-{
-	bench_rows(run, table, rows, n);
-	bench_lines(run, table, rows, n);
 }
 
 /* --- plots --- */
@@ -485,17 +383,6 @@ static void draw_bench(const struct bench_run *run)
 
 /* --- a run --- */
 
-const char *bench_machine(const struct bench_run *run, const char *key)
-{
-	static char all[600];
-
-	if (key)
-		return json_string_value(json_object_get(run->machine, key));
-	snprintf(all, sizeof(all), "%s; %s; %s", bench_machine(run, "cpu"),
-		 bench_machine(run, "kernel"), bench_machine(run, "compiler"));
-	return all;
-}
-
 void bench_fail(struct bench_run *run, const char *fmt, ...)
 {
 	va_list args;
@@ -526,10 +413,14 @@ static int print_comparison(const struct bench_run *run, const json_t *old)
 void bench_measure(struct bench_run *run)
 {
 	json_t *old = run->against ? compare_load(run->against) : NULL;
+	struct incise_error err = {0};
 	char command[40];
 	int worse = 0;
 
 	/* A wrong name fails before the work, not after. */
+	if (!run->json && access(REPORT_PYTHON, X_OK))
+		cli_fail("%s prints the tables and is missing; give --json",
+			 REPORT_PYTHON);
 	if (run->plot)
 		reserve(run);
 	run->machine = machine_json();
@@ -541,8 +432,10 @@ void bench_measure(struct bench_run *run)
 	run->bench->run(run);
 	cli_progress_end();
 	json_object_set_new(run->report, "figures", run->metrics);
-	if (run->json && !old)
+	if (!old && run->json)
 		json_print(json_incref(run->report));
+	else if (!old)
+		cli_check(report_script("tables", NULL, run->report, stdout, &err), &err);
 	cli_finish();
 	if (run->plot)
 		draw_bench(run);

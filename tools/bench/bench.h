@@ -1,13 +1,12 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
  * Benchmarks of incise bench. Each is declared by a struct bench, a measurement and tables of
- * its rows; from these the shared code makes the text, the JSON, the metrics and the plots.
+ * its rows; from these the shared code makes the JSON, the metrics and the plots.
  *
- *   run() ─▶ rows ─▶ bench_table ─┬─▶ text table        (without --json)
- *                                 ├─▶ JSON, metrics     (--json, compare, bench all)
+ *   run() ─▶ rows ─▶ bench_table ─┬─▶ JSON, metrics     (--json, compare, bench all)
  *                                 └─▶ data, bench_plot  (-o)
  *
- * The report of incise bench all is made of the JSON, by tools/report.
+ * Of the JSON tools/report makes the text without --json, and the report of incise bench all.
  */
 #ifndef INCISE_BENCH_H
 #define INCISE_BENCH_H
@@ -35,16 +34,13 @@ enum bench_type {
 };
 
 struct bench_column {
-	const char *key; /* of the JSON, "a.b" leads inwards; NULL: in the text only */
+	const char *key; /* of the JSON, "a.b" leads inwards */
 	size_t offset;
 	enum bench_type type;
-	const char *format;  /* printf's in the text: for a string, else for a double */
-	const char *heading; /* in the text; NULL: in the JSON only */
-	double scale;	     /* of the number; 0: 1 */
-	double text_scale;   /* in the text on top of that; 0: 1 */
-	bool optional;	     /* 0 is none */
-	bool whole;	     /* in the JSON a whole number is an integer */
-	bool data; /* neither in the text nor in the JSON: for plots and metrics */
+	double scale;  /* of the number; 0: 1 */
+	bool optional; /* 0 is none */
+	bool whole;    /* a whole number is an integer */
+	bool data;     /* not in the JSON: for plots and metrics */
 };
 
 #define BENCH_MEMBER(row, member) \
@@ -59,17 +55,16 @@ struct bench_column {
 			char *: BENCH_CHARS,                 \
 			json_t *: BENCH_JSON)
 
-/* COLUMN(row, "ns_p5", time.ns.p5, "%8.1f", "5 %") of struct row. */
+/* COLUMN(row, "ns_p5", time.ns.p5) of struct row. */
 #define COLUMN(row, key_, member, ...)                              \
 	{                                                           \
 		.key = key_, BENCH_MEMBER(row, member), __VA_ARGS__ \
 	}
 
-/* QUANTILES(row, "ns", time, "%8.1f"): the median, and the 5th and 95th percentile, of a harness_time. */
-#define QUANTILES(row, key_, member, format_, ...)                                  \
-	COLUMN(row, key_, member.ns.median, format_, key_, __VA_ARGS__),            \
-		COLUMN(row, key_ "_p5", member.ns.p5, format_, "5 %", __VA_ARGS__), \
-		COLUMN(row, key_ "_p95", member.ns.p95, format_, "95 %", __VA_ARGS__)
+/* QUANTILES(row, "ns", time): the median, and the 5th and 95th percentile, of a harness_time. */
+#define QUANTILES(row, key_, member)                                                \
+	COLUMN(row, key_, member.ns.median), COLUMN(row, key_ "_p5", member.ns.p5), \
+		COLUMN(row, key_ "_p95", member.ns.p95)
 
 /* A metric of each row. Its name is a template of keys, "{name}, {drift_ppm:%+g} ppm". */
 struct bench_metric {
@@ -77,7 +72,6 @@ struct bench_metric {
 	size_t offset; /* struct harness_time, struct harness_spread or double */
 	const char *unit, *name;
 	const char *where; /* rows with "KEY=TEXT,KEY!=TEXT|TEXT"; NULL: all */
-	bool more_is_better;
 };
 
 #define METRIC(kind_, row, member, ...)                                         \
@@ -89,12 +83,10 @@ struct bench_metric {
 #define BENCH_COLUMNS 32
 #define BENCH_METRICS 8
 
-/* A column "failed" has the reason why a row failed; with @failed_after a line of the text
- * ends with it behind so many columns. */
+/* A column "failed" has the reason why a row failed. */
 struct bench_table {
 	const char *key; /* of the list in the JSON, "a.b" leads inwards; NULL: no list */
 	size_t row_bytes;
-	int failed_after;
 	struct bench_column columns[BENCH_COLUMNS];
 	struct bench_metric metrics[BENCH_METRICS];
 };
@@ -112,6 +104,12 @@ struct bench_plot {
 	const char *across; /* a panel of that width for each value of this key */
 	const struct bench_table *data, *more;
 };
+
+/* Loads beside wake-ups; NULL at the end. */
+extern const char *const bench_loads[];
+
+/* As incise haptic asks for it, with the CPU; NULL where it is not granted. */
+struct incise_realtime *bench_realtime(int cpu);
 
 extern const char text_precision_gp[], text_stability_map_gp[];
 
@@ -143,9 +141,9 @@ void stability_integrators(struct bench_run *run);
 
 struct bench_run {
 	const struct bench *bench;
-	bool json, quick, tabs; /* tabs: the text has all columns of the JSON */
-	double seconds;		/* 0: not given */
-	long seed;		/* the same */
+	bool json, quick;
+	double seconds;			   /* 0: not given */
+	long seed;			   /* the same */
 	const char *plot, *load, *against; /* NULL: not given */
 	char **operands;
 	int n_operands;
@@ -165,28 +163,16 @@ struct bench_run {
  * bench_fail() was given. */
 void bench_measure(struct bench_run *run);
 
-/* Machine and build: "cpu", "kernel", "compiler", "vectors"; "cpu; kernel; compiler" for NULL. */
-const char *bench_machine(const struct bench_run *run, const char *key);
-
 /* Members of the JSON, an object of json_pack(). */
 void bench_values(struct bench_run *run, const char *fmt, ...);
 
 /* A member of the JSON; takes the value. */
 void bench_value(struct bench_run *run, const char *key, json_t *value);
 
-/* printf() of the text; nothing with --json. */
-void bench_text(const struct bench_run *run, const char *fmt, ...) INCISE_PRINTF(2, 3);
-
-/* Report rows: as JSON and metrics, for plots, and as a text table. The rows, and their texts
- * and lists, live until the end of the run. */
-void bench_table(struct bench_run *run, const struct bench_table *table, const void *rows,
-		 int n);
-
-/* The same without the text, and the text alone. */
+/* Report rows: as JSON and metrics, and for plots. The rows, and their texts and lists, live until
+ * the end of the run. */
 void bench_rows(struct bench_run *run, const struct bench_table *table, const void *rows,
 		int n);
-void bench_lines(const struct bench_run *run, const struct bench_table *table,
-		 const void *rows, int n);
 
 /* Time rows in turns: run() does so many units. The time is the table's first metric; failed
  * rows are left out. */

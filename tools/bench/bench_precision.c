@@ -69,6 +69,7 @@ struct evaluators {
 struct plain {
 	int n_inputs, n_rules, n_mfs[INPUTS];
 	double centre[INPUTS][MFS], width[INPUTS][MFS];
+	double factor[INPUTS][MFS]; /* -1/(2 width²) */
 	int mf[RULES][INPUTS];
 	double p[RULES][INPUTS + 1];
 };
@@ -87,6 +88,7 @@ static struct plain *plain_new(const struct incise_model *model)
 			const struct incise_mf *mf = incise_model_mf(model, i, k);
 
 			m->width[i][k] = mf->p[0];
+			m->factor[i][k] = -0.5 / (mf->p[0] * mf->p[0]);
 			m->centre[i][k] = mf->p[1];
 		}
 	}
@@ -99,36 +101,11 @@ static struct plain *plain_new(const struct incise_model *model)
 	return m;
 }
 
-/* The model with an exponential per membership function rather than per rule, each input
- * normalised by its largest degree. */
-struct separable {
-	int n_inputs, n_mfs[INPUTS];
-	double centre[INPUTS][MFS], factor[INPUTS][MFS]; /* -1/(2 s²) */
-	double p[RULES][INPUTS + 1];
-};
-
-static struct separable *separable_new(const struct plain *from)
-{
-	struct separable *m = cli_alloc(1, sizeof(*m));
-
-	m->n_inputs = from->n_inputs;
-	for (int i = 0; i < m->n_inputs; i++) {
-		m->n_mfs[i] = from->n_mfs[i];
-		for (int k = 0; k < m->n_mfs[i]; k++) {
-			double s = from->width[i][k];
-
-			m->centre[i][k] = from->centre[i][k];
-			m->factor[i][k] = (-0.5 / (s * s));
-		}
-	}
-	for (int r = 0; r < from->n_rules; r++)
-		for (int i = 0; i <= m->n_inputs; i++)
-			m->p[r][i] = from->p[r][i];
-	return m;
-}
+/* separable_eval(): the model with an exponential per membership function rather than per rule, each
+ * input normalised by its largest degree. */
 
 /* Degrees of one input, the largest about 1; returns their sum. */
-static double degrees(const struct separable *m, int i, double x, double *mu)
+static double degrees(const struct plain *m, int i, double x, double *mu)
 {
 	double largest = -HUGE_VAL, sum = 0;
 
@@ -148,7 +125,7 @@ static double degrees(const struct separable *m, int i, double x, double *mu)
 	return sum;
 }
 
-static double separable_eval(const struct separable *m, const double *x)
+static double separable_eval(const struct plain *m, const double *x)
 {
 	double mu_a[MFS], mu_b[MFS] = {1}, sum = 0, weights;
 	const double(*r)[INPUTS + 1] = m->p;
@@ -394,7 +371,7 @@ static void add_all(struct evaluators *all, const struct incise_model *model,
 	fixed = cli_require(incise_fixed_compile(model, &any, &err), &err);
 	incise_fixed_free(fixed);
 	add(all, floating, run_libm, plain, "double_libm");
-	add(all, floating, run_separable, separable_new(plain), "double_separable");
+	add(all, floating, run_separable, plain, "double_separable");
 	add(all, floating, run_library, model, "double_library");
 	add_fixed(all, model, INCISE_FIXED_DIRECT, 0, 0, "fixed_direct");
 	for (int i = 0; i < N(table_cells); i++)
@@ -487,16 +464,12 @@ static struct incise_model *own_model(struct incise_error *err)
 
 static const struct bench_table rows_table = {
 	.key = "rows",
-	.failed_after = 1,
 	.row_bytes = sizeof(struct row),
-	.columns = {COLUMN(row, "name", name, "%-18s", "evaluator"),
-		    QUANTILES(row, "ns", time, "%8.1f"),
-		    COLUMN(row, "max_error_N", max_error, "%11.3g", "largest / N"),
-		    COLUMN(row, "rms_error_N", rms_error, "%11.3g", "rms / N"),
-		    COLUMN(row, "bound_N", bound, "%11.3g", "bound / N"),
+	.columns = {COLUMN(row, "name", name), QUANTILES(row, "ns", time),
+		    COLUMN(row, "max_error_N", max_error),
+		    COLUMN(row, "rms_error_N", rms_error), COLUMN(row, "bound_N", bound),
 		    COLUMN(row, "size_bytes", size_bytes, .optional = true),
-		    COLUMN(row, "times_fuzzylite", times_reference, "%11.0f",
-			   "x fuzzylite"),
+		    COLUMN(row, "times_fuzzylite", times_reference),
 		    COLUMN(row, "peer", is_reference), COLUMN(row, "failed", failed),
 		    COLUMN(row, "kind", kind, .data = true)},
 	/* The reference's time hangs on where its heap lies: of one build and model it was from 1.7
@@ -505,7 +478,7 @@ static const struct bench_table rows_table = {
 		    METRIC(EXACT, row, max_error, "N", "{name} largest error")},
 };
 
-static void run(struct bench_run *run)
+static void run_precision(struct bench_run *run)
 {
 	struct evaluators *all = cli_alloc(1, sizeof(*all));
 	struct incise_error err = {0};
@@ -535,16 +508,7 @@ static void run(struct bench_run *run)
 		     json_text(incise_model_info(model)->name), "rules",
 		     incise_model_info(model)->n_rules, "points", (int)points.n,
 		     "repeats", repeats, "fuzzylite_version", all->reference_version);
-	bench_text(run,
-		   "model %s, %d rules; errors at %zu points, times of %d runs in turn\n"
-		   "%s; %s; vectors: %s; %s%s%s\n\n",
-		   incise_model_info(model)->name, incise_model_info(model)->n_rules,
-		   points.n, repeats, bench_machine(run, "cpu"),
-		   bench_machine(run, "kernel"), bench_machine(run, "vectors"),
-		   bench_machine(run, "compiler"),
-		   all->reference_version ? "; fuzzylite " : "",
-		   all->reference_version ? all->reference_version : "");
-	bench_table(run, &rows_table, all->row, all->n);
+	bench_rows(run, &rows_table, all->row, all->n);
 }
 
 const struct bench bench_precision = {
@@ -552,7 +516,7 @@ const struct bench bench_precision = {
 	.operands = "[MODEL.fis]",
 	.summary = "error and run time of a model's evaluators",
 	.n_operands = 1,
-	.run = run,
+	.run = run_precision,
 	.plot = {.script = text_precision_gp,
 		 .width = 1000,
 		 .height = 720,

@@ -223,8 +223,7 @@ struct scene {
 	/* Columns of the report; texts with ", " between names, or NULL. */
 	json_t *stages, *left_out, *libraries, *not_mapped, *devices, *files;
 	json_t *difference, *identical;
-	const char *forces; /* "same" */
-	char failed[520];   /* or "" */
+	char failed[520]; /* or "" */
 };
 
 struct scenes {
@@ -466,20 +465,18 @@ static const struct bench_table table = {
 	.row_bytes = sizeof(struct scene),
 	.columns =
 		{
-			COLUMN(scene, "name", name, "%-18s", "scene"),
+			COLUMN(scene, "name", name),
 			COLUMN(scene, "stages", stages),
 			COLUMN(scene, "left_out", left_out),
 			COLUMN(scene, "libraries", libraries),
-			COLUMN(scene, "tick_ns", few.time.ns.median, "%7.1f", "ns"),
-			COLUMN(scene, "full_ns", full.time.ns.median, "%7.1f", "full ns"),
-			COLUMN(scene, "times_cheaper", times_cheaper, "%7.2f", "times"),
-			COLUMN(scene, "plan_memory_KiB", few.memory_KiB, "%9.1f",
-			       "plan KiB"),
-			COLUMN(scene, "process_memory_KiB", process.peak_KiB, "%9.0f",
-			       "proc. KiB", .optional = true),
-			COLUMN(scene, "libraries_mapped", libraries_mapped, "%6.0f",
-			       "libs", .optional = true),
-			COLUMN(scene, NULL, forces, " %s", " forces"),
+			COLUMN(scene, "tick_ns", few.time.ns.median),
+			COLUMN(scene, "full_ns", full.time.ns.median),
+			COLUMN(scene, "times_cheaper", times_cheaper),
+			COLUMN(scene, "plan_memory_KiB", few.memory_KiB),
+			COLUMN(scene, "process_memory_KiB", process.peak_KiB,
+			       .optional = true),
+			COLUMN(scene, "libraries_mapped", libraries_mapped,
+			       .optional = true),
 			COLUMN(scene, "libraries_not_mapped", not_mapped),
 			COLUMN(scene, "devices", devices),
 			COLUMN(scene, "files_open", files),
@@ -555,72 +552,13 @@ static void complete(struct scene *s)
 	s->libraries = joined(process->libraries);
 	s->devices = joined(process->devices);
 	s->files = joined(process->files);
-	s->forces = "-";
 	if (!s->measured)
 		return;
-	s->forces = same ? "same" : "DIFFER";
 	s->identical = json_boolean(same);
 	if (!same)
 		s->difference = json_integer(s->first_difference);
 	s->stages = stages_of(s->few.plan);
 	s->left_out = left_out_of(s->few.plan);
-}
-
-static void print_list(const struct bench_run *run, const char *title, json_t *text)
-{
-	const char *names = json_string_value(text);
-
-	bench_text(run, "  %-9s %s\n", title, names && *names ? names : "none");
-}
-
-/* The stages of a plan, and what its loop's process holds. */
-static void print_details(const struct bench_run *run, const struct scene *s)
-{
-	bench_text(run, "\n%s\n", s->name);
-	print_list(run, "stages", s->stages);
-	print_list(run, "left out", s->left_out);
-	if (!s->libraries)
-		return;
-	print_list(run, "devices", s->devices);
-	print_list(run, "opened", s->files);
-	print_list(run, "libraries", s->libraries);
-	print_list(run, "not these", s->not_mapped);
-}
-
-static void print_notes(const struct bench_run *run, const struct scenes *all)
-{
-	long compared = 0;
-
-	for (int i = 0; i < all->n; i++)
-		compared += all->scene[i].ticks_compared;
-	bench_text(run, "\nforces of %ld ticks compared bit by bit\n", compared);
-	for (int i = 0; i < all->n; i++) {
-		const struct scene *s = &all->scene[i];
-
-		if (*s->failed)
-			bench_text(run, "%s: %s\n", s->name, s->failed);
-		else if (s->measured && s->full.time.ns.low <= s->few.time.ns.high)
-			/* The 95 % intervals of the medians meet. */
-			bench_text(run,
-				   "%s: no significant difference to the full "
-				   "pipeline\n",
-				   s->name);
-	}
-}
-
-static void report(struct bench_run *run, struct scenes *all)
-{
-	for (int i = 0; i < all->n; i++)
-		complete(&all->scene[i]);
-	bench_text(run,
-		   "a tick of each scene, and of the full pipeline, which has all "
-		   "stages\n%s\n\n",
-		   bench_machine(run, NULL));
-	bench_table(run, &table, all->scene, all->n);
-	print_notes(run, all);
-	for (int i = 0; i < all->n; i++)
-		if (all->scene[i].measured)
-			print_details(run, &all->scene[i]);
 }
 
 static void judge(struct bench_run *run, const struct scenes *all)
@@ -658,7 +596,9 @@ static void run_scenes(struct bench_run *run)
 			compare(&all->scene[i]);
 	}
 	time_all(all, run->quick);
-	report(run, all);
+	for (int i = 0; i < all->n; i++)
+		complete(&all->scene[i]);
+	bench_rows(run, &table, all->scene, all->n);
 	judge(run, all);
 }
 

@@ -360,31 +360,26 @@ static void add_references(struct training *t)
 static const struct bench_table rows_table = {
 	.key = "rows",
 	.row_bytes = sizeof(struct row),
-	.failed_after = 1,
-	.columns = {COLUMN(row, "name", name, "%-16s", "method"),
-		    COLUMN(row, "epochs", epochs, "%6.0f", "epochs", .optional = true),
+	.columns = {COLUMN(row, "name", name),
+		    COLUMN(row, "epochs", epochs, .optional = true),
 		    COLUMN(row, "rules", rules, .optional = true),
-		    COLUMN(row, "ms", time.ns.median, "%10.3g", "median ms", 1e-6),
-		    COLUMN(row, "ms_min", time.ns.min, "%9.3g", "least", 1e-6),
-		    COLUMN(row, "ms_max", time.ns.max, "%9.3g", "most", 1e-6),
+		    COLUMN(row, "ms", time.ns.median, .scale = 1e-6),
+		    COLUMN(row, "ms_min", time.ns.min, .scale = 1e-6),
+		    COLUMN(row, "ms_max", time.ns.max, .scale = 1e-6),
 		    COLUMN(row, "seconds", time.ns.median, .scale = 1e-9),
-		    COLUMN(row, "rms_error_N", spread[NORM_RMSE].median, "%10.4f",
-			   "rmse / N"),
-		    COLUMN(row, "rms_error_N_min", spread[NORM_RMSE].min, "  (%6.4f", ""),
-		    COLUMN(row, "rms_error_N_max", spread[NORM_RMSE].max, "to %6.4f)",
-			   ""),
-		    COLUMN(row, "max_error_N", spread[NORM_MAX].median, "%10.4f",
-			   "largest/N"),
+		    COLUMN(row, "rms_error_N", spread[NORM_RMSE].median),
+		    COLUMN(row, "rms_error_N_min", spread[NORM_RMSE].min),
+		    COLUMN(row, "rms_error_N_max", spread[NORM_RMSE].max),
+		    COLUMN(row, "max_error_N", spread[NORM_MAX].median),
 		    COLUMN(row, "max_error_N_max", spread[NORM_MAX].max),
-		    COLUMN(row, "mean_abs_error_N", spread[NORM_MEAN].median, "%10.4f",
-			   "mean |.|/N"),
+		    COLUMN(row, "mean_abs_error_N", spread[NORM_MEAN].median),
 		    COLUMN(row, "peer", is_reference), COLUMN(row, "failed", failed)},
 	.metrics = {METRIC(TIME, row, time, "ms", "{name}", "peer=0"),
 		    METRIC(EXACT, row, spread[NORM_RMSE].median, "N",
 			   "{name} error on unseen cuts", "peer=0")},
 };
 
-static void run(struct bench_run *run)
+static void run_training(struct bench_run *run)
 {
 	struct training *t = cli_alloc(1, sizeof(*t));
 
@@ -409,16 +404,11 @@ static void run(struct bench_run *run)
 	}
 	bench_values(run, "{si si si si}", "pairs", PAIRS, "epochs", EPOCHS, "repeats",
 		     t->repeats, "seeds", t->seeds);
-	bench_text(run,
-		   "%s\n%d pairs of 12 cuts, 20 unseen cuts whose force is exact; "
-		   "errors: median of %d data sets (5 to 95 %%), times: of %d runs in "
-		   "turn\n",
-		   bench_machine(run, "cpu"), PAIRS, t->seeds, t->repeats);
-	bench_table(run, &rows_table, t->row, t->n);
+	bench_rows(run, &rows_table, t->row, t->n);
 }
 
 const struct bench bench_training = {
 	.name = "training",
 	.summary = "error on unseen cuts over the training time",
-	.run = run,
+	.run = run_training,
 };

@@ -9,6 +9,7 @@
 #include <string.h>
 #include "../../lib/base/ascending.h"
 #include "../cli/cli.h"
+#include "../cli/machine.h"
 #include "harness.h"
 #include "../cli/stopwatch.h"
 
@@ -91,19 +92,6 @@ static double workload_ns(enum workload workload)
 }
 
 /* --- medians and their intervals --- */
-
-int harness_cpu(void)
-{
-	cpu_set_t set;
-	int last = 0;
-
-	if (sched_getaffinity(0, sizeof(set), &set))
-		return 0;
-	for (int i = 0; i < CPU_SETSIZE; i++)
-		if (CPU_ISSET(i, &set))
-			last = i;
-	return last;
-}
 
 /* Rank from below of a 95 % interval of the median of n < 24: the largest k for which less
  * than 2.5 % of all orders have k values or fewer on one side. */
@@ -212,7 +200,7 @@ static bool pin(cpu_set_t *before)
 	if (sched_getaffinity(0, sizeof(*before), before))
 		return false;
 	CPU_ZERO(&one);
-	CPU_SET(harness_cpu(), &one);
+	CPU_SET(machine_cpu(), &one);
 	return !sched_setaffinity(0, sizeof(one), &one);
 }
 

@@ -62,8 +62,4 @@ void harness_time_of(const double *ns, int n, struct harness_time *time);
  * largest. */
 void harness_spread(const double *values, int n, struct harness_spread *spread);
 
-/* The processor that variants are timed on: the last one, as interrupts are more often the
- * first one's. */
-int harness_cpu(void);
-
 #endif

@@ -40,20 +40,16 @@ static double unit_ns(const char *unit)
 }
 
 /* "PREFIX_low" and "PREFIX_high", or "low" and "high" alone. */
-static void interval_keys(const char *prefix, char low[40], char high[40])
-{
-	snprintf(low, 40, "%s%slow", prefix, *prefix ? "_" : "");
-	snprintf(high, 40, "%s%shigh", prefix, *prefix ? "_" : "");
-}
-
 static void set_interval(json_t *metric, const char *prefix, double k,
 			 const struct harness_spread *spread)
 {
-	char low[40], high[40];
+	const char *gap = *prefix ? "_" : "";
+	char key[40];
 
-	interval_keys(prefix, low, high);
-	json_set_number(metric, low, k * spread->low);
-	json_set_number(metric, high, k * spread->high);
+	snprintf(key, sizeof(key), "%s%slow", prefix, gap);
+	json_set_number(metric, key, k * spread->low);
+	snprintf(key, sizeof(key), "%s%shigh", prefix, gap);
+	json_set_number(metric, key, k * spread->high);
 }
 
 json_t *metrics_add(json_t *metrics, enum metric_kind kind, const void *value,

@@ -302,14 +302,11 @@ static void measure_stability_integrators(bool quick)
 static const struct bench_table stability_integrator_table = {
 	.key = "integrators",
 	.row_bytes = sizeof(struct row),
-	.failed_after = 3,
-	.columns = {COLUMN(row, "integrator", name, "%21s", "integrator"),
-		    COLUMN(row, "K_N_m", K_N_m, "%9g", "N/m"),
-		    COLUMN(row, "step_s", step_s, "%9.3g", "step, s"),
-		    COLUMN(row, "max_error", max_error, "%9.2g", "largest"),
-		    COLUMN(row, "rms_error", rms_error, "%9.2g", "rms"),
-		    COLUMN(row, "ns_per_step", ns_per_step, "%9.1f", "ns/step"),
-		    COLUMN(row, "ns_per_ms", time.ns.median, "%11.1f", "ns/ms"),
+	.columns = {COLUMN(row, "integrator", name), COLUMN(row, "K_N_m", K_N_m),
+		    COLUMN(row, "step_s", step_s), COLUMN(row, "max_error", max_error),
+		    COLUMN(row, "rms_error", rms_error),
+		    COLUMN(row, "ns_per_step", ns_per_step),
+		    COLUMN(row, "ns_per_ms", time.ns.median),
 		    COLUMN(row, "ns_per_ms_p5", time.ns.p5),
 		    COLUMN(row, "ns_per_ms_p95", time.ns.p95),
 		    COLUMN(row, "failed", failed)},
@@ -326,12 +323,7 @@ void stability_integrators(struct bench_run *run)
 	int missed = 0;
 
 	measure_stability_integrators(run->quick);
-	bench_text(
-		run,
-		"integrators of a spring: %g kg, damping ratio %g; errors relative to the "
-		"largest displacement\n",
-		DEVICE_KG, DAMPING_RATIO);
-	bench_table(run, &stability_integrator_table, rows, n_rows);
+	bench_rows(run, &stability_integrator_table, rows, n_rows);
 	for (int i = 0; i < n_rows; i++)
 		missed += rows[i].integrator->exact && !(rows[i].max_error <= EXACT);
 	if (missed)

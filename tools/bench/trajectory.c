@@ -5,7 +5,7 @@
 #include <math.h>
 #include "../../lib/base/vector.h"
 #include "../cli/cli.h"
-#include "stroke.h"
+#include "../plan/stroke.h"
 #include "trajectory.h"
 
 #define NS 1e-9

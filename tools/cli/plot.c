@@ -241,7 +241,8 @@ void plot_put_label(FILE *script, const char *name)
 {
 	static const struct {
 		const char *suffix, *unit;
-	} units[] = {{"_mm_s", "(mm/s)"}, {"_mm", "mm"}, {"_N", "N"}, {"_s", "s"}};
+	} units[] = {{"_mm_s", "(mm/s)"}, {"_mm", "mm"}, {"_deg_s", "(°/s)"},
+		     {"_deg", "°"},	  {"_N", "N"},	 {"_s", "s"}};
 	size_t n = strlen(name);
 	const char *unit = NULL;
 	char *text;

@@ -33,7 +33,8 @@ char *report_script_path(const char *name)
 int report_script(const char *what, const char *folder, const json_t *data, FILE *out,
 		  struct incise_error *err)
 {
-	char *script = report_script_path(strcmp(what, "compare") ? "report" : what);
+	bool own = !strcmp(what, "compare") || !strcmp(what, "tables");
+	char *script = report_script_path(own ? what : "report");
 	char *const argv[] = {REPORT_PYTHON, "-B",	     script,
 			      (char *)what,  (char *)folder, NULL};
 	struct memory_file in = memory_file_begin("page"),

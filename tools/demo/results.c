@@ -347,6 +347,9 @@ static void write_pairs(const struct demo *demo)
 
 /* ---- Figure 5: predicted, rendered and measured force of a cut never seen ---- */
 
+#define CLOSE_FROM_S 4.0 /* of the cut, seen close */
+#define CLOSE_S 0.5
+
 static void figure_prediction(const struct demo *demo)
 {
 	static const char *const ticks[] = {"t_s", "depth_mm", "command_N", "rendered_N"};
@@ -354,6 +357,9 @@ static void figure_prediction(const struct demo *demo)
 	/* The ticks of a replay that are in its cut. */
 	struct incise_dataset *cut =
 		read_dataset(demo, "new-cut-replay.csv", columns, 3, NULL, "cut");
+	/* The same ticks. */
+	struct incise_dataset *felt =
+		read_dataset(demo, "new-cut-texture.csv", columns, 3, NULL, "cut");
 	struct incise_dataset *log =
 		read_dataset(demo, "haptic.csv", ticks, 4, NULL, NULL);
 	FILE *data = plot_data(demo->folder, "prediction.dat");
@@ -364,7 +370,8 @@ static void figure_prediction(const struct demo *demo)
 		const double *row = incise_dataset_row(cut, i);
 
 		duration_s = row[0] - incise_dataset_row(cut, 0)[0];
-		fprintf(data, "%.4f %.5f %.5f\n", duration_s, row[1], row[2]);
+		fprintf(data, "%.4f %.5f %.5f %.5f\n", duration_s, row[1], row[2],
+			incise_dataset_row(felt, i)[2]);
 	}
 	plot_data_end(data, demo->folder);
 	/* Both begin where the blade meets the tissue. */
@@ -382,30 +389,36 @@ static void figure_prediction(const struct demo *demo)
 	if (contact < 0)
 		fputs("0 0 0\n", data);
 	plot_data_end(data, demo->folder);
-	script = plot_begin(demo->folder, "fig5-prediction", 1000, 740);
+	script = plot_begin(demo->folder, "fig5-prediction", 1000, 1100);
 	/* One time axis: that of the cut, whatever the loop ran on for. */
 	fprintf(script,
-		"layout = panels(80, 20, below(1), above(1), 0, between)\n"
-		"set multiplot layout 2,1 @layout "
+		"layout = panels(80, 20, below(2), above(1), 0, between)\n"
+		"set multiplot layout 3,1 @layout "
 		"title 'New cut at 5 mm (compare figure 5 of Song et al., 2006)'\n"
 		"set xlabel 'time in the cut / s'\nset ylabel 'force / N'\nset key off\n"
 		"set xrange [0:%.4f]\nset yrange [0:*]\nset ytics 0.1\n"
-		"set title '(a) measured, and predicted by the model'\n"
+		"set title '(a) measured, and predicted by the model: the mean'\n"
 		"plot 'prediction.dat' using 1:2 with lines lc rgb grey lw 0.8, \\\n"
 		"  '' using 1:3 with lines lt 2\n"
-		"set title '(b) measured, and rendered by the haptic loop'\n"
+		"set title '(b) measured, and rendered by the haptic loop with texture'\n"
 		"plot 'prediction.dat' using 1:2 with lines lc rgb grey lw 0.8, \\\n"
-		"  'rendered.dat' using 1:3 with lines lt 3 lw 2.5, \\\n"
-		"  '' using 1:2 with lines lc rgb ink dt 2 lw 1\n"
+		"  'rendered.dat' using 1:3 with lines lt 3 lw 1.5, \\\n"
+		"  '' using 1:2 with lines lc rgb ink dt 2 lw 0.5\n"
+		"set xrange [%g:%g]\n"
+		"set title '(c) the same poses for all, seen close'\n"
+		"plot 'prediction.dat' using 1:2 with lines lc rgb grey lw 1.5, \\\n"
+		"  '' using 1:3 with lines lt 2, '' using 1:4 with lines lt 1\n"
 		"eval key_panel\n"
 		"plot NaN with lines lc rgb grey lw 0.8 title 'measured', \\\n"
-		"  NaN with lines lt 2 title 'predicted', \\\n"
+		"  NaN with lines lt 2 title 'predicted mean', \\\n"
+		"  NaN with lines lt 1 title 'rendered with texture', \\\n"
 		"  NaN with lines lt 3 lw 2.5 title 'force on the hand', \\\n"
 		"  NaN with lines lc rgb ink dt 2 lw 1 title 'commanded force'\n"
 		"unset multiplot\n",
-		duration_s);
+		duration_s, CLOSE_FROM_S, CLOSE_FROM_S + CLOSE_S);
 	draw_results(demo, script, "fig5-prediction");
 	incise_dataset_free(cut);
+	incise_dataset_free(felt);
 	incise_dataset_free(log);
 }
 

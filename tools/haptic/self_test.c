@@ -5,7 +5,7 @@
 #include <errno.h>
 #include <math.h>
 #include "../../lib/base/vector.h"
-#include "../bench/stroke.h"
+#include "../plan/stroke.h"
 #include "haptic.h"
 
 #define STROKE_S 0.6

@@ -174,14 +174,14 @@ static struct incise_uncertainty *uncertainty_of(const char *path,
 	return uncertainty;
 }
 
-/* Input, output, half the 95 % interval of a new cut and of the mean of all cuts; false: it has none. */
-static bool write_band(const struct incise_model *model,
-		       const struct incise_uncertainty *uncertainty, int input,
-		       const char *folder, const char *name)
+/* Input, output, half the 95 % interval of a new cut and of the mean of all cuts. Returns the last parts. */
+static struct incise_uncertainty_parts write_band(
+	const struct incise_model *model, const struct incise_uncertainty *uncertainty,
+	int input, const char *folder, const char *name)
 {
 	const struct incise_model_info *info = incise_model_info(model);
 	FILE *data = plot_data(folder, name);
-	struct incise_uncertainty_parts u;
+	struct incise_uncertainty_parts u = {0};
 	double x[INCISE_MODEL_INPUTS_MAX];
 
 	for (int i = 0; i < info->n_inputs; i++)
@@ -196,29 +196,33 @@ static bool write_band(const struct incise_model *model,
 			INCISE_INTERVAL95 * u.mean);
 	}
 	plot_data_end(data, folder);
-	return !isnan(u.mean);
+	return u;
 }
 
 static const char mean_band[] =
 	"'' using 1:($2-$4):($2+$4) with filledcurves lc rgb blue fs transparent solid 0.4 "
 	"noborder title 'the mean of all cuts', \\\n  ";
 
-/* Over one of the inputs; the others are at the middle of their support. @mean: it has a band. */
+/* Over one of the inputs; the others are at the middle of their support. @u: parts of the sd anywhere. */
 static void put_band(struct model_grid *grid, const struct model_surface *surface,
-		     int input, int columns, bool mean)
+		     int input, int columns, const struct incise_uncertainty_parts *u)
 {
 	place_model_plot(grid, input, columns, BAND_HEIGHT);
-	fputs("set key inside top left\nset xrange [*:*]\nset yrange [*:*]\n"
-	      "set title '95 % intervals'\nset xlabel ",
-	      grid->script);
+	fprintf(grid->script,
+		"set key outside bottom center horizontal\nset xrange [%.9g:%.9g]\n"
+		"set yrange [*:*]\nset title '95 %% intervals%s'\nset xlabel ",
+		surface->input[input].min, surface->input[input].max,
+		surface->n_inputs > 1 ? "; other inputs at the middle of their support"
+				      : "");
 	plot_put_label(grid->script, surface->input[input].name);
 	fputs("\nset ylabel ", grid->script);
 	plot_put_label(grid->script, surface->output.name);
 	fprintf(grid->script,
 		"\nplot '%s' using 1:($2-$3):($2+$3) with filledcurves lc rgb blue fs "
-		"transparent solid 0.2 noborder title 'a new cut on a new rig', \\\n  "
+		"transparent solid 0.2 noborder title 'a new cut%s', \\\n  "
 		"%s'' using 1:2 with lines lc rgb ink title 'output'\n",
-		grid->bands[input], mean ? mean_band : "");
+		grid->bands[input], u->rig > 0 ? " on a new rig" : "",
+		isnan(u->mean) ? "" : mean_band);
 }
 
 /* --- the figure -------------------------------------------------------------------------- */
@@ -252,7 +256,7 @@ static FILE *draw_model(const struct figure *figure, const struct model_surface 
 	int n = model ? surface->n_inputs : 0, columns = n > 1 ? 2 : 1;
 	int rows = (n + columns - 1) / columns;
 	int bands = uncertainty ? columns : 0;
-	bool mean = false;
+	struct incise_uncertainty_parts u = {0};
 	struct residuals residuals = {0};
 	struct model_grid grid = {
 		.height = rows * FUNCTIONS_HEIGHT + SURFACE_HEIGHT +
@@ -275,7 +279,7 @@ static FILE *draw_model(const struct figure *figure, const struct model_surface 
 		model_plot_write_functions(model, figure->folder, grid.functions);
 	model_plot_write_surface(surface, figure->folder, grid.surface);
 	for (int i = 0; i < bands; i++)
-		mean = write_band(model, uncertainty, i, figure->folder, grid.bands[i]);
+		u = write_band(model, uncertainty, i, figure->folder, grid.bands[i]);
 	grid.script = plot_begin(figure->folder, figure->name, FIGURE_WIDTH, grid.height);
 	fputs("set multiplot\nset key outside right center\n", grid.script);
 	for (int i = 0; i < n; i++) {
@@ -286,7 +290,7 @@ static FILE *draw_model(const struct figure *figure, const struct model_surface 
 		grid.top += FUNCTIONS_HEIGHT;
 	put_surface(&grid, surface);
 	for (int i = 0; i < bands; i++)
-		put_band(&grid, surface, i, bands, mean);
+		put_band(&grid, surface, i, bands, &u);
 	if (figure->data)
 		put_residuals(&grid, surface, &residuals);
 	fputs("unset multiplot\n", grid.script);

@@ -211,7 +211,8 @@ INCISE_API int incise_train_factors(const char *const *paths, int n, double ridg
  * @param options progress and seed
  * @param realism measured on the cuts that are held out; or NULL
  * @return texture, to be freed with incise_texture_free(); NULL with errno EINVAL (no such input or column,
- *         rows that are means or out of order), ENODATA (too few events), ECANCELED (by the progress),
+ *         rows that are means or out of order), ENODATA (too few events), EDOM (none is better
+ *         than the model alone, which realism is of then), ECANCELED (by the progress),
  *         ENOMEM, or one of the sources
  */
 INCISE_API struct incise_texture *incise_train_texture(
@@ -241,8 +242,9 @@ struct incise_corpus_survey {
 	int n_groups;
 	struct incise_corpus_group *groups; /**< in order of appearance */
 	double min[INCISE_MODEL_INPUTS_MAX + 1], max[INCISE_MODEL_INPUTS_MAX + 1];
-	char name[200];	 /**< for messages; cut to this length */
-	char group[256]; /**< of all its rows; "": the text of each row */
+	char name[200];	      /**< for messages; cut to this length */
+	char group[256];      /**< of all its rows; "": the text of each row */
+	unsigned int missing; /**< bit i: rows have no number in further input i */
 };
 
 /** Number of sources. */

@@ -97,7 +97,7 @@ struct incise_haptic_ages {
 	uint64_t ticks, lost;
 	double assumed_ms;		    /**< by the plan: latency and period */
 	double mean_ms, most_ms, jitter_ms; /**< jitter: standard deviation */
-	/** How often the device's owner has taken the force away though the loop asked for one; 0 without owner. */
+	/** Times that the device's owner took the force away though the loop asked for one; 0 without owner. */
 	unsigned int cuts;
 	/** Reason of the last time, as the state in the log of incise device; or "" */
 	char last_cut[INCISE_HAPTIC_CUT_MAX];

@@ -72,8 +72,8 @@ INCISE_API int incise_uncertainty_save(const struct incise_uncertainty *uncertai
 INCISE_API void incise_uncertainty_free(struct incise_uncertainty *uncertainty);
 
 /**
- * How the noise depends on the inputs: noise(x) = noise·exp(offset + Σ slope·u), with u of each
- * input 0 up to low and 1 from high on. All 0: it does not.
+ * The noise by the inputs: noise(x) = noise·exp(offset + Σ slope·u), with u of each input 0 up to
+ * low and 1 from high on. All 0: the noise is the same everywhere.
  */
 struct incise_uncertainty_shape {
 	double offset;

@@ -9,7 +9,6 @@
 #include <sys/wait.h>
 #include <incise/calibration.h>
 #include "../../../lib/base/calibration.c"
-#include "../message.h"
 #include "temp_file.h"
 
 TEST(nominal_is_the_papers)

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /* Errors as values: the code, errno and a single clean line. */
 #include "../unit.h"
-#include <incise/error.h>
 #include <incise/version.h>
 
 TEST(test_code_line_and_errno)

@@ -7,7 +7,6 @@
 #include <pthread.h>
 #include <sys/stat.h>
 #include <incise/infile.h>
-#include "../message.h"
 #include "temp_file.h"
 
 static const struct incise_infile_kind stream = {.name = "a text", .advice = "give one"};

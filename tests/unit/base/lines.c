@@ -2,7 +2,6 @@
 /* lib/base/lines.h: lines without their ends, a NUL byte, errors of file and line. */
 #include "../unit.h"
 #include "../../../lib/base/lines.h"
-#include "../message.h"
 #include "temp_file.h"
 
 static const struct incise_infile_kind text = {.name = "a text", .advice = "give one"};

@@ -8,7 +8,6 @@
 #include <sys/wait.h>
 #include <signal.h>
 #include <incise/outfile.h>
-#include "../message.h"
 
 static char folder[] = "/tmp/incise-outfile-XXXXXX";
 static char path[64];

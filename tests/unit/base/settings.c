@@ -6,7 +6,6 @@
 #include "../unit.h"
 #include "../../../lib/base/random.h"
 #include "../../../lib/base/settings.h"
-#include "../message.h"
 #include "temp_file.h"
 
 struct content {

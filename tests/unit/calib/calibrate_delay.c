@@ -9,7 +9,6 @@
 #include <incise/calibrate_delay.h>
 #include "../../../lib/calib/calibrate_delay.c"
 #include "../cases.h"
-#include "../message.h"
 #include "draws.h"
 
 #define MOTION_MAX 20000

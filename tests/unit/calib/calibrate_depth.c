@@ -6,7 +6,6 @@
 #include "../unit.h"
 #include <incise/calibrate_depth.h>
 #include "../../../lib/calib/calibrate_depth.c"
-#include "../message.h"
 #include "draws.h"
 
 #define RIGS 2000

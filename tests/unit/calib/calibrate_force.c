@@ -6,7 +6,6 @@
 #include "../unit.h"
 #include <incise/calibrate_force.h>
 #include "../../../lib/base/random.h"
-#include "../message.h"
 
 #define MAX 64
 

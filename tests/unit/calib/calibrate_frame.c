@@ -7,7 +7,6 @@
 #include <incise/calibrate_frame.h>
 #include <incise/calibration.h>
 #include "../../../lib/base/vector.h"
-#include "../message.h"
 #include "../cases.h"
 #include "draws.h"
 

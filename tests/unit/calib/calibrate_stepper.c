@@ -8,7 +8,6 @@
 #include <incise/calibrate_stepper.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/calib/calibrate_stepper.c"
-#include "../message.h"
 
 #define STEP_MM 0.000625
 #define POINTS_MAX 2000

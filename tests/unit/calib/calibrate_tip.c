@@ -6,7 +6,6 @@
 #include "../unit.h"
 #include <incise/calibrate_tip.h>
 #include "../../../lib/base/vector.h"
-#include "../message.h"
 #include "../cases.h"
 #include "draws.h"
 

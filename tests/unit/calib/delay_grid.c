@@ -5,7 +5,6 @@
  */
 #include "../unit.h"
 #include "../../../lib/calib/delay_grid.h"
-#include "../message.h"
 
 #define SPAN_S 12
 #define SLOW (SPAN_S * 100)   /* each 10 ms: cubics */

@@ -3,7 +3,6 @@
 #include "../unit.h"
 #include <incise/redundancy.h>
 #include "../../../lib/base/random.h"
-#include "../message.h"
 
 #define PAIRS 1000
 

@@ -12,7 +12,6 @@
 static _Atomic int64_t clock_ns;
 #define incise_monotonic_ns() atomic_load(&clock_ns)
 #include "../../../lib/device/daq/comedi_force.c"
-#include "../message.h"
 #include "card.h"
 #include "found.h"
 

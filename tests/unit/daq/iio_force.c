@@ -7,7 +7,6 @@
 #include "../unit.h"
 #include <dirent.h>
 #include "../../../lib/device/daq/iio_force.c"
-#include "../message.h"
 #include "converter.h"
 #include "found.h"
 

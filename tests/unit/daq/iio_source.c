@@ -9,7 +9,6 @@
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include "../../../lib/device/daq/iio_source.c"
-#include "../message.h"
 #include "converter.h"
 
 /* --- format --- */

@@ -7,7 +7,6 @@
 #include <libavcodec/avcodec.h>
 #include <libavformat/avformat.h>
 #include "../../../lib/view/film.h"
-#include "../message.h"
 
 #define W 64
 #define H 48

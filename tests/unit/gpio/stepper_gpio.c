@@ -10,7 +10,6 @@
 #include <time.h>
 #include "../../../lib/rig/backends.h"
 #include "../../../lib/device/gpio/gpio_lines.h"
-#include "../message.h"
 
 extern const struct incise_backend incise_stepper_gpio;
 

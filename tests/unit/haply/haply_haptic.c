@@ -3,16 +3,9 @@
  * lib/device/haply/haply_haptic.c against tests/haply/emulator.py, a service of its own, in real time: each
  * test waits for what it needs to see. Late answers are of simulated time.
  */
-#include <errno.h>
 #include <locale.h>
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/wait.h>
-#include <unistd.h>
 #include <jansson.h>
-#include "../message.h"
 #include "../unit.h"
 #include "../../../lib/base/monotonic.h"
 #include "../../../lib/base/vector.h"

@@ -11,7 +11,6 @@
 #include <time.h>
 #include "../../../lib/rig/backends.h"
 #include "../../../lib/rig/motor.h"
-#include "../message.h"
 #include "../rig/conformance.h"
 #include "../rig/machine.h"
 

@@ -6,7 +6,6 @@
 #include "../unit.h"
 #include "../../../lib/learn/corpus.c"
 #include "../cases.h"
-#include "../message.h"
 
 #define SOURCES 3
 
@@ -134,7 +133,7 @@ TEST(test_division)
 struct table {
 	struct incise_corpus_source source;
 	char hash[65];
-	double rows[400][3];
+	double rows[400][5]; /* the last two are further inputs */
 	int group[400], n;
 };
 
@@ -260,6 +259,44 @@ TEST(test_estimated_different)
 	assert_int_equal(side->sample.pairs.n, 1000);
 	assert_in_range(side->different, 2600 * 87 / 100, 2600 * 113 / 100);
 	incise_corpus_free(corpus);
+}
+
+/*
+ * A gap of a further input anywhere, in the sample of 20 rows or not, held out or not, leaves that
+ * input out; also in surveys of another process.
+ */
+TEST(test_gap_of_a_further_input)
+{
+	static struct table table;
+
+	for (int gap = -1; gap < 400; gap += 1 + 400 / cases_of(401, 40)) {
+		struct incise_corpus *corpus = incise_corpus_new(2, true, 1, 20);
+		struct incise_corpus *other = incise_corpus_new(2, true, 1, 20);
+		size_t size;
+		void *bytes;
+
+		make_table(&table, 0);
+		for (table.n = 0; table.n < 400; table.n++) {
+			memcpy(table.rows[table.n],
+			       (double[]){table.n, 1, 1, 1, table.n == gap ? NAN : 1},
+			       sizeof(*table.rows));
+			table.group[table.n] = table.n / 40;
+		}
+		incise_corpus_keep(corpus, 3, 2);
+		assert_int_equal(incise_corpus_survey(corpus, &table.source, &err), 0);
+		bytes = incise_corpus_encode(corpus, &size);
+		assert_int_equal(incise_corpus_add(other, bytes, size, &err), 0);
+		incise_corpus_free(corpus);
+		assert_int_equal(incise_corpus_settle(other, 0.3, &err), 0);
+		for (int i = 0; i < 2; i++) {
+			double *extended = incise_corpus_extend(other, i);
+
+			assert_int_equal(!extended, i == 1 && gap >= 0);
+			free(extended);
+		}
+		free(bytes);
+		incise_corpus_free(other);
+	}
 }
 
 /* Another value, another order or another group in the second reading is an error. */

@@ -140,7 +140,7 @@ TEST(test_ratios)
 	incise_folds_free(&folds);
 }
 
-/* What bends keeps rules apart; a line under noise ends as a plane, noise alone as the mean. */
+/* A curve keeps rules apart; a line under noise ends as a plane, noise alone as the mean. */
 TEST(test_choice)
 {
 	static double other[PAIRS * 2];

@@ -3,7 +3,6 @@
 #include "../unit.h"
 /* before cmocka.h, which has a macro fail() */
 #include "../../../lib/learn/dataset.c"
-#include "../message.h"
 #include "../base/temp_file.h"
 
 static const char *const columns[] = {"force_N", "depth_mm"};

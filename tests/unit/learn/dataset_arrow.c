@@ -6,7 +6,6 @@
 #include "../unit.h"
 #include <incise/arrow.h>
 #include <incise/dataset.h>
-#include "../message.h"
 
 #define COLUMNS 4
 #define BATCHES 2

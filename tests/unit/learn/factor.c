@@ -5,12 +5,10 @@
  * of the same rows.
  */
 #include "../unit.h"
-#include <unistd.h>
 #include "../../../lib/learn/factor.h"
 #include "../../../lib/base/random.h"
 #include "../../../lib/learn/design.h"
 #include "../cases.h"
-#include "../message.h"
 
 #define ROWS 3000
 

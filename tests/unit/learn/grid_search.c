@@ -3,7 +3,6 @@
 #include "../unit.h"
 #include <incise/train.h>
 #include "../../../lib/base/random.h"
-#include "../message.h"
 
 static double rows[400 * 3];
 

@@ -6,7 +6,6 @@
 #include "../unit.h"
 #include <float.h>
 #include "../../../lib/learn/pairs.h"
-#include "../message.h"
 #include "../model/paper_model.h"
 
 /* Outputs of any size come out with mean 0 and variance 1. */

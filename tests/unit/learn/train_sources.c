@@ -10,7 +10,6 @@
 #include <incise/corpus.h>
 #include "../../../lib/base/random.h"
 #include "../cases.h"
-#include "../message.h"
 
 #define SOURCES 3
 #define RANKS 3

@@ -8,7 +8,6 @@
 #include <time.h>
 #include "../../../lib/loop/loop_control.h"
 #include <incise/loop.h>
-#include "../message.h"
 #include "../scene/felt.h"
 
 static struct incise_loop_stats stats;

@@ -16,7 +16,6 @@
 #include <sys/wait.h>
 #include <time.h>
 #include "../../../lib/loop/realtime.h"
-#include "../message.h"
 #include "root_folder.h"
 
 #if defined(__SANITIZE_ADDRESS__)

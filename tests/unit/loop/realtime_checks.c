@@ -4,7 +4,6 @@
  */
 #include "../unit.h"
 #include "../../../lib/loop/realtime.h"
-#include "../message.h"
 #include "root_folder.h"
 
 #define CPUS "/sys/devices/system/cpu/"

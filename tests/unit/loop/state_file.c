@@ -6,7 +6,6 @@
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include "../../../lib/loop/state_file.h"
-#include "../message.h"
 #include "state_made.h"
 
 static void put(const char *path, const char *text)

@@ -10,7 +10,6 @@
 #include <stdatomic.h>
 #include <sys/stat.h>
 #include "../../../lib/base/random.h"
-#include "../message.h"
 #include "state_made.h"
 
 static struct incise_state_now now;

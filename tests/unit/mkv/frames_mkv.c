@@ -14,7 +14,6 @@
 #include "../../../lib/base/crypto/sha256.h"
 #include "../../../lib/record/frames.h"
 #include "../../../lib/record/write/frame_pump.h"
-#include "../message.h"
 
 #define ROOM (1 << 20)
 #define MS 1000000LL

@@ -9,7 +9,6 @@
 #include <incise/fixed.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/model/model.h"
-#include "../message.h"
 #include "paper_model.h"
 #include "../cases.h"
 

@@ -2,12 +2,6 @@
 /*
  * Compiling: the cheapest arithmetic within the budget, refusals, and files.
  */
-#include <errno.h>
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
-#include "../message.h"
 #include "../unit.h"
 #include "../base/temp_file.h"
 #include "../fixed/compiled.h"

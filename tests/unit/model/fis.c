@@ -4,7 +4,6 @@
 #include <locale.h>
 #include <float.h>
 #include "../cases.h"
-#include "../message.h"
 #include "any_model.h"
 #include "every_kind.h"
 

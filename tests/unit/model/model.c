@@ -5,7 +5,6 @@
 #include "../unit.h"
 #include <float.h>
 #include "../cases.h"
-#include "../message.h"
 #include "any_model.h"
 
 /*

@@ -4,13 +4,8 @@
  * they enclose, checked against long double and differences; certified bounds are never below
  * an error that is found, and not uselessly far above.
  */
-#include <errno.h>
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
 #include "../../../lib/model/model.h"
 #include "../../../lib/model/model_grid.h"
-#include "../message.h"
 #include "../unit.h"
 #include "../fixed/compiled.h"
 #include "paper_model.h"

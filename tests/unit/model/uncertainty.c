@@ -4,7 +4,6 @@
  */
 #include "../unit.h"
 #include <incise/uncertainty.h>
-#include "../message.h"
 #include "paper_model.h"
 
 #define N 60

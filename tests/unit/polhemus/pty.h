@@ -13,8 +13,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
+#include "../../clock.h"
 #include "../../polhemus/emulator.h"
 
 struct pty {
@@ -27,14 +27,6 @@ struct pty {
 	_Atomic bool deaf;	      /* sends nothing either */
 	const char *_Atomic injected; /* bytes that reach it without the host; once */
 };
-
-static int64_t pty_now_ns(void)
-{
-	struct timespec ts;
-
-	clock_gettime(CLOCK_MONOTONIC, &ts);
-	return ts.tv_sec * INT64_C(1000000000) + ts.tv_nsec;
-}
 
 static void *pty_run(void *argument)
 {
@@ -49,7 +41,7 @@ static void *pty_run(void *argument)
 
 		poll(&waits, 1, 1);
 		n = waits.revents & POLLIN ? read(p->master, bytes, sizeof(bytes)) : 0;
-		emulator_advance(&p->emulator, pty_now_ns());
+		emulator_advance(&p->emulator, now_ns());
 		injected = atomic_exchange(&p->injected, NULL);
 		if (injected)
 			emulator_write(&p->emulator, injected, strlen(injected));
@@ -91,7 +83,7 @@ static inline int pty_begin(struct pty *p, enum emulator_kind kind)
 	if (!mkdtemp(p->folder))
 		return -1;
 	snprintf(p->path, sizeof(p->path), "%s/tty", p->folder);
-	emulator_init(&p->emulator, kind, pty_now_ns());
+	emulator_init(&p->emulator, kind, now_ns());
 	return pty_plug(p);
 }
 

@@ -8,7 +8,6 @@
 #include <stdatomic.h>
 #include <incise/backend.h>
 #include "../../../lib/record/write/frame_pump.h"
-#include "../message.h"
 
 #define SIDE 16
 #define MS 1000000LL

@@ -5,7 +5,6 @@
 #include "../unit.h"
 #include <limits.h>
 #include "../../../lib/record/frames.h"
-#include "../message.h"
 
 static const struct incise_frames_shape shape = {32, 16, INCISE_PIXELS_GREY, 60};
 

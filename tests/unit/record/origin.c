@@ -3,8 +3,6 @@
  * Tests of incise/origin.h: tokens against a table written by hand, found in other bytes and files,
  * and each single change of one.
  */
-#include <errno.h>
-#include <unistd.h>
 #include "../unit.h"
 #include <incise/origin.h>
 

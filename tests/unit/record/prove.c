@@ -6,7 +6,6 @@
 #include <incise/prove.h>
 #include <openssl/sha.h>
 #include <openssl/ts.h>
-#include <unistd.h>
 
 #define SIM "sim:clock=simulated"
 #define DB "a.rec/recording.db"

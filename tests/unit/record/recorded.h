@@ -13,7 +13,6 @@
 #include <incise/rig.h>
 #include <incise/sim.h>
 #include "../../rows_sql.h"
-#include "../message.h"
 #include "../unit.h"
 
 /* All 14 cuts of the paper, but short: 43 s. */

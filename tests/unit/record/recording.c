@@ -8,7 +8,6 @@
 #include <endian.h>
 #include <fcntl.h>
 #include <limits.h>
-#include <stdlib.h>
 #include "../../../lib/record/read/cut.h"
 
 #define DB "a.rec/recording.db"

@@ -4,7 +4,6 @@
  * is refused with its line.
  */
 #include "../unit.h"
-#include "../message.h"
 #include "actuator_text.h"
 #include "../../../lib/rig/motor.h"
 

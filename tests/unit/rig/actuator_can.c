@@ -5,7 +5,6 @@
  */
 #include "../unit.h"
 #include "../../../lib/rig/actuator.h"
-#include "../message.h"
 #include "actuator_text.h"
 
 TEST(defaults_are_those_of_the_manual)

@@ -5,7 +5,6 @@
  */
 #include "../unit.h"
 #include "../../../lib/rig/daq_feed.h"
-#include "../message.h"
 
 static struct daq_feed *feed;
 

@@ -7,7 +7,6 @@
 #include <sys/stat.h>
 #include "../../../lib/rig/encoder.h"
 #include "../../../lib/rig/page.h"
-#include "../message.h"
 
 static char folder[40];
 static struct incise_stepper_motor_status slot;

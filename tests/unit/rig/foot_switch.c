@@ -9,7 +9,6 @@
 #include <sys/ioctl.h>
 #include <sys/stat.h>
 #include <incise/foot_switch.h>
-#include "../message.h"
 
 #define LONG_BITS (8 * sizeof(long))
 

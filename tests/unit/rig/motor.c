@@ -8,7 +8,6 @@
 #include "../../../lib/base/random.h"
 #include "../../../lib/rig/motor.h"
 #include "../../../lib/sim/sim.h"
-#include "../message.h"
 #include "conformance.h"
 #include "machine.h"
 

@@ -9,7 +9,6 @@
 #include "../../../lib/rig/actuator.h"
 #include "../../../lib/rig/rig_plan.h"
 #include "../../../lib/sim/sim.h"
-#include "../message.h"
 #include "../base/temp_file.h"
 
 /* Every key of rig.conf, in two actuators; the virtual rig is the force channel. */

@@ -8,7 +8,6 @@
 #include <incise/rig.h>
 #include <incise/sim.h>
 #include "../../../lib/rig/rig_plan.h"
-#include "../message.h"
 #include "../base/temp_file.h"
 
 /* --- file --- */

@@ -5,7 +5,6 @@
  */
 #include "../unit.h"
 #include <incise/scan.h>
-#include "../message.h"
 
 static int found(void *context, const struct incise_scan_device *device)
 {

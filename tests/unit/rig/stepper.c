@@ -5,7 +5,6 @@
  */
 #include "../unit.h"
 #include <incise/backend.h>
-#include "../message.h"
 
 /* --- stepper --- */
 

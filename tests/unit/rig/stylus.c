@@ -4,7 +4,6 @@
  * without the enabling button, and the ages of poses; with a device whose samples are given here.
  */
 #include "../unit.h"
-#include <math.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/base/vector.h"
 #include "../../../lib/rig/stylus.h"

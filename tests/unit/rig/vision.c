@@ -5,7 +5,6 @@
  */
 #include "../unit.h"
 #include "../../../lib/rig/backends.h"
-#include "../message.h"
 
 /* A module that remembers what it was called with. */
 static struct {

@@ -5,7 +5,6 @@
 #include "../unit.h"
 #include "../../../lib/sim/sim.h"
 #include "../../../lib/sim/world.h"
-#include "../message.h"
 
 #define START_NS INCISE_NS_PER_S
 #define MAX 120000

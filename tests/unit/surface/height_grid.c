@@ -2,7 +2,6 @@
 /* Reading ESRI ASCII grids: where heights lie, what is refused, damaged files. */
 #include "../unit.h"
 #include "../../../lib/surface/surface.h"
-#include "../message.h"
 #include "../base/temp_file.h"
 #include "solid.h"
 

@@ -5,7 +5,6 @@
  */
 #include "../unit.h"
 #include "../../../lib/surface/surface.h"
-#include "../message.h"
 #include "../base/temp_file.h"
 #include "../cases.h"
 #include "solid.h"

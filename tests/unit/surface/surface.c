@@ -3,7 +3,6 @@
 #include "../unit.h"
 #include <float.h>
 #include "../../../lib/surface/surface.h"
-#include "../message.h"
 #include "solid.h"
 
 static const double zero[3], bad[3] = {0, NAN, 0}, far[3] = {0, 0, 1e300};

@@ -7,7 +7,6 @@
 #include <time.h>
 #include "../../../lib/rig/backends.h"
 #include "../../../lib/device/tmc/tmc_driver.h"
-#include "../message.h"
 #include "chip.h"
 #include "pytmcstepper.h"
 

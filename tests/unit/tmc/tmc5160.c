@@ -6,11 +6,9 @@
 #include "../unit.h"
 #include <linux/spi/spidev.h>
 #include <stdatomic.h>
-#include <string.h>
 #include <sys/ioctl.h>
 #include "../../../lib/rig/backends.h"
 #include "../../../lib/device/tmc/tmc_driver.h"
-#include "../message.h"
 
 extern const struct incise_backend incise_driver_tmc5160;
 

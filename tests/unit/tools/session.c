@@ -6,7 +6,6 @@
 #include "../unit.h"
 #include <incise/clock.h>
 #include "../../../tools/session/session.h"
-#include "../message.h"
 
 #define HZ 1000
 /* The file's last digit: values are rounded to 1e-4. */

@@ -8,7 +8,6 @@
 #include <glob.h>
 #include <sys/stat.h>
 #include "../../../lib/rig/backends.h"
-#include "../message.h"
 #include "driver.h"
 
 extern const struct incise_backend incise_camera_v4l2;

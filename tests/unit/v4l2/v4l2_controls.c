@@ -6,7 +6,6 @@
  */
 #include "../unit.h"
 #include "../../../lib/device/v4l2/v4l2_controls.h"
-#include "../message.h"
 #include "driver.h"
 
 #define WHERE "rig.conf:1: camera"

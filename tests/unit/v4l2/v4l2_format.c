@@ -5,7 +5,6 @@
  */
 #include "../unit.h"
 #include "../../../lib/device/v4l2/v4l2_format.h"
-#include "../message.h"
 #include "driver.h"
 
 #define WHERE "rig.conf:1: camera"

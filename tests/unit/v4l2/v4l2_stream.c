@@ -9,7 +9,6 @@
 #include <stdatomic.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/device/v4l2/v4l2_stream.h"
-#include "../message.h"
 #include "driver.h"
 
 #define WHERE "rig.conf:1: camera"

@@ -5,7 +5,6 @@
  */
 #include "../unit.h"
 #include <incise/film.h>
-#include "../message.h"
 
 static char folder[] = "/tmp/incise-films-XXXXXX";
 

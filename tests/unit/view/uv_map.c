@@ -7,7 +7,6 @@
 #include "../../../lib/base/random.h"
 #include "../../../lib/base/vector.h"
 #include "../../../lib/view/uv_map.h"
-#include "../message.h"
 #include "../surface/solid.h"
 
 #define SIZE 512

@@ -8,7 +8,6 @@
 #include <SDL.h>
 #include <epoxy/gl.h>
 #include "../../../lib/view/window.h"
-#include "../message.h"
 #include "look.h"
 
 static struct incise_window *window;

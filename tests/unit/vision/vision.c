@@ -9,7 +9,6 @@
 #include "../../../lib/sim/sim.h"
 #include "../../vision/scalpel_picture.h"
 #include "../cases.h"
-#include "../message.h"
 
 /* A sanitizer slows them ten times down, and sees in a few what it sees in all. */
 #define FRAMES cases_of(16, 4)

@@ -12,7 +12,6 @@
 #include <poll.h>
 #include <pthread.h>
 #include <sys/socket.h>
-#include "../message.h"
 #include "../unit.h"
 #include "../../../lib/base/monotonic.h"
 #include "../../../lib/base/vector.h"

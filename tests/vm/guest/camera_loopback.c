@@ -17,6 +17,7 @@
 #include <time.h>
 #include <unistd.h>
 #include <linux/videodev2.h>
+#include "../../clock.h"
 #include "../../../lib/rig/backends.h"
 #include "../../../lib/rig/thread.h"
 #include "../../../lib/sim/sim.h"
@@ -41,14 +42,6 @@ struct feeder {
 	int n;	      /* frames shot */
 	int64_t t_ns; /* timestamp of the last one */
 };
-
-static int64_t now_ns(void)
-{
-	struct timespec now;
-
-	clock_gettime(CLOCK_MONOTONIC, &now);
-	return now.tv_sec * 1000000000LL + now.tv_nsec;
-}
 
 /* Every byte of every frame is another one. */
 static uint8_t pixel(int picture, size_t at)

@@ -18,6 +18,7 @@
 #include <unistd.h>
 #include <incise/scan.h>
 #include <linux/videodev2.h>
+#include "../../clock.h"
 #include "../../../lib/rig/backends.h"
 #include "../tap.h"
 
@@ -29,14 +30,6 @@ extern const struct incise_backend incise_camera_v4l2;
 static const char *path;
 static bool on_time; /* in virtual time */
 static struct incise_error err;
-
-static int64_t now_ns(void)
-{
-	struct timespec now;
-
-	clock_gettime(CLOCK_MONOTONIC, &now);
-	return now.tv_sec * 1000000000LL + now.tv_nsec;
-}
 
 static struct incise_camera *open_camera(const struct incise_camera_setup *setup)
 {

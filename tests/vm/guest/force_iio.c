@@ -20,6 +20,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "../../clock.h"
 #include "../../../lib/rig/backends.h"
 #include "../../../lib/device/daq/iio_source.h"
 #include "../hold.h"
@@ -35,14 +36,6 @@ extern const struct incise_backend incise_force_iio;
 
 static struct incise_force_sample samples[MANY + 65536];
 static bool virtual_time;
-
-static int64_t now_ns(void)
-{
-	struct timespec t;
-
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return t.tv_sec * INCISE_NS_PER_S + t.tv_nsec;
-}
 
 static void nap(int ms)
 {

@@ -11,23 +11,15 @@
 #include <poll.h>
 #include <string.h>
 #include <sys/utsname.h>
-#include <time.h>
 #include <unistd.h>
 
+#include "../../clock.h"
 #include "../simulator.h"
 #include "../tap.h"
 
 enum { step, dir, enable, min, max, home, estop, spare };
 
 static struct incise_sim_edge edge[1 << 16];
-
-static int64_t now_ns(void)
-{
-	struct timespec now;
-
-	clock_gettime(CLOCK_MONOTONIC, &now);
-	return now.tv_sec * 1000000000LL + now.tv_nsec;
-}
 
 /* Every edge that was made is there once, in order, timestamped by this clock. */
 static void edges_are_whole(void)

@@ -22,6 +22,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "../../clock.h"
 #include "../../../driver/sim/incise_sim.h"
 #include "../../../driver/uapi/incise_stepper.h"
 
@@ -37,14 +38,6 @@ struct bench {
 static void report(bool good, const char *what)
 {
 	printf("%sok %s\n", good ? "" : "not ", what);
-}
-
-static int64_t now_ns(void)
-{
-	struct timespec t;
-
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return t.tv_sec * INT64_C(1000000000) + t.tv_nsec;
 }
 
 static void nap(long us)

@@ -17,6 +17,7 @@
 #include <sys/mman.h>
 #include <time.h>
 #include <incise/backend.h>
+#include "../../clock.h"
 #include "../../../lib/rig/backends.h"
 #include "../tap.h"
 
@@ -29,14 +30,6 @@ struct seen {
 	uint64_t n, doubled, gaps, next;
 	int64_t first_ns, last_ns, least_ns, most_ns;
 };
-
-static int64_t now_ns(void)
-{
-	struct timespec ts;
-
-	clock_gettime(CLOCK_MONOTONIC, &ts);
-	return ts.tv_sec * INT64_C(1000000000) + ts.tv_nsec;
-}
 
 static void rest(void)
 {

@@ -27,6 +27,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "../../clock.h"
 #include "../simulator.h"
 
 #define GIVE_UP_NS INT64_C(10000000000)
@@ -40,14 +41,6 @@ struct count {
 	int64_t last_ns, off_ns, struck_ns;
 	uint64_t before; /* steps, until the stroke */
 };
-
-static int64_t now_ns(void)
-{
-	struct timespec ts;
-
-	clock_gettime(CLOCK_MONOTONIC, &ts);
-	return ts.tv_sec * INT64_C(1000000000) + ts.tv_nsec;
-}
 
 static void nap(void)
 {

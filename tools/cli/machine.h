@@ -13,4 +13,8 @@ void machine_line(const char *path, const char *key, char *line, int size);
 /* An object, as in incise-bench(1). Call it first, to get the load average before the run. */
 json_t *machine_json(void);
 
+/* The processor that variants are timed on: the last one, as interrupts are more often the
+ * first one's. */
+int machine_cpu(void);
+
 #endif

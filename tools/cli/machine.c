@@ -11,8 +11,7 @@
 #include <unistd.h>
 #include <sys/utsname.h>
 #include <incise/version.h>
-#include "harness.h"
-#include "../cli/json.h"
+#include "json.h"
 #include "machine.h"
 #if defined(__x86_64__)
 #include <cpuid.h>
@@ -70,10 +69,23 @@ static void set_kernel(json_t *machine)
 					 strstr(name.version, "PREEMPT_RT")));
 }
 
+int machine_cpu(void)
+{
+	cpu_set_t set;
+	int last = 0;
+
+	if (sched_getaffinity(0, sizeof(set), &set))
+		return 0;
+	for (int i = 0; i < CPU_SETSIZE; i++)
+		if (CPU_ISSET(i, &set))
+			last = i;
+	return last;
+}
+
 /* Processors that are granted to this process, and the governor of the timed one. */
 static void set_processors(json_t *machine)
 {
-	int cpu = harness_cpu(), n = (int)sysconf(_SC_NPROCESSORS_ONLN);
+	int cpu = machine_cpu(), n = (int)sysconf(_SC_NPROCESSORS_ONLN);
 	char path[80], governor[32] = "";
 	cpu_set_t cpus;
 
