@@ -794,7 +794,7 @@ static void settle_front(struct tick *t)
 }
 
 /*
- * The way of the front is the largest of sums of a depth, the length of the line and an eighth of a distance, in all
+ * The way of the front is the largest of sums of a depth, the length of the line and an eighth of the way to its side, in all
  * ticks together: no more than their errors add up.
  */
 static void settle_way(struct tick *t)
