@@ -2,7 +2,7 @@
 # install, uninstall, dist.
 
 headers := $(wildcard lib/include/incise/*.h)
-scenes := $(wildcard scenes/*.scene scenes/*.fis)
+scenes := $(wildcard scenes/*.scene scenes/*.fis scenes/*.tex)
 report_files := $(addprefix tools/report/,report.py tables.py compare.py measure.py bench.j2 assess.j2 document.css)
 examples := $(wildcard doc/*.example)
 unit_scripts := udev/stepper-setup

@@ -164,6 +164,12 @@ demo: ## walk paper 1 on the virtual rig; pictures and summary in demo.out/
 	+@$(MAKE) --no-print-directory all
 	$(O)/bin/incise demo -o $(DEMO) --overwrite
 
+texture: ## learn the texture of the shipped liver again, from the virtual rig
+	+@$(MAKE) --no-print-directory all
+	$(O)/bin/incise capture -o $(O)/liver.rec --overwrite --rig sim:seed=1,clock=simulated -c none --camera off
+	$(O)/bin/incise train $(O)/liver.rec -o scenes/liver.fis.tex --overwrite
+	@sed -i '1i # SPDX-License-Identifier: GPL-2.0-or-later\n# As make texture writes it.' scenes/liver.fis.tex
+
 bench: ## measure everything on this machine; one report in build/bench/
 	@mk/deps build bench
 	+@$(MAKE) --no-print-directory all
@@ -172,4 +178,4 @@ bench: ## measure everything on this machine; one report in build/bench/
 readme-figures: ## put the summary of that report, and two of its figures, into doc/evidence.md
 	mk/readme-figures $(O)/bench
 
-.PHONY: tools pages deps demo bench readme-figures
+.PHONY: tools pages deps demo texture bench readme-figures

@@ -39,7 +39,7 @@ static size_t rows_of_cuts(const struct incise_texture_cut *cuts, int n)
 	return rows;
 }
 
-static double quantile(double *numbers, size_t n, double share)
+static double take_quantile(double *numbers, size_t n, double share)
 {
 	qsort(numbers, n, sizeof(*numbers), ascending);
 	return n ? numbers[(size_t)(share * (double)(n - 1))] : 0;
@@ -54,9 +54,9 @@ struct incise_texture_cut incise_look_part(const struct incise_texture_cut *cut,
 
 	for (size_t i = 1; i < cut->n; i++)
 		numbers[i - 1] = way[i] - way[i - 1];
-	fast = FAST_SHARE * quantile(numbers, cut->n ? cut->n - 1 : 0, ALMOST);
+	fast = FAST_SHARE * take_quantile(numbers, cut->n ? cut->n - 1 : 0, ALMOST);
 	memcpy(numbers, force, cut->n * sizeof(*numbers));
-	strong = FORCE_SHARE * quantile(numbers, cut->n, ALMOST);
+	strong = FORCE_SHARE * take_quantile(numbers, cut->n, ALMOST);
 	for (size_t i = 1; i < cut->n; i++)
 		if (way[i] - way[i - 1] >= fast && force[i] >= strong) {
 			from = from < i ? from : i;
@@ -77,7 +77,7 @@ static double median_step(const struct incise_texture_cut *cuts, int n, double *
 		for (size_t k = 1; k < part.n; k++)
 			numbers[m++] = part.way[k] - part.way[k - 1];
 	}
-	return m ? quantile(numbers, m, 0.5) : 1;
+	return m ? take_quantile(numbers, m, 0.5) : 1;
 }
 
 static double median_noise(const struct incise_texture_cut *cuts, int n, double *numbers)
@@ -90,7 +90,7 @@ static double median_noise(const struct incise_texture_cut *cuts, int n, double 
 		for (size_t k = 2; k < cuts[c].n; k++)
 			numbers[m++] = fabs(f[k] - 2 * f[k - 1] + f[k - 2]);
 	}
-	return quantile(numbers, m, 0.5) * SD_OF_BENDS;
+	return take_quantile(numbers, m, 0.5) * SD_OF_BENDS;
 }
 
 /* --- one cut --- */
@@ -238,7 +238,8 @@ static void finish_look(struct incise_look *look, const struct sums *sums)
 	double m = fmax(sums->cells, 1), mean = sums->difference[0] / m,
 	       square = sums->difference[1] / m, variance = fmax(square - mean * mean, 0);
 
-	qsort(look->drop, look->n_events, sizeof(*look->drop), ascending);
+	if (look->n_events)
+		qsort(look->drop, look->n_events, sizeof(*look->drop), ascending);
 	look->rate = look->length > 0 ? (double)look->n_events / look->length : 0;
 	look->rms =
 		sums->force > 0 ? sqrt(sums->square * sums->windows) / sums->force : 0;

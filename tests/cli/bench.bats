@@ -288,6 +288,38 @@ names="double_libm double_separable double_library fixed_direct fixed_table_64 \
 	done
 }
 
+# Row of a kind of texture in r.json.
+realism() { jq -e ".rows[] | select(.kind == \"$1\") | .$2" r.json; }
+
+# bats test_tags=check
+@test "bench realism: teeth that a model learned, next to noise and to none, on cuts that were held out" {
+	quick_report realism
+	[ "$(jq -c '[.rows[].kind]' r.json)" = '["none","noise","texture"]' ]
+	holds "$(realism texture events) > 100 && $(realism texture cuts) == 7"
+	# the same on each machine, but for rounding: the issue's bounds of a simulated rig
+	holds "$(realism texture event_rate) > $(realism texture event_rate_low)"
+	holds "$(realism texture event_rate) < $(realism texture event_rate_high)"
+	holds "$(realism texture spectrum_dB) < 3 && $(realism none spectrum_dB) > 10"
+	holds "$(realism texture rms) > 0.8 && $(realism texture rms) < 1.2"
+	holds "$(realism texture mean_force) ^ 2 < 0.01 ^ 2 && $(realism none mean_force) == 0"
+	# noise of the same spectrum is no saw-tooth: it falls too often, and as it rises
+	holds "$(realism noise event_rate) > 2 && $(realism noise spectrum_dB) < 3"
+	holds "$(realism noise skewness) ^ 2 < 0.3 ^ 2 && $(realism texture skewness) < -2"
+}
+
+@test "bench realism of data: forces without teeth, and files that have no cuts" {
+	awk 'BEGIN { print "cut,depth_mm,velocity_mm_s,force_N"
+		for (c = 1; c <= 8; c++) for (i = 0; i < 400; i++)
+			printf "%d,%.4f,%.3f,%.5f\n", c, i / 50, 10 + c, (0.1 + 0.01 * c) * i / 50 + 0.001 * ((i * 7919 % 101) / 101 - 0.5) }' >smooth.csv
+	run --separate-stderr incise bench realism smooth.csv --quick
+	failed_with smooth.csv "a texture needs 20"
+	sed 's/^cut,/group,/' smooth.csv >none.csv
+	run --separate-stderr incise bench realism none.csv --quick
+	failed_with none.csv cut
+	run --separate-stderr incise bench realism a b
+	bad_usage "'realism' takes at most 1 operand"
+}
+
 # bats test_tags=slow
 @test "bench training as a table" {
 	run -0 --separate-stderr incise bench training --quick

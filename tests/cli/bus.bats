@@ -132,7 +132,7 @@ setup_file() {
 setup() {
 	work_folder
 	export INCISE_MODULE_PATH=$BATS_FILE_TMPDIR/modules
-	cp "$root/scenes/liver.scene" "$root/scenes/liver.fis" .
+	cp "$root"/scenes/liver.{scene,fis,fis.tex} .
 }
 
 rig() { # ARGUMENTS

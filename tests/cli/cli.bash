@@ -47,6 +47,12 @@ left_memory() {
 	[ -z "$in_memory" ] || rm -rf "$in_memory"
 }
 
+# The shipped liver without its texture, for a model that is put beside it.
+smooth_liver() {
+	sed 's/^model = .*/model = "liver.fis";/' "$root/scenes/liver.scene" >liver.scene
+	grep -q '^model = "liver.fis";' liver.scene
+}
+
 # For tests in real time, in which programs have to answer each other within so many ms:
 # watch_machine in setup(), machine_watched MS in teardown(). A witness wants to run every 5 ms. A
 # test that fails is repeated where the machine let the witness wait for MS or more meanwhile, and

@@ -129,7 +129,7 @@ finds() {
 @test "a figure of a replay, with and without a force" {
 	incise capture -o a.rec --rig sim:clock=simulated,depth_mm=10,times=1,pause_s=0.1,cut_s=4 \
 		--duration 3s >/dev/null
-	cp "$root/scenes/liver.scene" .
+	smooth_liver
 	cp m.fis liver.fis
 	incise replay a.rec liver.scene -o replay.png >/dev/null
 	measured replay.svg

@@ -12,7 +12,7 @@ setup_file() {
 setup() {
 	work_folder
 	cp "$BATS_FILE_TMPDIR/liver.fis" .
-	cp "$root/scenes/liver.scene" .
+	smooth_liver
 	# contact from 0.1 s on
 	quick=sim:clock=simulated,depth_mm=10,times=1,pause_s=0.1,cut_s=4
 }

@@ -91,7 +91,10 @@ setup() {
 	# shellcheck disable=SC2046
 	${CC:-cc} -std=c11 -Wall -Wextra -Werror program.c -o program \
 		$(pkg-config --cflags --libs incise) -Wl,-rpath,"$dest/usr/lib"
-	run -0 ./program "$dest/usr/share/incise/scenes/liver.scene"
+	cmp "$root/scenes/liver.fis.tex" "$dest/usr/share/incise/scenes/liver.fis.tex"
+	smooth_liver
+	cp "$dest/usr/share/incise/scenes/liver.fis" .
+	run -0 ./program liver.scene
 	echo "$output" >felt
 	[ "$(wc -l <felt)" -eq 8 ]
 	# the scene's integers give what the model says in double

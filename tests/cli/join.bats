@@ -278,7 +278,7 @@ without_u() {
 	[ "$(wc -l <day.csv)" -eq 801 ]
 	# and the loop runs on it: the same force to the bit on the clock of the tracker
 	incise train both.rec -o m.fis >/dev/null 2>&1
-	sed 's|"[^"]*\.fis"|"m.fis"|' "$BATS_TEST_DIRNAME/../../scenes/liver.scene" >liver.scene
+	sed 's|model = .*|model = "m.fis";|' "$BATS_TEST_DIRNAME/../../scenes/liver.scene" >liver.scene
 	incise join tracker.rec force.rec -o tracked.rec >/dev/null
 	incise replay both.rec liver.scene | tail -n +2 >alone
 	incise replay tracked.rec:force=force,tracker=tracker liver.scene | tail -n +2 >joined

@@ -6,7 +6,7 @@ load stepper_module
 
 setup() {
 	work_folder
-	cp "$root/scenes/liver.scene" "$root/scenes/liver.fis" .
+	cp "$root"/scenes/liver.{scene,fis,fis.tex} .
 	module_folder
 }
 

@@ -5,7 +5,7 @@ load cli
 
 setup() {
 	work_folder
-	cp "$root"/scenes/*.scene "$root"/scenes/*.fis .
+	cp "$root"/scenes/* .
 }
 
 @test "plan shows what each shipped scene runs and leaves out" {
@@ -22,7 +22,7 @@ setup() {
 # bats test_tags=check
 @test "plan reports as JSON: every stage is kept or left out" {
 	incise plan liver.scene --json >r.json
-	[ "$(key r.json kept)" = '["pose","predict","contact","reaction","fracture","start","limit"]' ]
+	[ "$(key r.json kept)" = '["pose","predict","contact","texture","reaction","fracture","start","limit"]' ]
 	holds "$(key r.json margin) > 1 && $(key r.json margin) == $(key r.json weakest.margin)"
 	holds "$(key r.json weakest.states) >= 3 && $(key r.json weakest.hz) > 5"
 	holds "$(key r.json tick_ns) > 0"
@@ -113,7 +113,7 @@ setup() {
 }
 
 @test "plan: another model, another arithmetic" {
-	incise plan liver.scene --json >fixed.json
+	incise plan liver.scene --no-texture --json >fixed.json
 	incise plan liver.scene --arith double --json >double.json
 	holds "$(key fixed.json bound_N) > 0"
 	[ "$(key double.json bound_N)" = 0.0 ]

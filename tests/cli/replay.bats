@@ -16,7 +16,7 @@ setup() {
 	work_folder
 	cp "$BATS_FILE_TMPDIR/liver.fis" .
 	cp -r "$BATS_FILE_TMPDIR/liver.rec" .
-	cp "$root/scenes/liver.scene" .
+	smooth_liver
 }
 
 teardown() {

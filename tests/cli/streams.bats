@@ -296,7 +296,7 @@ poses() {
 	[[ "$output" == *"the haptic loop fades the force whenever the network delays poses of OpenIGTLink Stylus"* ]]
 	echo 'stepper = "sim:";' >>rig.conf
 	# so soft that it is stable with however few poses a busy machine delivers
-	sed "s|liver.fis|$root/scenes/liver.fis|; s|tissue = {|& gain = 0.001;|" "$root/scenes/liver.scene" >soft.scene
+	sed "s|model = .*|model = \"$root/scenes/liver.fis\";|; s|tissue = {|& gain = 0.001;|" "$root/scenes/liver.scene" >soft.scene
 	run --separate-stderr incise haptic soft.scene --rig rig.conf --no-rt --overruns 0 --duration 0.3s
 	[[ "$stderr" == *"poses come over a network, whose delay has no bound"* ]]
 }

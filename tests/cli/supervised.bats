@@ -8,7 +8,7 @@ load stepper_module
 setup() {
 	watch_machine
 	memory_folder
-	cp "$root/scenes/liver.scene" "$root/scenes/liver.fis" "$root/scenes/wall.scene" .
+	cp "$root"/scenes/liver.{scene,fis,fis.tex} "$root/scenes/wall.scene" .
 	module_folder
 }
 

@@ -10,7 +10,7 @@ setup() {
 	chmod 700 "$XDG_RUNTIME_DIR/incise"
 	page=$XDG_RUNTIME_DIR/incise/neck.state
 	control=$XDG_RUNTIME_DIR/incise/neck.control
-	cp "$root/scenes/neck.scene" "$root/scenes/liver.scene" "$root/scenes/liver.fis" .
+	cp "$root/scenes/neck.scene" "$root"/scenes/liver.{scene,fis,fis.tex} .
 	pid=
 }
 

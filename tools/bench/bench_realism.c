@@ -67,7 +67,7 @@ static void measure_file(char *path, const char *name, struct row *row)
 		incise_train_texture(source, 1, &trained, &options.train, &row->of, &err);
 	/* No texture is better than the model alone: they are the same then. */
 	if (!texture && errno != EDOM)
-		cli_fail_with(&err);
+		cli_fail("%s: %s", path, err.text);
 	cli_progress_end();
 	for (int k = INCISE_REALISM_KINDS - 1; k >= 0; k--)
 		row[k] = (struct row){name, kinds[k], row->of, row->of.kind[k]};
@@ -104,26 +104,22 @@ static void measure_rig(int i, bool quick, struct row *row)
 static const struct bench_table rows_table = {
 	.key = "rows",
 	.row_bytes = sizeof(struct row),
-	.columns = {COLUMN(row, "set", set, "%-12s", "cuts of"),
-		    COLUMN(row, "kind", kind, "%-8s", "texture"),
-		    COLUMN(row, "cuts", of.cuts),
-		    COLUMN(row, "events", of.events, "%7.0f", "events"),
+	.columns = {COLUMN(row, "set", set), COLUMN(row, "kind", kind),
+		    COLUMN(row, "cuts", of.cuts), COLUMN(row, "events", of.events),
 		    COLUMN(row, "up_to_cycles_mm", of.up_to_cycles),
-		    COLUMN(row, "event_rate", is.rate, "%6.2f", "rate"),
-		    COLUMN(row, "event_rate_low", of.rate_low, "  (%4.2f", ""),
-		    COLUMN(row, "event_rate_high", of.rate_high, "to %4.2f)", ""),
-		    COLUMN(row, "drops_ks", is.drops, "%6.2f", "drops"),
-		    COLUMN(row, "spectrum_dB", is.spectrum_dB, "%8.1f", "dB"),
-		    COLUMN(row, "rms", is.rms, "%6.2f", "rms"),
-		    COLUMN(row, "skewness", is.skewness, "%9.2f", "skewness"),
-		    COLUMN(row, "recorded_skewness", of.skewness, "  (%5.2f)", ""),
-		    COLUMN(row, "mean_force", is.mean_force, "%8.2f", "mean, %",
-			   .text_scale = 100)},
+		    COLUMN(row, "event_rate", is.rate),
+		    COLUMN(row, "event_rate_low", of.rate_low),
+		    COLUMN(row, "event_rate_high", of.rate_high),
+		    COLUMN(row, "drops_ks", is.drops),
+		    COLUMN(row, "spectrum_dB", is.spectrum_dB),
+		    COLUMN(row, "rms", is.rms), COLUMN(row, "skewness", is.skewness),
+		    COLUMN(row, "recorded_skewness", of.skewness),
+		    COLUMN(row, "mean_force", is.mean_force)},
 	.metrics = {METRIC(EXACT, row, is.spectrum_dB, "dB",
 			   "spectrum of {set}, {kind}")},
 };
 
-static void run(struct bench_run *run)
+static void run_realism(struct bench_run *run)
 {
 	const int n = run->n_operands || run->quick ? 1 : N(rigs);
 	struct row *rows = cli_alloc((size_t)n * INCISE_REALISM_KINDS, sizeof(*rows));
@@ -134,13 +130,7 @@ static void run(struct bench_run *run)
 		else
 			measure_rig(i, run->quick,
 				    rows + INCISE_REALISM_KINDS * (size_t)i);
-	bench_text(
-		run,
-		"%s\nCuts that were held out, rendered divided by recorded: rate of events "
-		"(95 %% interval of the recorded one), rms of the texture; drops: distance of "
-		"Kolmogorov and Smirnov; dB: of octaves; skewness of differences (recorded)\n",
-		bench_machine(run, "cpu"));
-	bench_table(run, &rows_table, rows, n * INCISE_REALISM_KINDS);
+	bench_rows(run, &rows_table, rows, n * INCISE_REALISM_KINDS);
 }
 
 const struct bench bench_realism = {
@@ -148,5 +138,5 @@ const struct bench bench_realism = {
 	.operands = "[DATA]",
 	.summary = "texture of rendered cuts next to recorded ones",
 	.n_operands = 1,
-	.run = run,
+	.run = run_realism,
 };

@@ -73,6 +73,18 @@ def training(report):
         ("max_error_N", "%10.4f", "largest/N"), ("mean_abs_error_N", "%10.4f", "mean |.|/N")], 1)
 
 
+def realism(report):
+    yield (f"{machine(report, 'cpu')}\nCuts that were held out, rendered divided by recorded: rate of events (95 % interval "
+           "of the recorded one), rms of the texture; drops: distance of Kolmogorov and Smirnov; dB: of octaves; skewness "
+           "of differences (recorded)\n")
+    yield table(report["rows"], [
+        ("set", "%-12s", "cuts of"), ("kind", "%-8s", "texture"), ("events", "%7.0f", "events"),
+        ("event_rate", "%6.2f", "rate"), ("event_rate_low", "  (%4.2f", ""), ("event_rate_high", "to %4.2f)", ""),
+        ("drops_ks", "%6.2f", "drops"), ("spectrum_dB", "%8.1f", "dB"), ("rms", "%6.2f", "rms"),
+        ("skewness", "%9.2f", "skewness"), ("recorded_skewness", "  (%5.2f)", ""),
+        (times("mean_force", 100), "%8.2f", "mean, %")])
+
+
 EXPERIMENTS = {
     "exact_limit": ("largest stable stiffness of a wall alone on the device, K T^2/m: simulation compared with "
                     "eigenvalues", ""),
@@ -214,7 +226,7 @@ def developers(report):
 def main():
     report = json.load(sys.stdin)
     name = report["schema"].split("/")[2]
-    text = {f.__name__: f for f in (precision, training, stability, loop, view, scenes)}.get(name, developers)
+    text = {f.__name__: f for f in (precision, training, realism, stability, loop, view, scenes)}.get(name, developers)
     sys.stdout.write("".join(text(report)))
 
 

@@ -82,7 +82,7 @@ check "it has no power" drive_stopped
 
 drive_tell restart
 # Compiled: an emulated processor takes ten seconds over the survey of a .fis file.
-sed "s|liver.fis|$INCISE_BUILD/tests/vm/liver.fx|" "$root/scenes/liver.scene" >liver.scene
+sed "s|model = .*|model = \"$INCISE_BUILD/tests/vm/liver.fx\";|" "$root/scenes/liver.scene" >liver.scene
 haptic() { incise haptic liver.scene --rig rig.conf --duration 2s --json >report.json; }
 check "haptic renders" haptic
 # The report has the first actuator twice: by itself and in the list of all.

@@ -16,7 +16,7 @@ sim = { depth_mm = [15]; times = [1000]; cut_s = 2.0; pause_s = 1.0; };
 END
 # Compiled: an emulated processor takes ten seconds over the survey of a .fis file, and
 # three over each plan of what is compiled: what is not about the learnt force is with the plain wall.
-sed "s|liver.fis|$INCISE_BUILD/tests/vm/liver.fx|" scenes/liver.scene >/tmp/liver.scene
+sed "s|model = .*|model = \"$INCISE_BUILD/tests/vm/liver.fx\";|" scenes/liver.scene >/tmp/liver.scene
 haptic() { "$INCISE_BUILD/bin/incise" haptic ${scene:-scenes/wall.scene} --rig /tmp/rig.conf -c none "$@" >/tmp/out 2>/tmp/err; }
 said() { grep -q "$@" || { cat /tmp/out /tmp/err; return 1; }; }
 # A run that fails says why.
