@@ -13,8 +13,10 @@ timed = $(MAKE) $(jobs) -k --no-print-directory $(addprefix timed-,$1)
 timed-%:
 	+@tests/timed $(times) $* $(MAKE) -k --no-print-directory $(part_$*)
 
-# A test that runs for longer is ended, with its name.
+# A test that runs for longer is ended, with its name. It hangs: all cases, beside the other parts of
+# check-full, take some minutes of a processor.
 LIMIT_S ?= 600
+all_cases := CASES=all$(if $(filter file,$(origin LIMIT_S)), LIMIT_S=3600)
 
 # What is built for `check` is in a folder of its own: one build of library, programs and tests, which
 # stops at any bad access or undefined operation.
@@ -48,9 +50,9 @@ check: ## install what is missing, build and test: some ten minutes
 	@echo "make check-full runs everything (an hour and more): all cases, all tests of the commands, attacks, kernels, packages"
 
 # Parts of check-full beside those of check. Each installs what it needs.
-part_plain := check-unit CASES=all
-part_cli := check-cli CASES=all
-part_attack := check-attack
+part_plain := check-unit $(all_cases)
+part_cli := check-cli $(all_cases)
+part_attack := check-attack $(all_cases)
 part_fuzz := check-fuzz
 part_python := check-python
 part_tsan := check-tsan

@@ -238,7 +238,8 @@ static void finish_look(struct incise_look *look, const struct sums *sums)
 	double m = fmax(sums->cells, 1), mean = sums->difference[0] / m,
 	       square = sums->difference[1] / m, variance = fmax(square - mean * mean, 0);
 
-	qsort(look->drop, look->n_events, sizeof(*look->drop), ascending);
+	if (look->n_events)
+		qsort(look->drop, look->n_events, sizeof(*look->drop), ascending);
 	look->rate = look->length > 0 ? (double)look->n_events / look->length : 0;
 	look->rms =
 		sums->force > 0 ? sqrt(sums->square * sums->windows) / sums->force : 0;

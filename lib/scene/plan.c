@@ -233,6 +233,7 @@ size_t incise_plan_memory(const struct incise_plan *plan)
 	size += plan->doubles.state.average ? sizeof(*plan->doubles.state.average) : 0;
 	size += plan->incision ? incise_incision_memory(plan->incision) : 0;
 	size += plan->integers ? sizeof(*plan->integers) : 0;
+	size += plan->texture ? sizeof(*plan->texture) : 0;
 	if (plan->fixed)
 		size += sizeof(*plan->fixed) + plan->fixed->size;
 	for (int i = 0; i < INCISE_CUTTING_PHASES; i++)

@@ -370,7 +370,7 @@ full() {
 	done <<-'END'
 		export d.rec -o out.odd|--output: out.odd: unknown extension .odd; give .csv, .h5, .hdf5 or .mcap
 		export d.rec -o out.CSV|--output: out.CSV: unknown extension .CSV; give .csv, .h5, .hdf5 or .mcap
-		train pairs.csv -o out.odd|--output: out.odd: unknown extension .odd; give .fis, .initial.fis, .csv or .fac
+		train pairs.csv -o out.odd|--output: out.odd: unknown extension .odd; give .fis, .initial.fis, .csv, .fac or .fis.tex
 		compile m.fis -o out.odd|--output: out.odd: unknown extension .odd; give .fx, .plan or .c
 		compile m.fis -o out.plan|--output: out.plan: unknown extension .plan; give .fx
 		compile m.scene -o out.fx|--output: out.fx: unknown extension .fx; give .plan

@@ -350,7 +350,7 @@ entry() {
 	local pid id seen=
 	command -v Xvfb >/dev/null && command -v xdotool >/dev/null || skip "Xvfb or xdotool are not installed"
 	gnuplot -e "set print '-'; print GPVAL_TERMINALS" | grep -qwE 'qt|wxt|x11' || skip "gnuplot has no windows"
-	Xvfb -displayfd 5 -screen 0 1280x1024x24 5>display >/dev/null 2>&1 3>&- &
+	Xvfb -displayfd 5 -noreset -screen 0 1280x1024x24 5>display >/dev/null 2>&1 3>&- &
 	server=$!
 	await test -s display
 	DISPLAY=:$(cat display)

@@ -209,7 +209,7 @@ begin_view() {
 
 @test "a window: the mouse presses the blade in, and draws it through the skin" {
 	command -v Xvfb >/dev/null && command -v xdotool >/dev/null || skip "Xvfb or xdotool are not installed"
-	Xvfb -displayfd 5 -screen 0 800x600x24 5>display >/dev/null 2>&1 3>&- &
+	Xvfb -displayfd 5 -noreset -screen 0 800x600x24 5>display >/dev/null 2>&1 3>&- &
 	server=$!
 	await test -s display
 	DISPLAY=:$(cat display)
@@ -221,9 +221,10 @@ begin_view() {
 	for ((i = 0; i < 9600; i++)); do
 		window=$(xdotool search --name neck.scene 2>/dev/null | head -n 1)
 		[ -n "$window" ] && break
+		kill -0 $pid || complain "no window: $(cat err)"
 		sleep 0.05
 	done
-	[ -n "$window" ] || complain "no window: $(cat err)"
+	[ -n "$window" ] || complain "no window within 8 min: $(cat err)"
 	sleep 1
 	xdotool mousemove --window "$window" 170 170
 	sleep 0.5

@@ -834,7 +834,7 @@ static void report_first(struct bench_run *run, const struct tick_row *tick,
 		     row->cyclictest.json);
 }
 
-static void run(struct bench_run *run)
+static void run_bench_loop(struct bench_run *run)
 {
 	static struct tick_row ticks[N(own)];
 	static struct wakeups wakeups;
@@ -874,5 +874,5 @@ const struct bench bench_loop = {
 	.n_operands = 1,
 	.takes_duration = true,
 	.takes_load = true,
-	.run = run,
+	.run = run_bench_loop,
 };

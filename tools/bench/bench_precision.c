@@ -478,7 +478,7 @@ static const struct bench_table rows_table = {
 		    METRIC(EXACT, row, max_error, "N", "{name} largest error")},
 };
 
-static void run(struct bench_run *run)
+static void run_precision(struct bench_run *run)
 {
 	struct evaluators *all = cli_alloc(1, sizeof(*all));
 	struct incise_error err = {0};
@@ -516,7 +516,7 @@ const struct bench bench_precision = {
 	.operands = "[MODEL.fis]",
 	.summary = "error and run time of a model's evaluators",
 	.n_operands = 1,
-	.run = run,
+	.run = run_precision,
 	.plot = {.script = text_precision_gp,
 		 .width = 1000,
 		 .height = 720,

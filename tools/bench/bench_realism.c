@@ -119,7 +119,7 @@ static const struct bench_table rows_table = {
 			   "spectrum of {set}, {kind}")},
 };
 
-static void run(struct bench_run *run)
+static void run_realism(struct bench_run *run)
 {
 	const int n = run->n_operands || run->quick ? 1 : N(rigs);
 	struct row *rows = cli_alloc((size_t)n * INCISE_REALISM_KINDS, sizeof(*rows));
@@ -138,5 +138,5 @@ const struct bench bench_realism = {
 	.operands = "[DATA]",
 	.summary = "texture of rendered cuts next to recorded ones",
 	.n_operands = 1,
-	.run = run,
+	.run = run_realism,
 };

@@ -456,7 +456,7 @@ static void add_curves(struct bench_run *run)
 
 /* --- the bench --- */
 
-static void run(struct bench_run *run)
+static void run_stability(struct bench_run *run)
 {
 	struct incise_error err = {0};
 
@@ -481,7 +481,7 @@ const struct bench bench_stability = {
 	.n_operands = 1,
 	.summary = "stability limits, simulated and computed; scenes at rest; "
 		   "integrators",
-	.run = run,
+	.run = run_stability,
 	.plot = {.suffix = "map",
 		 .script = text_stability_map_gp,
 		 .width = 340,

@@ -379,7 +379,7 @@ static const struct bench_table rows_table = {
 			   "{name} error on unseen cuts", "peer=0")},
 };
 
-static void run(struct bench_run *run)
+static void run_training(struct bench_run *run)
 {
 	struct training *t = cli_alloc(1, sizeof(*t));
 
@@ -410,5 +410,5 @@ static void run(struct bench_run *run)
 const struct bench bench_training = {
 	.name = "training",
 	.summary = "error on unseen cuts over the training time",
-	.run = run,
+	.run = run_training,
 };

@@ -74,14 +74,14 @@ def training(report):
 
 
 def realism(report):
-    yield (f"{machine(report, 'cpu')}\ncuts that were held out, rendered divided by recorded: rate of events (95 % "
-           "interval of the recorded one), rms of the texture; drops: distance of Kolmogorov and Smirnov; dB: of "
-           "octaves; skewness of differences (recorded)\n")
+    yield (f"{machine(report, 'cpu')}\nCuts that were held out, rendered divided by recorded: rate of events (95 % interval "
+           "of the recorded one), rms of the texture; drops: distance of Kolmogorov and Smirnov; dB: of octaves; skewness "
+           "of differences (recorded)\n")
     yield table(report["rows"], [
         ("set", "%-12s", "cuts of"), ("kind", "%-8s", "texture"), ("events", "%7.0f", "events"),
         ("event_rate", "%6.2f", "rate"), ("event_rate_low", "  (%4.2f", ""), ("event_rate_high", "to %4.2f)", ""),
-        ("drops_ks", "%6.2f", "drops"), ("spectrum_dB", "%6.1f", "dB"), ("rms", "%6.2f", "rms"),
-        ("skewness", "%9.2f", "skewness"), ("recorded_skewness", "  (%6.2f)", ""),
+        ("drops_ks", "%6.2f", "drops"), ("spectrum_dB", "%8.1f", "dB"), ("rms", "%6.2f", "rms"),
+        ("skewness", "%9.2f", "skewness"), ("recorded_skewness", "  (%5.2f)", ""),
         (times("mean_force", 100), "%8.2f", "mean, %")])
 
 

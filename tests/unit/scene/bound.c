@@ -26,7 +26,7 @@
 
 /* What all scenes met. */
 struct met {
-	int scenes, with_force, unbounded, broken;
+	int scenes, textured, with_force, unbounded, broken;
 	long ticks, apart, apart_beyond,
 		unpaid;	      /* apart by a decision; of these beyond the bound */
 	double ratio[SCENES]; /* bound ÷ largest difference */
@@ -113,11 +113,13 @@ static void compare(uint64_t seed, const struct drawn *d, struct met *met)
 	struct pair p = {.bound_N = 0};
 	char text[TEXT_MOST];
 	int kind = in_double(d->text[1].all, text);
+	bool textured = false;
 
 	for (int k = 0; k < 2; k++) {
 		p.scene[k] = fed_scene(&folder, k ? d->text[1].all : text, &err);
 		succeeds(p.scene[k]);
 		p.scene[k]->unchecked = true;
+		textured = seed % 2 && add_texture(seed, p.scene[k]);
 		p.plan[k] = incise_plan_new_fed(p.scene[k], &d->tracker, &err);
 		succeeds(p.plan[k]);
 	}
@@ -126,6 +128,7 @@ static void compare(uint64_t seed, const struct drawn *d, struct met *met)
 	p.apart.plan = p.plan;
 	p.bound_N = incise_plan_bound(p.plan[1], REACH_MM);
 	met->scenes++;
+	met->textured += textured;
 	met->unbounded += !(p.bound_N < INFINITY);
 	walk(&p, seed, d, met);
 	if (p.most_N > 0)
@@ -151,11 +154,11 @@ TEST(test_no_force_is_off_by_more_than_certified)
 		compare(first + (uint64_t)i, &d, &met);
 	}
 	middle = met.with_force ? median(met.ratio, met.with_force) : 0;
-	printf("%d scenes, %d with a force, %ld ticks, %ld of them apart by a decision "
+	printf("%d scenes, %d textured, %d with a force, %ld ticks, %ld of them apart by a decision "
 	       "(%ld beyond the bound), %ld unpaid; "
 	       "bound ÷ largest difference: %.2f, median %.3g\n",
-	       met.scenes, met.with_force, met.ticks, met.apart, met.apart_beyond,
-	       met.unpaid, met.ratio[0], middle);
+	       met.scenes, met.textured, met.with_force, met.ticks, met.apart,
+	       met.apart_beyond, met.unpaid, met.ratio[0], middle);
 	assert_true(met.with_force > scenes / 3 && met.apart < met.ticks / 100);
 	assert_int_equal(met.broken, 0);
 	assert_int_equal(met.unbounded, 0);

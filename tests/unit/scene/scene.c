@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /* Scene files: defaults, paths, and errors that name file, line and range. */
 #include "../unit.h"
+#include "../../../lib/model/companion.h"
+#include "../../../lib/model/texture.h"
 #include "../../../lib/scene/scene.h"
 #include "../message.h"
 #include "felt.h"
@@ -20,7 +22,7 @@ static double number(const struct incise_scene *scene, const char *key)
 }
 
 static char dir[] = "/tmp/incise-scene-XXXXXX";
-static char path[64], model_path[64];
+static char path[64], model_path[64], texture_path[64];
 
 static int set_up(void **state)
 {
@@ -28,6 +30,7 @@ static int set_up(void **state)
 		return -1;
 	snprintf(path, sizeof(path), "%s/a.scene", dir);
 	snprintf(model_path, sizeof(model_path), "%s/m.fis", dir);
+	snprintf(texture_path, sizeof(texture_path), "%s/m.fis.tex", dir);
 	felt_write_model(model_path);
 	return 0;
 }
@@ -36,6 +39,7 @@ static int tear_down(void **state)
 {
 	unlink(path);
 	unlink(model_path);
+	unlink(texture_path);
 	return rmdir(dir);
 }
 
@@ -481,6 +485,102 @@ TEST(test_inputs_of_a_model)
 		incise_scene_free(scene);
 	}
 	felt_write_model(model_path);
+}
+
+/* A file of a texture of this model, or of any, over this way. */
+static void write_texture(const char *unit, bool of_model, double variation)
+{
+	int n[2] = {3, 2};
+	double point[5] = {2000, 4000, -3000, 1000, -1000};
+	struct incise_model *model = incise_model_load(model_path, &err);
+	struct incise_texture texture = {.checksum =
+						 incise_model_checksum(model) + !of_model,
+					 .info = {.most = 0.5,
+						  .variation = variation,
+						  .up_to_cycles = 1,
+						  .n_cuts = 5,
+						  .length = 100},
+					 .step = 0.25,
+					 .n_curves = 2,
+					 .n = n,
+					 .point = point};
+
+	strcpy(texture.unit, unit);
+	texture.info.unit = texture.unit;
+	succeeds(!incise_texture_save(&texture, texture_path, &err));
+	incise_model_free(model);
+}
+
+#define TEXTURE "model = { cut = \"m.fis\"; texture = \"m.fis.tex\"; };\n"
+#define VARIES(share, seed) "tissue = { variation = " share "; seed = " seed "; };"
+
+/* The same tables for the same seed; factors of cuts where they are asked for. */
+TEST(test_texture)
+{
+	static const char *const texts[] = {TEXTURE VARIES("0.0", "7"),
+					    TEXTURE VARIES("0.0", "7"),
+					    TEXTURE VARIES("0.0", "8"),
+					    TEXTURE VARIES("0.5", "7")};
+	struct incise_scene *scene[4];
+
+	write_texture("mm", true, 0.2);
+	for (int i = 0; i < 4; i++) {
+		scene[i] = load(texts[i], NULL, &err);
+		succeeds(scene[i]);
+		assert_true(incise_fixed_texture_good(scene[i]->texture));
+		assert_string_equal(incise_scene_file(scene[i], 2), texture_path);
+		for (int k = 0; k < INCISE_TEXTURE_CUTS && i < 3; k++)
+			assert_int_equal(scene[i]->texture->factor[k], INCISE_FIXED_ONE);
+	}
+	assert_memory_equal(scene[0]->texture, scene[1]->texture,
+			    sizeof(*scene[0]->texture));
+	assert_memory_not_equal(scene[0]->texture->knot, scene[2]->texture->knot,
+				sizeof(scene[0]->texture->knot));
+	assert_true(scene[3]->texture->factor_most > INCISE_FIXED_ONE);
+	incise_scene_leave_texture_out(scene[0]);
+	assert_null(scene[0]->texture);
+	assert_null(incise_scene_file(scene[0], 2));
+	for (int i = 0; i < 4; i++)
+		incise_scene_free(scene[i]);
+	/* Another model takes its place, and has none. */
+	scene[0] = load(TEXTURE VARIES("0.5", "7"), model_path, &err);
+	succeeds(scene[0]);
+	assert_null(scene[0]->texture);
+	incise_scene_free(scene[0]);
+}
+
+TEST(test_no_texture)
+{
+	static const struct {
+		const char *text, *unit;
+		bool of_model;
+		double variation;
+		int code;
+		const char *says;
+	} cases[] = {
+		{TEXTURE, "mm", false, 0.1, ESTALE, "m.fis.tex"},
+		{TEXTURE, "deg", true, 0.1, EINVAL, "deg"},
+		{TEXTURE VARIES("1.0", "1"), "mm", true, 0, EINVAL, "tissue.variation"},
+		{TEXTURE VARIES("1.5", "1"), "mm", true, 0.1, EINVAL, "a.scene:2"},
+		{TEXTURE VARIES("1.0", "-1"), "mm", true, 0.1, EINVAL, "a.scene:2"},
+		{TEXTURE "tissue = { withdrawal = \"paper\"; };", "mm", true, 0.1, EINVAL,
+		 "model.texture"},
+		{"model = \"m.fis\";\n" VARIES("1.0", "1"), "mm", true, 0.1, EINVAL,
+		 "tissue.variation"},
+		{"model = { texture = \"m.fis.tex\"; };", "mm", true, 0.1, EINVAL, "cut"},
+		{"model = { cut = \"m.fis\"; texture = 1; };", "mm", true, 0.1, EINVAL,
+		 "model.texture"},
+		{"model = { cut = \"m.fis\"; texture = \"m.fis\"; };", "mm", true, 0.1,
+		 EINVAL, "m.fis"},
+		{"model = { cut = \"m.fis\"; texture = \"n.tex\"; };", "mm", true, 0.1,
+		 ENOENT, "n.tex"},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		write_texture(cases[i].unit, cases[i].of_model, cases[i].variation);
+		assert_error(load(cases[i].text, NULL, &err), cases[i].code, &err,
+			     "a.scene", cases[i].says);
+	}
 }
 
 GROUP(set_up, tear_down);

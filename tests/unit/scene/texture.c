@@ -167,7 +167,7 @@ TEST(test_share_that_is_felt)
 	static double force_N[TICKS][3];
 
 	for (int k = 0; k < 2; k++) {
-		double last = 1 + 1e-6;
+		double last = 1.001;
 
 		for (int i = 0; i < 4; i++) {
 			struct incise_scene *scene;

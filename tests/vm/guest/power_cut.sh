@@ -111,7 +111,7 @@ while [ $i -lt "$cuts" ]; do
 		good=-1000
 	fi
 	umount disk
-	[ $((i % 20)) != 0 ] || echo "# $i cuts"
+	[ $((i % 5)) != 0 ] || echo "# $i cuts"
 done
 echo "# $good cuts behind the first commits; at most $most ms are lost"
 check "each disk mounts, each recording opens, none is damaged" [ $good -gt $((cuts / 2)) ]
