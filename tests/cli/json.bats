@@ -19,6 +19,7 @@ models() {
 	made_pairs >pairs.csv
 	printf '5 20\n' >points
 	report train train pairs.csv -o m.fis
+	incise capture -o tooth.rec --rig sim:clock=simulated,cut_s=4,pause_s=0.1,times=4,force_hz=1000 --camera off >/dev/null
 	report train.texture train tooth.rec -o t.fis --texture
 	report info.texture info t.fis.tex
 	report info.textured info t.fis
