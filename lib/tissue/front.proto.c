@@ -151,15 +151,14 @@ bool T(front_enter)(struct T(front) *front, const num at[3], const dir normal[3]
 	return false;
 }
 
-/* Length of a line, and a share of the way beside it, by its parts: both add up from line to line. */
+/* Length of a line, and a share of the way to its side: both add up from line to line. */
 static num length_of(const struct T(line) *line, const num at[3])
 {
 	num off[3];
 
-	off_line(off, line, at);
+	v_sub(off, at, line->at);
 	return n_add(n_sub(line->to, line->from),
-		     n_times(ASIDE,
-			     n_add(n_add(n_abs(off[0]), n_abs(off[1])), n_abs(off[2]))));
+		     n_times(ASIDE, n_abs(v_along(off, line->side))));
 }
 
 num T(front_advance)(struct T(front) *front, const num at[3], const dir normal[3],
