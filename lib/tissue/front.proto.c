@@ -151,13 +151,12 @@ bool T(front_enter)(struct T(front) *front, const num at[3], const dir normal[3]
 	return false;
 }
 
-/* Length of a line, and a share of the way beside it, by its parts: both add up from line to line. */
-static num length_of(const struct T(line) *line, const num at[3])
+/* Length of the line, and a share of the way beside it, by its parts: both add up from line to line. */
+static num length_of(const struct T(front) *front)
 {
-	num off[3];
+	const num *off = front->off;
 
-	off_line(off, line, at);
-	return n_add(n_sub(line->to, line->from),
+	return n_add(n_sub(front->line.to, front->line.from),
 		     n_times(ASIDE,
 			     n_add(n_add(n_abs(off[0]), n_abs(off[1])), n_abs(off[2]))));
 }
@@ -170,19 +169,20 @@ num T(front_advance)(struct T(front) *front, const num at[3], const dir normal[3
 
 	line->from = n_min(line->from, s);
 	line->to = n_max(line->to, s);
-	if (holds(line, at))
+	off_line(front->off, line, at);
+	if (line->there && v_is_short(front->off, BESIDE))
 		return n_sub(n_sub(line->to, line->from), length);
 	/* It left the line sideways; a curved skin does that too. The cut goes on from here. */
 	keep(front);
-	front->way.before += w_of(length_of(line, at));
+	front->way.before += w_of(length_of(front));
 	begin_cut_of(front, at, normal, side);
+	front->off[0] = front->off[1] = front->off[2] = 0;
 	return BESIDE;
 }
 
-bool T(front_way)(struct T(front) *front, const num at[3], num depth)
+bool T(front_way)(struct T(front) *front, num depth)
 {
-	wide way = front->way.before +
-		   w_of(n_add(length_of(&front->line, at), n_max(depth, 0)));
+	wide way = front->way.before + w_of(n_add(length_of(front), n_max(depth, 0)));
 
 	if (!(front->way.most < way))
 		return false;
