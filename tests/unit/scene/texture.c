@@ -198,6 +198,27 @@ TEST(test_share_that_is_felt)
 	}
 }
 
+/* A share that was felt before a reload goes on with a texture, and is not one of a plan without. */
+TEST(test_share_of_the_plan_that_takes_over)
+{
+	static double force_N[TICKS][3];
+	struct incise_scene *scene[3];
+	struct incise_plan *plan[3];
+
+	for (int i = 0; i < 3; i++)
+		plan[i] = textured(&scene[i], i < 2 ? teeth(0.3, 1) : NULL, "fixed", 400);
+	run(plan[0], force_N);
+	assert_false(isnan(incise_plan_texture_felt(plan[0])));
+	for (int i = 1; i < 3; i++) {
+		incise_plan_take_over(plan[i], plan[0]);
+		assert_int_equal(isnan(incise_plan_texture_felt(plan[i])), i == 2);
+	}
+	for (int i = 0; i < 3; i++) {
+		incise_plan_free(plan[i]);
+		incise_scene_free(scene[i]);
+	}
+}
+
 /* The largest factor counts like a gain, and the refusal says what holds. */
 TEST(test_a_scene_is_refused_by_its_largest_factor)
 {
