@@ -205,9 +205,10 @@ num T(front_force)(struct T(front) *front, num unloading, num friction, num dept
 	front->rest = n_sub(front->rest, advance);
 	trial = force = n_times(K, n_sub(depth, front->rest));
 	if (n_below(0, advance)) {
-		wide work2 = w_work(front->work2, front->force, elastic, way);
+		wide work2 = w_work(front->work2, front->force,
+				    n_max(elastic, n_neg(rubs)), way);
 
-		/* Elastic energy is F²/2K. */
+		/* Elastic energy is F²/2K. Nothing pulls with more than the friction. */
 		force = n_min(trial, n_max(elastic, w_paid(K, work2, front->most2)));
 	}
 	upper = n_max(rubs, n_times(K, n_sub(depth, front->cut)));
