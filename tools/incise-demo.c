@@ -192,7 +192,7 @@ static json_t *run_command(const struct demo *demo, char *const *argv)
 #define RUN(demo, ...) run_command(demo, (char *const[]){__VA_ARGS__, NULL})
 
 /* Damping of the haptic scalpel: enough for the models of most seeds to come to rest on it. */
-#define DAMPING "0.015"
+#define DAMPING "0.02"
 
 static void write_scene(const struct demo *demo)
 {

@@ -176,7 +176,8 @@ static const struct cli_option option_table[] = {
 	 CLI_INTEGER(struct train_options, how.train.seed, 0, 1L << 53)},
 	{0, "mf", "N,M",
 	 "membership functions per input (default: 5,4 for two inputs, else 3 "
-	 "each), or auto: chosen by cross-validation",
+	 "each; with --texture 3,2 unless these are better by 5 %), or "
+	 "auto: chosen by cross-validation",
 	 CLI_PARSED_BY(parse_mfs)},
 	{0, "epochs", "N", "of classic: largest number of epochs (default: 80)",
 	 CLI_INTEGER(struct train_options, how.train.epochs, 1, 100000)},
@@ -373,6 +374,8 @@ static void parse_train(struct train_options *options, int argc, char **argv)
 	if (options->n_mfs && options->n_mfs != options->how.n_inputs)
 		cli_usage("--mf: expected %d counts, one for each of --inputs, found %d",
 			  options->how.n_inputs, options->n_mfs);
+	options->how.smooth = options->texture && !options->n_mfs && !options->auto_mfs &&
+			      !options->how.train.classic;
 	for (int i = 0;
 	     i < options->how.n_inputs && !options->n_mfs && !options->auto_mfs; i++)
 		options->how.n_mfs[i] =
@@ -924,6 +927,9 @@ static void report_train_text(const struct train_options *options,
 		printf("  penalty from a random %zu of the pairs, consequents from all\n",
 		       report->pairs_tuned);
 	print_better(options, trained);
+	if (options->how.smooth && incise_model_info(model)->n_mfs[1] == 2)
+		printf("few membership functions, as a smooth model leaves more to the "
+		       "texture; --mf sets others\n");
 	if (texture)
 		texture_print(texture);
 	cli_written();
@@ -1035,7 +1041,8 @@ static void train_texture_alone(const struct train_options *options)
 	if (texture)
 		cli_check(incise_texture_save(texture, options->tex, &err), &err);
 	if (options->json) {
-		json_print(json_pack("{so}", "texture", texture_json(texture)));
+		json_print(json_pack("{so ss}", "texture", texture_json(texture),
+				     "texture_file", options->tex));
 	} else if (texture) {
 		texture_print(texture);
 		cli_written();

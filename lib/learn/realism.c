@@ -418,12 +418,8 @@ int incise_realism_of(const struct incise_texture *texture,
 	int rc = numbers && force ? incise_look_at(&recorded, cuts, n, NULL) : -ENOMEM;
 
 	*realism = (struct incise_realism){.cuts = n,
-					   .length = recorded.length,
-					   .step = recorded.step,
 					   .up_to_cycles = 0.5 / recorded.step,
-					   .noise = recorded.noise,
 					   .events = (int)recorded.n_events,
-					   .rms = recorded.rms,
 					   .skewness = recorded.skewness};
 	find_rates(realism);
 	for (size_t i = 0, at = 0; (int)i < n && !rc; at += cuts[i++].n)

@@ -47,7 +47,6 @@ struct learning {
 	uint64_t seed;
 	struct incise_watch *watch;
 	struct incise_look recorded;
-	double alone;	   /* events of the model alone, relative to the recorded ones */
 	double step;	   /* of the way, between points */
 	double *tau, *sum; /* of the points of a cut */
 	double **force;	   /* of each cut, rendered */
@@ -55,44 +54,9 @@ struct learning {
 
 /* --- pieces --- */
 
-static size_t count_points(const struct incise_texture_cut *part, double step)
-{
-	double n = part->n ? (part->way[part->n - 1] - part->way[0]) / step : 0;
-
-	return (size_t)fmin(n, (double)(POINTS_PER_ROW * part->n));
-}
-
-/*
- * τ of part of a cut at each step, that of the nearest row: means of rows would make falls less steep. Returns
- * the number of points.
- */
-static size_t find_tau(struct learning *learning, const struct incise_texture_cut *cut)
-{
-	struct incise_texture_cut part = incise_look_part(cut, learning->sum);
-	size_t n = count_points(&part, learning->step), row = 0;
-	double *tau = learning->tau, least = 0, mean = 0;
-
-	for (size_t i = 0; i < part.n; i++)
-		least = fmax(least, MODEL_LEAST * part.model[i]);
-	for (size_t i = 0; i < n; i++) {
-		double at = part.way[0] + (double)i * learning->step;
-
-		while (row + 1 < part.n && part.way[row + 1] - at < at - part.way[row])
-			row++;
-		tau[i] = part.force[row] / fmax(part.model[row], least);
-		mean += tau[i] / (double)n;
-	}
-	if (!(mean > 0 && isfinite(mean)))
-		return 0;
-	for (size_t i = 0; i < n; i++)
-		tau[i] = tau[i] / mean - 1;
-	return n;
-}
-
-/* Take the mean over a window around each point away; towards the ends the window gets smaller. */
+/* Take the mean over a window of so many points away; towards the ends it gets smaller. */
 static void take_running_mean(struct learning *learning, size_t n, double window)
 {
-	size_t most = (size_t)(window * learning->recorded.step / learning->step / 2);
 	double *sum = learning->sum;
 
 	sum[0] = 0;
@@ -101,10 +65,40 @@ static void take_running_mean(struct learning *learning, size_t n, double window
 	for (size_t i = 0; i < n; i++) {
 		size_t half = i < n - 1 - i ? i : n - 1 - i;
 
-		half = half < most ? half : most;
+		half = (size_t)fmin((double)half, window / 2);
 		learning->tau[i] -=
 			(sum[i + half + 1] - sum[i - half]) / (double)(2 * half + 1);
 	}
+}
+
+/*
+ * τ of part of a cut at each step, that of the nearest row: means of rows would make falls less steep. Returns
+ * the number of points.
+ */
+static size_t find_tau(struct learning *learning, const struct incise_texture_cut *cut,
+		       double window)
+{
+	struct incise_texture_cut part = incise_look_part(cut, learning->sum);
+	double *tau = learning->tau, least = 0, mean = 0, step = learning->step;
+	size_t n = 0, row = 0;
+
+	for (size_t i = 0; i < part.n; i++)
+		least = fmax(least, MODEL_LEAST * part.model[i]);
+	for (; row + 1 < part.n && n < POINTS_PER_ROW * part.n; n++) {
+		double at = part.way[0] + (double)n * step;
+
+		while (row + 1 < part.n && part.way[row + 1] - at < at - part.way[row])
+			row++;
+		tau[n] = part.force[row] / fmax(part.model[row], least);
+		mean += tau[n];
+	}
+	mean /= fmax((double)n, 1);
+	if (!(mean > 0 && isfinite(mean)))
+		return 0;
+	for (size_t i = 0; i < n; i++)
+		tau[i] = tau[i] / mean - 1;
+	take_running_mean(learning, n, window * learning->recorded.step / step);
+	return n;
 }
 
 static void add_piece(struct incise_texture *texture, size_t *points, const double *tau,
@@ -124,23 +118,16 @@ static void add_piece(struct incise_texture *texture, size_t *points, const doub
 	texture->n[texture->n_curves++] = (int)n;
 }
 
-/* The pieces of cuts, of all of them a like share if they are too many; NULL: there are none. */
+/* Pieces of cuts: a like share of each if all have too many points; NULL: there are none, or no memory. */
 static struct incise_texture *find_pieces(struct learning *learning,
 					  const struct incise_texture_cut *cuts, int n,
 					  const struct candidate *candidate)
 {
+	double share = INCISE_TEXTURE_POINTS * learning->step / learning->recorded.length;
 	struct incise_texture *texture = calloc(1, sizeof(*texture));
-	uint64_t state = incise_random_mix(learning->seed + 1), share;
-	size_t all = 1, points = 0;
+	uint64_t at = 0;
+	size_t points = 0;
 
-	for (int i = 0; i < n; i++) {
-		struct incise_texture_cut part =
-			incise_look_part(&cuts[i], learning->sum);
-
-		all += count_points(&part, learning->step);
-	}
-	share = INCISE_TEXTURE_POINTS < all ? UINT64_MAX / all * INCISE_TEXTURE_POINTS
-					    : UINT64_MAX;
 	if (texture) {
 		texture->step = learning->step;
 		texture->n = calloc(INCISE_TEXTURE_CURVES, sizeof(*texture->n));
@@ -148,13 +135,12 @@ static struct incise_texture *find_pieces(struct learning *learning,
 	}
 	for (int i = 0; i < n && texture && texture->n && texture->point; i++) {
 		const double *tau = learning->tau;
-		size_t m = find_tau(learning, &cuts[i]), from = 0;
+		size_t m = find_tau(learning, &cuts[i], candidate->window), from = 0;
 
-		take_running_mean(learning, m, candidate->window);
 		for (size_t k = 1; k < m; k++) {
 			if (!(tau[k - 1] < 0 && tau[k] >= 0))
 				continue;
-			if (from && incise_random_next(&state) <= share)
+			if (from && incise_random_uniform(learning->seed, at++) < share)
 				add_piece(texture, &points, tau + from, k - from,
 					  candidate->gain);
 			from = k;
@@ -190,55 +176,10 @@ static int render_halves(struct learning *learning, const struct candidate *cand
 		incise_texture_fill(texture, 0, learning->seed, &knots);
 		incise_texture_free(texture);
 		incise_look_render(&knots, learning->cuts + from, n, look->noise,
-				   incise_random_mix(learning->seed + (uint64_t)i),
-				   learning->force + from);
+				   learning->seed + (uint64_t)i, learning->force + from);
 	}
 	return incise_look_at(look, learning->cuts, learning->n, learning->force);
 }
-
-/* How far rendered cuts are from the recorded ones, dB. */
-static double score_look(const struct incise_look *look,
-			 const struct incise_look *recorded)
-{
-	double ratio = fmax(look->rate, 1e-3 * recorded->rate) / recorded->rate;
-
-	return incise_look_distance(look, recorded) + fabs(DECIBEL(ratio));
-}
-
-/* The candidate with the best score, if it improves on none, which is the first. 0, -ENOMEM or -ECANCELED. */
-static int choose_candidate(struct learning *learning, struct candidate *best)
-{
-	int n_gains = sizeof(gains) / sizeof(*gains);
-	int n = 1 + n_gains * (int)(sizeof(windows) / sizeof(*windows));
-	double least = INFINITY;
-
-	for (int i = 0; i < n; i++) {
-		struct candidate candidate = {0};
-		struct incise_look look;
-		double score;
-		int rc;
-
-		if (i)
-			candidate = (struct candidate){windows[(i - 1) / n_gains],
-						       gains[(i - 1) % n_gains]};
-		rc = render_halves(learning, &candidate, &look);
-		score = rc ? INFINITY : score_look(&look, &learning->recorded);
-		learning->alone =
-			i ? learning->alone : look.rate / learning->recorded.rate;
-		free(look.drop);
-		if (rc == -ENOMEM)
-			return rc;
-		if (learning->watch && incise_watch_ask(learning->watch))
-			return -ECANCELED;
-		if (score < least) {
-			least = score - (i ? 0 : IMPROVEMENT);
-			*best = candidate;
-		}
-	}
-	return 0;
-}
-
-/* --- texture --- */
 
 static void note_look(struct incise_texture_look *to, const struct incise_look *look)
 {
@@ -251,38 +192,58 @@ static void note_look(struct incise_texture_look *to, const struct incise_look *
 		to->octave[i] = DECIBEL(look->octave[i]);
 }
 
-static int note_looks(struct learning *learning, const struct candidate *chosen,
-		      struct incise_texture_info *info)
+/*
+ * The candidate nearest to the recorded cuts, if it improves on no texture, which is the first; note what was
+ * seen of both. 0, -ENOMEM or -ECANCELED.
+ */
+static int choose_candidate(struct learning *learning, struct candidate *best,
+			    struct incise_texture_info *info)
 {
 	const struct incise_look *recorded = &learning->recorded;
-	int rc = 0;
+	int n_gains = sizeof(gains) / sizeof(*gains);
+	int n = 1 + n_gains * (int)(sizeof(windows) / sizeof(*windows)), rc = 0;
+	double least = INFINITY;
 
-	info->seed = learning->seed;
-	info->n_cuts = learning->n;
-	info->n_events = (int)recorded->n_events;
-	info->up_to_cycles = 0.5 / recorded->step;
-	note_look(&info->recorded, recorded);
-	for (int i = 0; i < 2 && !rc; i++) {
+	for (int i = 0; i < n && rc != -ENOMEM && rc != -ECANCELED; i++) {
+		struct candidate candidate = {0};
 		struct incise_look look;
 
-		rc = render_halves(learning, i ? chosen : &(struct candidate){0}, &look);
-		if (!rc)
-			info->error[i] = incise_look_distance(&look, recorded);
-		if (!rc && i)
-			note_look(&info->rendered, &look);
+		if (i)
+			candidate = (struct candidate){windows[(i - 1) / n_gains],
+						       gains[(i - 1) % n_gains]};
+		rc = render_halves(learning, &candidate, &look);
+		if (!rc) {
+			double rate = fmax(look.rate / recorded->rate, 1e-3);
+			double error = incise_look_distance(&look, recorded);
+			double score = error + fabs(DECIBEL(rate));
+
+			if (score < least) {
+				least = score - (i ? 0 : IMPROVEMENT);
+				*best = candidate;
+				info->error[i > 0] = error;
+				note_look(&info->rendered, &look);
+			}
+		}
 		free(look.drop);
+		if (learning->watch && incise_watch_ask(learning->watch))
+			rc = -ECANCELED;
 	}
-	return rc;
+	return rc == -ENODATA ? 0 : rc;
 }
+
+/* --- texture --- */
 
 static struct incise_texture *learn_pieces(struct learning *learning,
 					   struct incise_error *err)
 {
 	struct incise_look *recorded = &learning->recorded;
+	int rc = incise_look_at(recorded, learning->cuts, learning->n, NULL);
+	struct incise_texture_info info = {.n_cuts = learning->n,
+					   .n_events = (int)recorded->n_events,
+					   .up_to_cycles = 0.5 / recorded->step};
+	struct incise_texture *texture = NULL;
 	struct candidate best = {0};
-	struct incise_texture *texture;
-	int shift = INCISE_TEXTURE_SHIFT_LEAST,
-	    rc = incise_look_at(recorded, learning->cuts, learning->n, NULL);
+	int shift = INCISE_TEXTURE_SHIFT_LEAST;
 
 	if (!rc && (learning->n < 2 || recorded->n_events < EVENTS_LEAST))
 		return INCISE_ERROR_NULL(
@@ -296,7 +257,7 @@ static struct incise_texture *learn_pieces(struct learning *learning,
 	       ldexp(1, shift - 15) <= recorded->step)
 		shift++;
 	learning->step = ldexp(1, shift - 16);
-	rc = rc ? rc : choose_candidate(learning, &best);
+	rc = rc ? rc : choose_candidate(learning, &best, &info);
 	if (!rc && !best.gain)
 		return INCISE_ERROR_NULL(
 			err, EDOM,
@@ -304,23 +265,28 @@ static struct incise_texture *learn_pieces(struct learning *learning,
 			"the model alone, which has %.2g times their events "
 			"(cross-validated); fewer membership functions (--mf) make it "
 			"smoother",
-			learning->alone);
-	texture = rc ? NULL : find_pieces(learning, learning->cuts, learning->n, &best);
-	if (texture && !note_looks(learning, &best, &texture->info))
-		return texture;
-	incise_texture_free(texture);
-	return INCISE_ERROR_NULL(err, rc ? -rc : ENOMEM, "%s",
-				 rc == -ECANCELED ? "training was stopped"
-						  : "no memory to learn a texture");
+			info.rendered.rate / recorded->rate);
+	if (!rc)
+		texture = find_pieces(learning, learning->cuts, learning->n, &best);
+	if (!texture)
+		return INCISE_ERROR_NULL(err, rc ? -rc : ENOMEM, "%s",
+					 rc == -ECANCELED
+						 ? "training was stopped"
+						 : "no memory to learn a texture");
+	note_look(&info.recorded, recorded);
+	info.most = texture->info.most;
+	texture->info = info;
+	return texture;
 }
 
 struct incise_texture *incise_texture_learn(const struct incise_texture_cut *cuts, int n,
 					    uint64_t seed, struct incise_watch *watch,
 					    struct incise_error *err)
 {
-	struct learning learning = {.n = n, .seed = seed, .watch = watch};
-	size_t rows = 0, most = 0, *order = calloc((size_t)n + 1, sizeof(*order)), room;
+	struct learning learning = {
+		.n = n, .seed = incise_random_mix(seed + 1), .watch = watch};
 	struct incise_texture *texture = NULL;
+	size_t rows = 0, most = 0, room;
 	double *numbers;
 
 	for (int i = 0; i < n; i++) {
@@ -331,23 +297,27 @@ struct incise_texture *incise_texture_learn(const struct incise_texture_cut *cut
 	numbers = calloc(rows + 2 * room, sizeof(*numbers));
 	learning.cuts = calloc((size_t)n + 1, sizeof(*cuts));
 	learning.force = calloc((size_t)n + 1, sizeof(*learning.force));
-	if (numbers && order && learning.cuts && learning.force) {
-		double *at = numbers;
+	if (numbers && learning.cuts && learning.force) {
+		double *at = numbers + 2 * room;
 
-		learning.tau = at;
-		learning.sum = at += room;
-		incise_random_shuffle(order, (size_t)n, seed);
-		at += room;
-		for (int i = 0; i < n; at += learning.cuts[i++].n) {
-			learning.cuts[i] = cuts[order[i]];
-			learning.force[i] = at;
+		learning.tau = numbers;
+		learning.sum = numbers + room;
+		for (int i = 0; i < n; i++) {
+			int j = (int)(incise_random_bits(seed, (uint64_t)i) %
+				      (uint64_t)(i + 1));
+
+			learning.cuts[i] = learning.cuts[j];
+			learning.cuts[j] = cuts[i];
 		}
+		for (int i = 0; i < n; at += learning.cuts[i++].n)
+			learning.force[i] = at;
 		texture = learn_pieces(&learning, err);
 	} else {
 		incise_error_set(err, ENOMEM, "no memory to learn a texture");
 	}
+	if (texture)
+		texture->info.seed = seed;
 	free(numbers);
-	free(order);
 	free(learning.cuts);
 	free(learning.force);
 	free(learning.recorded.drop);

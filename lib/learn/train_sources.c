@@ -535,6 +535,47 @@ static int find_sums(void *user, const struct incise_model *premises,
 	return rc;
 }
 
+/* An error that is smaller by less does not pay for an input, or for functions. */
+#define WORTH 0.95
+
+/* Find the held-out errors of pairs of the sample with such functions. */
+static int judge_grid(struct training *t, const struct incise_pairs *pairs,
+		      const char *const *names, int *n_mfs, struct incise_choice *choice)
+{
+	struct incise_train_options options = t->options->train;
+	struct incise_train_sums none = {.choice = choice};
+	struct incise_model *model;
+	int rc;
+
+	options.groups = incise_corpus_side(t->trained->corpus, false)->sample.groups;
+	model = incise_train_start(pairs, names, t->options->type, n_mfs, &options, NULL);
+	rc = model ? incise_train_sample(model, pairs, NULL, &options, &none, NULL, NULL)
+		   : -errno;
+	incise_model_free(model);
+	return rc;
+}
+
+/* Take few functions unless the others pay. */
+static int choose_smooth(struct training *t, int *n_mfs)
+{
+	const struct incise_pairs *pairs =
+		&incise_corpus_side(t->trained->corpus, false)->sample.pairs;
+	struct incise_choice base = {0}, few = {0};
+	int smooth[INCISE_MODEL_INPUTS_MAX] = {INCISE_TRAIN_MFS}, rc;
+
+	for (int i = 1; i < INCISE_MODEL_INPUTS_MAX; i++)
+		smooth[i] = INCISE_TRAIN_MFS - 1;
+	rc = judge_grid(t, pairs, t->options->columns, n_mfs, &base);
+	if (rc != -ECANCELED)
+		rc = judge_grid(t, pairs, t->options->columns, smooth, &few);
+	if (base.n_units && base.n_units == few.n_units &&
+	    base.total > WORTH * WORTH * few.total)
+		memcpy(n_mfs, smooth, sizeof(smooth));
+	free(base.error);
+	free(few.error);
+	return rc == -ECANCELED ? rc : 0;
+}
+
 static int search_premises(struct training *t)
 {
 	const struct incise_corpus *corpus = t->trained->corpus;
@@ -556,6 +597,9 @@ static int search_premises(struct training *t)
 	options.ranges = ranges;
 	options.uncertainty = &trained->uncertainty;
 	memcpy(n_mfs, t->options->n_mfs, sizeof(n_mfs));
+	rc = t->options->smooth ? choose_smooth(t, n_mfs) : 0;
+	if (rc)
+		return rc;
 	trained->model = incise_train_start(&fit->sample.pairs, t->options->columns,
 					    t->options->type, n_mfs, &options, &t->err);
 	if (!trained->model)
@@ -786,9 +830,6 @@ static int judge_model(struct training *t)
 
 /* --- further inputs ------------------------------------------------------------------ */
 
-/* An error that is smaller by less does not pay for an input. */
-#define WORTH 0.95
-
 /*
  * Whether a gain is beyond chance: few groups with large errors decide its sum, so the number of groups
  * that gain counts, too.
@@ -813,22 +854,11 @@ static int judge_further(struct training *t, int i, struct incise_choice *choice
 	const char *const *columns = t->options->columns;
 	const char *names[] = {columns[0], columns[1], columns[t->reading.n_required + i],
 			       columns[2]};
-	int n_mfs[] = {INCISE_TRAIN_MFS, INCISE_TRAIN_MFS, INCISE_TRAIN_MFS},
-	    rc = -ENOMEM;
-	struct incise_train_options options = t->options->train;
-	struct incise_train_sums none = {.choice = choice};
+	int n_mfs[] = {INCISE_TRAIN_MFS, INCISE_TRAIN_MFS, INCISE_TRAIN_MFS};
 	double *rows = incise_corpus_extend(t->trained->corpus, i);
 	struct incise_pairs pairs = {rows, fit->pairs.n, 3, NULL};
-	struct incise_model *model = NULL;
+	int rc = rows ? judge_grid(t, &pairs, names, n_mfs, choice) : -ENOMEM;
 
-	options.groups = fit->groups;
-	if (rows)
-		model = incise_train_start(&pairs, names, t->options->type, n_mfs,
-					   &options, NULL);
-	if (model)
-		rc = incise_train_sample(model, &pairs, NULL, &options, &none, NULL,
-					 NULL);
-	incise_model_free(model);
 	free(rows);
 	return rc;
 }

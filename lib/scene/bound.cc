@@ -670,6 +670,15 @@ static void run_contact(const struct T(plan) *plan, struct T(state) *state,
 	meet_membrane(plan, state, tick);
 }
 
+/* At a way that is as far off as at any tick: see settle_way(). */
+static void run_texture(const struct T(plan) *plan, struct T(state) *state)
+{
+	if (!plan->texture || state->held != INCISE_TOOL_BLADE)
+		return;
+	state->fresh = joined(state, [&] { return advance(state); });
+	state->tooth = T(texture_at)(plan, &state->front.way, &state->factor);
+}
+
 typedef void stage(const struct T(plan) *, struct T(state) *, struct T(tick) *);
 
 /* Run a stage along all of its paths, and join its forces. The state's errors cover its numbers. */
@@ -718,7 +727,7 @@ static void run_paths(struct tick *t)
 		struct T(tick) tick = t->tick;
 
 		run_contact(&t->plan, &state, &tick);
-		T(stage_texture)(&t->plan, &state, &tick);
+		run_texture(&t->plan, &state);
 		if (t->plan.has_model && at(t->plan.numbers.unloading.id).high > 0 &&
 		    state.held == INCISE_TOOL_BLADE)
 			take(&t->cutting,
@@ -785,13 +794,13 @@ static void settle_front(struct tick *t)
 }
 
 /*
- * The way of the front is the largest of sums of a depth, the length of the line and an eighth of a distance, in all
+ * The way of the front is the largest of sums of a depth and the length of a line with the way to its side, in all
  * ticks together: no more than their errors add up.
  */
 static void settle_way(struct tick *t)
 {
 	const struct T(line) *line = &t->state.front.line;
-	double off_mm = t->depth.both + off(at(line->from.id)) + 2 * off(at(line->to.id));
+	double off_mm = t->depth.both + off(at(line->from.id)) + 3 * off(at(line->to.id));
 	num way = num::of(put({0, 4 * t->plan.reach_mm, off_mm, 0, 16, false}));
 
 	t->state.front.way.most = t->state.front.way.before = way;

@@ -47,7 +47,7 @@ SourceStruct, SourcesOptionsStruct, PropagationReportStruct, TrainedStruct = _li
         void *parts;
         int n_parts, n_further;
         const char *group;
-        bool all_rows, averaged;
+        bool all_rows, averaged, smooth;
         double check;
         void *premises;
         int type, n_mfs[8];

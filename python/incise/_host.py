@@ -87,11 +87,12 @@ class Host:
         arithmetic: Optional[str] = None,
         velocity: bool = False,
         fit_gain: bool = False,
+        texture: bool = True,
         tool: str = "auto",
         tip_mm: Sequence[float] = (0, 0, 0),
         live: bool = False,
     ):
-        self.path, self._scene = load_scene(scene, model, arithmetic)
+        self.path, self._scene = load_scene(scene, model, arithmetic, texture)
         options = HostOptions(step_s, velocity, fit_gain, tuple(tip_mm), find_tool(tool))
         if live:
             clock = function("incise_clock_new_real")()

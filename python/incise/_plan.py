@@ -118,6 +118,7 @@ _library.prototypes(
     int incise_scene_set_arithmetic(struct incise_scene *scene, const char *name,
         struct incise_error *err);
     void incise_scene_set_full(struct incise_scene *scene, bool full);
+    void incise_scene_leave_texture_out(struct incise_scene *scene);
     struct incise_plan *incise_plan_new_fed(const struct incise_scene *scene,
         const struct incise_tracker_info *tracker, struct incise_error *err);
     void incise_plan_free(struct incise_plan *plan);
@@ -213,7 +214,10 @@ def find_scene(scene: PathLike) -> str:
 
 
 def load_scene(
-    scene: PathLike, model: Union[PathLike, Model, CompiledModel, None], arithmetic: Optional[str]
+    scene: PathLike,
+    model: Union[PathLike, Model, CompiledModel, None],
+    arithmetic: Optional[str],
+    texture: bool,
 ) -> Tuple[str, Any]:
     """The path of a scene, and the scene with its model and its arithmetic."""
     path = find_scene(scene)
@@ -222,6 +226,8 @@ def load_scene(
     loaded = _library.Handle(made, "incise_scene_free")
     if arithmetic is not None:
         call("incise_scene_set_arithmetic", loaded, arithmetic.encode())
+    if not texture:
+        function("incise_scene_leave_texture_out")(loaded)
     return path, loaded
 
 
@@ -264,7 +270,7 @@ class Plan:
     """A scene, compiled to its stages, and fed with poses.
 
     scene: a .scene file, or the name of a shipped one. model: in place of the scene's, a .fis or .fx, or
-    a model that was trained or compiled here.
+    a model that was trained or compiled here. texture: with that of the scene, if its model is.
     tracker_hz, latency_ms: of the tracker that the poses are from; the prediction and the stability
     depend on them. A scene that its device cannot hold is refused with the largest safe gain.
     """
@@ -276,12 +282,13 @@ class Plan:
         *,
         arithmetic: Optional[str] = None,
         full: bool = False,
+        texture: bool = True,
         tool: str = "auto",
         tip_mm: Sequence[float] = (0, 0, 0),
         tracker_hz: float = 120,
         latency_ms: float = 4.2,
     ):
-        self.path, self._scene = load_scene(scene, model, arithmetic)
+        self.path, self._scene = load_scene(scene, model, arithmetic, texture)
         function("incise_scene_set_full")(self._scene, full)
         self.rate_hz: float = function("incise_scene_rate_hz")(self._scene)
         self._period_ns = round(1e9 / self.rate_hz)

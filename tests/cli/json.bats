@@ -19,6 +19,7 @@ models() {
 	made_pairs >pairs.csv
 	printf '5 20\n' >points
 	report train train pairs.csv -o m.fis
+	incise capture -o tooth.rec --rig sim:clock=simulated,cut_s=4,pause_s=0.1,times=4,force_hz=1000 --camera off >/dev/null
 	report train.texture train tooth.rec -o t.fis --texture
 	report info.texture info t.fis.tex
 	report info.textured info t.fis
@@ -202,13 +203,13 @@ commands() {
 	mapfile -t files < <(sed "s|^|$out/|" files)
 	schemas --mutate "$INCISE_BUILD/schema" "${files[@]}"
 	[ "$status $output" = "0 " ] || complain "$output"
-	sed 's/"pairs": [0-9]*,/"pairs": "many",/' "$out/train.json" >wrong.json
+	sed 's/"pairs": [0-9]*,/"pairs": "many",/' "$out/merge.json" >wrong.json
 	schemas "$INCISE_BUILD/schema" wrong.json
 	[[ "$status $output" == "1 wrong.json: "*"'many' is not of type 'integer'"* ]]
-	sed 's|incise/train/1|incise/train/2|' "$out/train.json" >wrong.json
+	sed 's|incise/merge/1|incise/merge/2|' "$out/merge.json" >wrong.json
 	schemas "$INCISE_BUILD/schema" wrong.json
-	[ "$status $output" = "1 wrong.json: schema: 'incise/train/1' was expected" ]
-	sed '/"schema"/d' "$out/train.json" >wrong.json
+	[ "$status $output" = "1 wrong.json: schema: 'incise/merge/1' was expected" ]
+	sed '/"schema"/d' "$out/merge.json" >wrong.json
 	schemas "$INCISE_BUILD/schema" wrong.json
 	[ "$status $output" = "1 wrong.json: no schema is named" ]
 }

@@ -21,6 +21,8 @@ setup() {
 
 # bats test_tags=check
 @test "train learns the saw-tooth of a recording" {
+	grep -qE "^6 rules, " out
+	grep -q "smooth model .* --mf" out
 	grep -qE "^texture over the way in mm, of [0-9]+ events in 4 cuts" out
 	[ "$(tail -n 1 out)" = "wrote t.fis, t.fis.sd and t.fis.tex" ]
 	incise info t.fis --json | jq .texture >a.json

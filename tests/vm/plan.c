@@ -160,7 +160,8 @@ static void limits(struct incise_fixed_numbers *numbers, const struct plan_recip
 void *plan_make(const struct plan_recipe *recipe, uint32_t *size)
 {
 	struct incise_fixed_plan_header *head;
-	uint32_t model_size = 0, heights = 0;
+	uint32_t model_size = 0, heights = 0, texture = 0;
+	uint64_t seed = 1;
 	void *model = NULL;
 
 	if (recipe->model)
@@ -169,14 +170,15 @@ void *plan_make(const struct plan_recipe *recipe, uint32_t *size)
 		return NULL;
 	if (recipe->surface == INCISE_FIXED_GRID)
 		heights = KNOTS * KNOTS * sizeof(int32_t);
-	*size = sizeof(*head) + (model_size + 7) / 8 * 8 + heights;
+	if (recipe->model && recipe->texture)
+		texture = sizeof(struct incise_fixed_texture);
+	*size = sizeof(*head) + (model_size + 7) / 8 * 8 + heights + texture;
 	head = calloc(1, *size);
 	if (!head) {
 		free(model);
 		return NULL;
 	}
 	memcpy(head->magic, INCISE_FIXED_PLAN_MAGIC, sizeof(head->magic));
-	head->version = INCISE_FIXED_PLAN_VERSION; /* no inputs but depth and speed */
 	head->size = *size;
 	snprintf(head->name, sizeof(head->name), "%s", recipe->name);
 	if (model) {
@@ -186,17 +188,24 @@ void *plan_make(const struct plan_recipe *recipe, uint32_t *size)
 		free(model);
 	}
 	if (heights) {
-		int32_t *to = (int32_t *)(void *)((char *)head + *size - heights);
+		int32_t *to =
+			(int32_t *)(void *)((char *)head + *size - texture - heights);
 
-		head->heights_at = *size - heights;
+		head->heights_at = *size - texture - heights;
 		head->heights_size = heights;
 		for (int i = 0; i < KNOTS * KNOTS; i++)
 			to[i] = height(i % KNOTS, i / KNOTS);
+	}
+	if (texture) {
+		head->texture_at = *size - texture;
+		incise_fx_trial_texture(&seed, INCISE_TEXTURE_ONE / 2,
+					(void *)((char *)head + head->texture_at));
 	}
 	scalpel(&head->numbers, recipe);
 	surface(&head->numbers, recipe->surface);
 	tissue(&head->numbers, recipe);
 	limits(&head->numbers, recipe);
+	head->version = incise_fixed_plan_version(head);
 	head->crc = incise_fx_crc((uint8_t *)head + INCISE_FIXED_PLAN_CRC_FROM,
 				  *size - INCISE_FIXED_PLAN_CRC_FROM);
 	return head;

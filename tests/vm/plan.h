@@ -22,6 +22,7 @@ struct plan_recipe {
 	int tick_ns;
 	bool inserts, tube, membrane, plain; /* plain: a spring and nothing else */
 	const char *model;		     /* a file, or NULL */
+	bool texture;			     /* with a model */
 };
 
 /* The file of a plan, to be freed; NULL without memory or model. */

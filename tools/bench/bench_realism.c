@@ -51,7 +51,8 @@ static void measure_file(char *path, const char *name, struct row *row)
 						 .group = "cut",
 						 .check = 0.5,
 						 .type = INCISE_MF_GAUSS,
-						 .n_mfs = {5, 4}};
+						 /* Smooth along the speed. */
+						 .n_mfs = {3, 2}};
 	struct recording_rows all = {0};
 	struct incise_train_source *source = sources_new(&path, 1, &all);
 	struct incise_error err = {0};

@@ -30,14 +30,10 @@ struct incise_realism_row {
  */
 struct incise_realism {
 	int cuts;	     /**< that were compared */
-	double length;	     /**< of their way, all together */
-	double step;	     /**< of the way */
 	double up_to_cycles; /**< per unit of the way: half a cycle each step */
-	double noise;	     /**< sd of the sensor's, in the unit of the force */
 	int events;	     /**< recorded */
 	double rate_low,
 		rate_high; /**< 95 % interval of Poisson of the rate, relative to the recorded one */
-	double rms;	 /**< of the texture, relative to the mean force */
 	double skewness; /**< of the differences of the force; a saw-tooth's is negative */
 	struct incise_realism_row kind[INCISE_REALISM_KINDS];
 };

@@ -111,11 +111,32 @@ static int replay(const char *path, const struct felt *f,
 	return rc;
 }
 
+/* The same rig and scene, with teeth of 1 mm. */
+static void add_teeth(struct felt *f)
+{
+	struct incise_fixed_texture *to = calloc(1, sizeof(*to));
+
+	assert_non_null(to);
+	to->step_shift = 11;
+	to->most = INCISE_TEXTURE_ONE / 16;
+	to->factor_most = INCISE_FIXED_ONE;
+	for (int i = 0; i < INCISE_TEXTURE_KNOTS; i++)
+		to->knot[i] = (int16_t)((i % 32 - 16) * INCISE_TEXTURE_ONE / 256);
+	for (int i = 0; i < INCISE_TEXTURE_CUTS; i++)
+		to->factor[i] = INCISE_FIXED_ONE;
+	/* Stiff enough that the teeth rise as they are. */
+	f->scene->tissue.force[0][INCISE_REACTION_UNLOADING] = 1;
+	f->scene->texture = to;
+	incise_plan_free(f->plan);
+	f->plan = incise_plan_new(f->scene, f->rig, &err);
+	succeeds(f->plan);
+}
+
 TEST(forces_are_those_of_the_live_loop)
 {
 	static const char *const evaluators[] = {"fixed", "double"};
 
-	for (int k = 0; k < 2; k++) {
+	for (int k = 0; k < 4; k++) {
 		struct incise_loop_options loop = {.rate_hz = 1000,
 						   .duration_ns = TICKS * MS,
 						   .log = live,
@@ -124,10 +145,15 @@ TEST(forces_are_those_of_the_live_loop)
 		struct incise_replay_report report;
 		struct felt f;
 
-		felt_start(&f, evaluators[k], INCISE_RIG_TRACKER);
+		double felt;
+
+		felt_start(&f, evaluators[k % 2], INCISE_RIG_TRACKER);
+		if (k >= 2)
+			add_teeth(&f);
 		assert_int_equal(incise_loop_run(f.plan, incise_rig_clock(f.rig), &loop,
 						 &stats, &err),
 				 0);
+		felt = stats.texture_felt;
 		if (replay("a.rec", &f, (struct incise_replay_options){0}, &seen, &report,
 			   &err))
 			fail_msg("%s", err.text);
@@ -135,6 +161,9 @@ TEST(forces_are_those_of_the_live_loop)
 		assert_int_equal(seen.n, TICKS - 1);
 		assert_int_equal(stats.ticks, TICKS - 1);
 		assert_true(seen.in_cut && stats.force_max_N > 0.3);
+		assert_true(isnan(felt) ? k < 2
+					: k >= 2 && felt > 0.5 &&
+						  fabs(stats.texture_felt - felt) < 0.01);
 		assert_true(fabs(report.seconds - (TICKS - 2) * 1e-3) < 1e-9);
 		assert_int_equal(report.poses,
 				 (int)ask(DB, "SELECT count(*) FROM tracker WHERE "

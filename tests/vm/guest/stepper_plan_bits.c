@@ -189,6 +189,8 @@ int main(int argc, char **argv)
 		{"spring, 1 kHz", INCISE_FIXED_PLANE, 1, 1000000, .plain = true},
 		{"plane, model, 1 kHz", INCISE_FIXED_PLANE, 1, 1000000, .inserts = true,
 		 .membrane = true, .model = model},
+		{"plane, texture, 1 kHz", INCISE_FIXED_PLANE, 1, 1000000, .model = model,
+		 .texture = true},
 		{"capsule, 2 axes, 1 kHz", INCISE_FIXED_CAPSULE, 2, 1000000,
 		 .inserts = true, .tube = true, .model = model},
 		{"grid, 3 axes, 1 kHz", INCISE_FIXED_GRID, 3, 1000000, .inserts = true,

@@ -135,7 +135,7 @@ static void refused_files(void)
 	check(plan_load(&bench, head, INCISE_FIXED_PLAN_SIZE_MAX + 1, ALL) == -EFBIG,
 	      "too large: EFBIG");
 	check(plan_load(&bench, (void *)8, size, ALL) == -EFAULT, "from nowhere: EFAULT");
-	wrong.version = INCISE_FIXED_PLAN_VERSION_MORE + 1;
+	wrong.version = INCISE_FIXED_PLAN_VERSION_TEXTURE + 1;
 	check(plan_load(&bench, &wrong, sizeof(wrong), ALL) == -EOPNOTSUPP,
 	      "of another version: EOPNOTSUPP");
 	wrong = *head;
