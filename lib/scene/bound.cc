@@ -795,12 +795,13 @@ static void settle_front(struct tick *t)
 
 /*
  * The way of the front is the largest of sums of a depth and the length of a line with the way to its side, in all
- * ticks together: no more than their errors add up.
+ * ticks together: no more than their errors add up; of both ways, which are across each other, √2 of one.
  */
 static void settle_way(struct tick *t)
 {
 	const struct T(line) *line = &t->state.front.line;
-	double off_mm = t->depth.both + off(at(line->from.id)) + 3 * off(at(line->to.id));
+	double off_mm =
+		t->depth.both + off(at(line->from.id)) + 1.5 * off(at(line->to.id));
 	num way = num::of(put({0, 4 * t->plan.reach_mm, off_mm, 0, 16, false}));
 
 	t->state.front.way.most = t->state.front.way.before = way;

@@ -161,12 +161,12 @@ static bool helps(struct incise_plan *plan, const struct incise_tracker_info *tr
 #define ATTEMPTS 6
 #define HOST_ATTEMPTS 16 /* shorter steps swing in other ways */
 
-/* For a message. */
+/* For a message, to the bit as it is read again: a texture leaps at less. */
 static double three_digits(double value, double (*round)(double))
 {
-	double unit = pow(10, floor(log10(value)) - 2);
+	double part = pow(10, 2 - floor(log10(value)));
 
-	return round(value / unit) * unit;
+	return round(value * part) / part;
 }
 
 /* The device's own damping, or as much as any has. */

@@ -22,7 +22,8 @@ void incise_plan_take_over(struct incise_plan *plan, const struct incise_plan *b
 	plan->ops.clear_cuts(plan);
 	for (int i = 0; before->ops.cut(from, i, &cut); i++)
 		plan->ops.add_cut(plan, &cut);
-	plan->felt = before->felt;
+	if (plan->texture)
+		plan->felt = before->felt;
 }
 
 void incise_plan_free(struct incise_plan *plan)

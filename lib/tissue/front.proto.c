@@ -151,13 +151,13 @@ bool T(front_enter)(struct T(front) *front, const num at[3], const dir normal[3]
 	return false;
 }
 
-/* Length of a line with the way to its side, which add up from line to line of a straight way. */
-static inline num length_of(const struct T(line) *line, const num at[3])
+/* Length of the line with the way to its side, which add up from line to line of a straight way. */
+static inline num length_of(const struct T(front) *front)
 {
-	num off[3], aside, along = n_sub(line->to, line->from);
+	const struct T(line) *line = &front->line;
+	num along = n_sub(line->to, line->from),
+	    aside = n_abs(v_along(front->off, line->side));
 
-	v_sub(off, at, line->at);
-	aside = n_abs(v_along(off, line->side));
 	return n_add(n_max(along, aside), n_times(ASIDE, n_min(along, aside)));
 }
 
@@ -169,19 +169,20 @@ num T(front_advance)(struct T(front) *front, const num at[3], const dir normal[3
 
 	line->from = n_min(line->from, s);
 	line->to = n_max(line->to, s);
-	if (holds(line, at))
+	off_line(front->off, line, at);
+	if (line->there && v_is_short(front->off, BESIDE))
 		return n_sub(n_sub(line->to, line->from), length);
 	/* It left the line sideways; a curved skin does that too. The cut goes on from here. */
 	keep(front);
-	front->way.before += w_of(length_of(line, at));
+	front->way.before += w_of(length_of(front));
 	begin_cut_of(front, at, normal, side);
+	front->off[0] = front->off[1] = front->off[2] = 0;
 	return BESIDE;
 }
 
-bool T(front_way)(struct T(front) *front, const num at[3], num depth)
+bool T(front_way)(struct T(front) *front, num depth)
 {
-	wide way = front->way.before +
-		   w_of(n_add(length_of(&front->line, at), n_max(depth, 0)));
+	wide way = front->way.before + w_of(n_add(length_of(front), n_max(depth, 0)));
 
 	if (!(front->way.most < way))
 		return false;
@@ -204,9 +205,10 @@ num T(front_force)(struct T(front) *front, num unloading, num friction, num dept
 	front->rest = n_sub(front->rest, advance);
 	trial = force = n_times(K, n_sub(depth, front->rest));
 	if (n_below(0, advance)) {
-		wide work2 = w_work(front->work2, front->force, elastic, way);
+		wide work2 = w_work(front->work2, front->force,
+				    n_max(elastic, n_neg(rubs)), way);
 
-		/* Elastic energy is F²/2K. */
+		/* Elastic energy is F²/2K. Nothing pulls with more than the friction. */
 		force = n_min(trial, n_max(elastic, w_paid(K, work2, front->most2)));
 	}
 	upper = n_max(rubs, n_times(K, n_sub(depth, front->cut)));

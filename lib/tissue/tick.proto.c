@@ -629,8 +629,7 @@ void T(stage_texture)(const struct T(plan) *plan, struct T(state) *state,
 		return;
 	state->fresh = T_JOINED(state, advance(state));
 	state->goes_on =
-		!state->membrane.hit &&
-		T(front_way)(&state->front, state->proxy.touch.point, state->depth);
+		!state->membrane.hit && T(front_way)(&state->front, state->depth);
 	state->tooth = T(texture_at)(plan, &state->front.way, &state->factor);
 }
 

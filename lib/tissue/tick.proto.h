@@ -118,6 +118,7 @@ struct T(front) {
 	} kept[T_FRONT_CUTS]; /* as they were left; that in which it is, as it was entered */
 	int32_t n, in, newest; /* so many there are; it is in this one; this began last */
 	struct T(way) way;
+	num off[3];	/* from the line to the place of the last advance */
 	uint32_t begun; /* cuts, so far */
 };
 
@@ -139,7 +140,7 @@ num T(front_advance)(struct T(front) *front, const num at[3], const dir normal[3
  * at; it stays while the blade rests, draws back or is where it was. Call after T(front_advance)(). Returns whether it
  * went on.
  */
-bool T(front_way)(struct T(front) *front, const num at[3], num depth) INCISE_REALTIME;
+bool T(front_way)(struct T(front) *front, num depth) INCISE_REALTIME;
 
 /*
  * The force on the blade, out of the tissue: -friction × cutting … cutting. Any numbers are safe.

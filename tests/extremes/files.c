@@ -556,6 +556,24 @@ static void write_in(const struct mutants *m, const char *name, void (*write)(FI
 	free(bytes.broken);
 }
 
+/* The files that a shipped scene reads: a texture is of one model alone. */
+static void copy_in(const struct mutants *m, const char *name)
+{
+	struct incise_error err = {0};
+	char *bytes = malloc(SIZE_MAX_BYTES), path[PATH_MAX];
+	size_t n;
+
+	if (!bytes)
+		cli_fail("no memory");
+	snprintf(path, sizeof(path), "%s/%s", m->row->setup->scenes, name);
+	if (read_whole(path, bytes, SIZE_MAX_BYTES, &n, &err))
+		cli_fail_with(&err);
+	snprintf(path, sizeof(path), "%s/%s", m->folder, name);
+	if (write_whole(path, bytes, n, &err))
+		cli_fail_with(&err);
+	free(bytes);
+}
+
 static void take_whole(struct mutants *m)
 {
 	struct incise_error err = {0};
@@ -607,7 +625,8 @@ static void try_mutants(struct extremes_row *row, const struct property *propert
 	m->row = row;
 	folder_make(m->folder, sizeof(m->folder), "for scenes");
 	snprintf(m->path, sizeof(m->path), "%s/x.scene", m->folder);
-	write_in(m, "liver.fis", ground_write_model);
+	copy_in(m, "liver.fis");
+	copy_in(m, "liver.fis.tex");
 	write_in(m, "s.obj", write_mesh);
 	write_in(m, "s.asc", write_heights);
 	take_whole(m);

@@ -213,11 +213,6 @@ struct incise_plan_texture {
 	double rms;			  /**< of τ */
 	double events_per_mm;		  /**< of such cuts, as they were learned */
 	double factor_least, factor_most; /**< of a cut's force */
-	/**
-	 * Share of it that the limit of slew and the actuators can follow, in a cut at 10 mm/s with half of the
-	 * scene's largest force.
-	 */
-	double follows;
 };
 
 /** Get the texture of the plan. @return false: it has none, and all is 0. */
@@ -279,6 +274,8 @@ INCISE_API void incise_plan_rendered(const struct incise_plan *plan,
  *    keeps from that;
  *  - while no force goes unpaid (INCISE_TICK_UNPAID): at the end of an account roundings decide;
  *  - for the tip that is set.
+ *
+ * A texture adds the error of its way times its steepest fall: much, where it falls within a few micrometres.
  *
  * With a model of three or four inputs it rests on estimated slopes
  * (incise_plan_stability.certified) and is no proof. Takes up to some seconds.

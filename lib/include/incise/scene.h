@@ -35,7 +35,7 @@ struct incise_scene;
  * @return scene, to be freed with incise_scene_free(); NULL with errno of
  *         incise_infile_open(), EINVAL (syntax, unknown key, value out of range; the error
  *         names file, line and accepted range), or of incise_model_load(),
- *         incise_fixed_load(), incise_surface_load_mesh().
+ *         incise_fixed_load(), incise_texture_load(), incise_surface_load_mesh().
  */
 INCISE_API struct incise_scene *incise_scene_load(const char *path, const char *model,
 						  struct incise_error *err);
@@ -53,8 +53,8 @@ INCISE_API int incise_scene_set_arithmetic(struct incise_scene *scene, const cha
 INCISE_API int incise_scene_set_texture(struct incise_scene *scene, int texture_px);
 
 /**
- * Leave out the texture of the cuts, model.texture, and their variation: plans that are made from now on
- * render the model's mean force.
+ * Leave out the texture of the cuts, model.texture, and their variation: plans render the model's mean force. Call it
+ * before a plan is made of the scene, for plans read its texture.
  */
 INCISE_API void incise_scene_leave_texture_out(struct incise_scene *scene);
 

@@ -169,15 +169,15 @@ static struct incise_scene *cut_of(const struct drawn *d, uint64_t seed)
 	return scene;
 }
 
-/* By the front alone. */
+/* By the front alone; first a stiff one that was drawn back sideways and gave work. */
 TEST(test_no_cut_with_texture_returns_more_than_it_takes)
 {
 	int cuts = cases_are_all() ? CUTS : CUTS_FEW;
-	uint64_t seed = cases_seed(1);
+	uint64_t seed = 30175, next = cases_seed(1);
 	struct met met = {0};
 	static struct drawn d;
 
-	for (; met.contacts < cuts; seed++) {
+	for (; met.contacts < cuts; seed = next++) {
 		struct incise_scene *scene;
 
 		draw(seed, &d);

@@ -50,11 +50,11 @@ static double advance(struct front *f, const double at[3], double depth)
 	before = f->whole ? f->i.newest : f->d.newest;
 	if (f->whole) {
 		fresh = incise_fixed_front_advance(&f->i, p, n, s);
-		incise_fixed_front_way(&f->i, p, q16(depth));
+		incise_fixed_front_way(&f->i, q16(depth));
 		new_mm = fresh / ONE;
 	} else {
 		new_mm = incise_double_front_advance(&f->d, at, up, side);
-		incise_double_front_way(&f->d, at, depth);
+		incise_double_front_way(&f->d, depth);
 	}
 	f->left += (f->whole ? f->i.newest : f->d.newest) != before;
 	return new_mm;
