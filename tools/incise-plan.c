@@ -236,9 +236,9 @@ static json_t *texture_json(const struct incise_plan *plan)
 
 	if (!incise_plan_texture(plan, &t))
 		return json_null();
-	return json_pack("{sf sf sf sf sf so}", "most", t.most, "rms", t.rms,
+	return json_pack("{sf sf sf sf sf}", "most", t.most, "rms", t.rms,
 			 "events_per_mm", t.events_per_mm, "factor_min", t.factor_least,
-			 "factor_max", t.factor_most, "follows", json_number(t.follows));
+			 "factor_max", t.factor_most);
 }
 
 static void print_texture(const struct incise_plan *plan)
@@ -247,11 +247,9 @@ static void print_texture(const struct incise_plan *plan)
 
 	if (incise_plan_texture(plan, &t))
 		printf("texture     up to ±%.3g %% of the force, %.3g %% rms, %.3g events/mm; "
-		       "a cut has %.3g to %.3g times the force\n"
-		       "            at 10 mm/s and half the largest force %.0f %% of it can be "
-		       "followed\n",
+		       "a cut has %.3g to %.3g times the force\n",
 		       100 * t.most, 100 * t.rms, t.events_per_mm, t.factor_least,
-		       t.factor_most, 100 * t.follows);
+		       t.factor_most);
 }
 
 static void report_plan_json(const struct plan_job *job, const struct incise_plan *plan,

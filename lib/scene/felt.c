@@ -58,47 +58,6 @@ double incise_plan_texture_felt(const struct incise_plan *plan)
 	return incise_felt_share(&plan->felt);
 }
 
-/* A cut of the plan's device through all of its table, with this force without texture. */
-#define CUT_MM_S 10.0
-
-static double find_follows(const struct incise_plan *plan)
-{
-	const struct incise_fixed_texture *texture = plan->texture;
-	double mm = ldexp(1, texture->step_shift - 16),
-	       period_s = 1 / plan->scene->rate_hz;
-	double N_s = INFINITY, N_s2 = INFINITY, slewed_N, acting_N, speed_N_s = 0;
-	double mean_N = plan->scene->limits.force_N / 2;
-	struct incise_felt felt = {.sum = {{0}}};
-
-	for (int i = 0; i < plan->axes.n; i++) {
-		const struct incise_stepper_info *info = &plan->axes.axis[i].info;
-
-		N_s = fmin(N_s, info->spring_N_mm * info->velocity_mm_s);
-		N_s2 = fmin(N_s2, info->spring_N_mm * info->acceleration_mm_s2);
-	}
-	slewed_N = acting_N = mean_N;
-	for (double at = 0; at < INCISE_TEXTURE_KNOTS; at += CUT_MM_S * period_s / mm) {
-		int knot = (int)at;
-		double low = texture->knot[knot];
-		double high = texture->knot[(knot + 1) % INCISE_TEXTURE_KNOTS];
-		double texture_N =
-			mean_N * (low + (high - low) * (at - knot)) / INCISE_TEXTURE_ONE;
-		double most_N = plan->scene->limits.slew_N_s * period_s, off_N, to_N_s;
-
-		slewed_N += fmax(-most_N, fmin(mean_N + texture_N - slewed_N, most_N));
-		/* A motor that can still stop there. */
-		off_N = slewed_N - acting_N;
-		to_N_s = fmin(fabs(off_N) / period_s,
-			      fmin(N_s, sqrt(2 * N_s2 * fabs(off_N))));
-		most_N = N_s2 * period_s;
-		speed_N_s +=
-			fmax(-most_N, fmin(copysign(to_N_s, off_N) - speed_N_s, most_N));
-		acting_N += speed_N_s * period_s;
-		incise_felt_add(&felt, mean_N, texture_N, acting_N);
-	}
-	return incise_felt_share(&felt);
-}
-
 bool incise_plan_texture(const struct incise_plan *plan, struct incise_plan_texture *to)
 {
 	const struct incise_fixed_texture *texture = plan->texture;
@@ -118,7 +77,6 @@ bool incise_plan_texture(const struct incise_plan *plan, struct incise_plan_text
 		.events_per_mm = plan->scene->learned.rendered.rate,
 		.factor_least = least / (double)INCISE_FIXED_ONE,
 		.factor_most = texture->factor_most / (double)INCISE_FIXED_ONE,
-		.follows = find_follows(plan),
 	};
 	return true;
 }

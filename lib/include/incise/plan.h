@@ -213,11 +213,6 @@ struct incise_plan_texture {
 	double rms;			  /**< of τ */
 	double events_per_mm;		  /**< of such cuts, as they were learned */
 	double factor_least, factor_most; /**< of a cut's force */
-	/**
-	 * Share of it that the limit of slew and the actuators can follow, in a cut at 10 mm/s with half of the
-	 * scene's largest force.
-	 */
-	double follows;
 };
 
 /** Get the texture of the plan. @return false: it has none, and all is 0. */
