@@ -27,7 +27,7 @@ struct incise_texture {
 	double step; /* 2^INCISE_TEXTURE_SHIFT_LEAST / 65536 to … _MOST */
 	int n_curves;
 	int n[INCISE_TEXTURE_CURVES]; /* points of each, 2 or more */
-	/* Of all, after each other; whole, of 1/INCISE_TEXTURE_ONE. */
+	/* The points, curve after curve; whole, of 1/INCISE_TEXTURE_ONE. */
 	double point[INCISE_TEXTURE_POINTS];
 };
 
