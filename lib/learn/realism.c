@@ -30,7 +30,7 @@
 #define FORCE_SHARE 0.5
 #define ALMOST 0.99
 
-static size_t rows_of_cuts(const struct incise_texture_cut *cuts, int n)
+size_t incise_look_rows(const struct incise_texture_cut *cuts, int n)
 {
 	size_t rows = 0;
 
@@ -48,26 +48,28 @@ static double take_quantile(double *numbers, size_t n, double share)
 struct incise_texture_cut incise_look_part(const struct incise_texture_cut *cut,
 					   double *numbers)
 {
-	const double *way = cut->way, *force = cut->force;
+	const struct incise_texture_row *row = cut->row;
 	double fast, strong;
 	size_t from = cut->n, to = 0;
 
 	for (size_t i = 1; i < cut->n; i++)
-		numbers[i - 1] = way[i] - way[i - 1];
+		numbers[i - 1] = row[i].way - row[i - 1].way;
 	fast = FAST_SHARE * take_quantile(numbers, cut->n ? cut->n - 1 : 0, ALMOST);
-	memcpy(numbers, force, cut->n * sizeof(*numbers));
+	for (size_t i = 0; i < cut->n; i++)
+		numbers[i] = row[i].force;
 	strong = FORCE_SHARE * take_quantile(numbers, cut->n, ALMOST);
 	for (size_t i = 1; i < cut->n; i++)
-		if (way[i] - way[i - 1] >= fast && force[i] >= strong) {
+		if (row[i].way - row[i - 1].way >= fast && row[i].force >= strong) {
 			from = from < i ? from : i;
 			to = i + 1;
 		}
 	from = from < to ? from : to;
-	return (struct incise_texture_cut){way + from, force + from, cut->model + from,
-					   to - from};
+	return (struct incise_texture_cut){row + from, to - from};
 }
 
-static double median_step(const struct incise_texture_cut *cuts, int n, double *numbers)
+/* The medians of the way of a row, and of the second differences of the force. */
+static void find_scales(struct incise_look *look, const struct incise_texture_cut *cuts,
+			int n, double *numbers)
 {
 	size_t m = 0;
 
@@ -75,42 +77,40 @@ static double median_step(const struct incise_texture_cut *cuts, int n, double *
 		struct incise_texture_cut part = incise_look_part(&cuts[c], numbers + m);
 
 		for (size_t k = 1; k < part.n; k++)
-			numbers[m++] = part.way[k] - part.way[k - 1];
+			numbers[m++] = part.row[k].way - part.row[k - 1].way;
 	}
-	return m ? take_quantile(numbers, m, 0.5) : 1;
-}
-
-static double median_noise(const struct incise_texture_cut *cuts, int n, double *numbers)
-{
-	size_t m = 0;
-
+	look->step = m ? take_quantile(numbers, m, 0.5) : 1;
+	m = 0;
 	for (int c = 0; c < n; c++) {
-		const double *f = cuts[c].force;
+		const struct incise_texture_row *row = cuts[c].row;
 
 		for (size_t k = 2; k < cuts[c].n; k++)
-			numbers[m++] = fabs(f[k] - 2 * f[k - 1] + f[k - 2]);
+			numbers[m++] = fabs(row[k].force - 2 * row[k - 1].force +
+					    row[k - 2].force);
 	}
-	return take_quantile(numbers, m, 0.5) * SD_OF_BENDS;
+	look->noise = take_quantile(numbers, m, 0.5) * SD_OF_BENDS;
 }
 
 /* --- one cut --- */
 
 /* The means of the line through the rows over cells of one step; returns their number, @most or fewer. */
-static size_t average_cells(const struct incise_texture_cut *cut, const double *force,
+static size_t average_cells(const struct incise_texture_cut *cut, const double *rendered,
 			    double step, double *cell, size_t most)
 {
+	const struct incise_texture_row *row = cut->row;
 	double at = 0, sum = 0;
 	size_t n = 0;
 
 	for (size_t i = 1; i < cut->n; i++) {
-		double from = at, until = cut->way[i] - cut->way[0];
-		double slope = (force[i] - force[i - 1]) / (until - from);
+		double force = rendered ? rendered[i - 1] : row[i - 1].force;
+		double from = at, until = row[i].way - row[0].way;
+		double slope = ((rendered ? rendered[i] : row[i].force) - force) /
+			       (until - from);
 
 		while (n < most && at < until) {
 			double edge = (double)(n + 1) * step, to = fmin(edge, until);
 
-			sum += (to - at) *
-			       (force[i - 1] + slope * ((at + to) / 2 - from));
+			sum += (to - at) * (force + slope * ((at + to) / 2 - from));
 			at = to;
 			if (to < edge)
 				continue;
@@ -161,7 +161,7 @@ static int find_events(struct incise_look *look, const double *cell, size_t n,
 
 /* Sums of windows and of differences. */
 struct sums {
-	double power[INCISE_LOOK_OCTAVES], square, force;
+	double power[INCISE_TEXTURE_OCTAVES], square, force;
 	double difference[3]; /* of its powers 1 … 3 */
 	double windows, spectra, cells;
 };
@@ -193,7 +193,7 @@ static void add_spectrum(struct sums *sums, const double *cell)
 	for (int i = 0; i < WINDOW; i++)
 		x[i] = (cell[i + 1] - cell[i] - mean) *
 		       (0.5 - 0.5 * cos(2 * M_PI * (i + 1) / (WINDOW + 1)));
-	for (int k = 0; k < INCISE_LOOK_OCTAVES; k++) {
+	for (int k = 0; k < INCISE_TEXTURE_OCTAVES; k++) {
 		int first = k ? (last + 1) / 2 : last / 2;
 
 		for (int f = first; f <= last; f++) {
@@ -235,44 +235,46 @@ static int look_at_cells(struct incise_look *look, struct sums *sums, const doub
 
 static void finish_look(struct incise_look *look, const struct sums *sums)
 {
+	struct incise_texture_look *shape = &look->shape;
 	double m = fmax(sums->cells, 1), mean = sums->difference[0] / m,
 	       square = sums->difference[1] / m, variance = fmax(square - mean * mean, 0);
 
 	if (look->n_events)
 		qsort(look->drop, look->n_events, sizeof(*look->drop), ascending);
-	look->rate = look->length > 0 ? (double)look->n_events / look->length : 0;
-	look->rms =
+	for (int i = 0; i < INCISE_TEXTURE_DECILES && look->n_events; i++)
+		shape->drop[i] = look->drop[look->n_events * (size_t)(i + 1) /
+					    (INCISE_TEXTURE_DECILES + 1)];
+	shape->rate = look->length > 0 ? (double)look->n_events / look->length : 0;
+	shape->rms =
 		sums->force > 0 ? sqrt(sums->square * sums->windows) / sums->force : 0;
 	look->skewness = variance > 0 ? (sums->difference[2] / m - 3 * mean * square +
 					 2 * mean * mean * mean) /
 						pow(variance, 1.5)
 				      : 0;
-	for (int k = 0; k < INCISE_LOOK_OCTAVES; k++)
-		look->octave[k] = sums->power[k] / fmax(sums->spectra, 1);
+	for (int k = 0; k < INCISE_TEXTURE_OCTAVES; k++)
+		shape->octave[k] =
+			INCISE_DECIBEL(sums->power[k] / fmax(sums->spectra, 1));
 }
 
 int incise_look_at(struct incise_look *look, const struct incise_texture_cut *cuts, int n,
-		   double *const *rendered)
+		   const double *rendered)
 {
-	size_t most = CELLS_PER_ROW * rows_of_cuts(cuts, n) + 1;
+	size_t most = CELLS_PER_ROW * incise_look_rows(cuts, n) + 1, row = 0;
 	double *numbers = malloc(most * sizeof(*numbers));
 	struct sums sums = {0};
 	int rc = numbers ? 0 : -ENOMEM;
 
-	if (!rc && !look->step) {
-		look->step = median_step(cuts, n, numbers);
-		look->noise = median_noise(cuts, n, numbers);
-	}
-	for (int i = 0; i < n && !rc; i++) {
+	if (!rc && !look->step)
+		find_scales(look, cuts, n, numbers);
+	for (int i = 0; i < n && !rc; row += cuts[i++].n) {
 		struct incise_texture_cut part = incise_look_part(&cuts[i], numbers);
-		const double *force = rendered
-					      ? rendered[i] + (part.force - cuts[i].force)
-					      : part.force;
+		const double *force =
+			rendered ? rendered + row + (part.row - cuts[i].row) : NULL;
 		double largest = 0;
 		size_t m;
 
 		for (size_t k = 0; k < cuts[i].n; k++)
-			largest = fmax(largest, cuts[i].force[k]);
+			largest = fmax(largest, cuts[i].row[k].force);
 		m = average_cells(&part, force, look->step, numbers, most);
 		rc = look_at_cells(look, &sums, numbers, m, largest);
 	}
@@ -286,9 +288,9 @@ double incise_look_distance(const struct incise_look *a, const struct incise_loo
 {
 	double sum = 0;
 
-	for (int k = 0; k < INCISE_LOOK_OCTAVES; k++)
-		sum += fabs(10 * log10((a->octave[k] + 1e-30) / (b->octave[k] + 1e-30)));
-	return sum / INCISE_LOOK_OCTAVES;
+	for (int k = 0; k < INCISE_TEXTURE_OCTAVES; k++)
+		sum += fabs(a->shape.octave[k] - b->shape.octave[k]);
+	return sum / INCISE_TEXTURE_OCTAVES;
 }
 
 double incise_look_drops(const struct incise_look *a, const struct incise_look *b)
@@ -350,19 +352,21 @@ static void make_noise(struct incise_fixed_texture *texture, uint64_t key)
 
 double incise_look_render(const struct incise_fixed_texture *knots,
 			  const struct incise_texture_cut *cuts, int n, double noise,
-			  uint64_t key, double *const *force)
+			  uint64_t key, double *force)
 {
 	double sum = 0, model = 0;
 	uint64_t at = 0;
 
 	for (int i = 0; i < n; i++)
 		for (size_t k = 0; k < cuts[i].n; k++) {
-			double f = fmax(cuts[i].model[k], 0);
+			const struct incise_texture_row *row = &cuts[i].row[k];
+			double f = fmax(row->model, 0);
 
 			model += f;
-			f *= 1 + tau_at(knots, i, cuts[i].way[k] - cuts[i].way[0]);
+			f *= 1 + tau_at(knots, i, row->way - cuts[i].row->way);
 			sum += f;
-			force[i][k] = f + noise * incise_random_normal(key, at++);
+			force[at] = f + noise * incise_random_normal(key, at);
+			at++;
 		}
 	return model > 0 ? sum / model : 1;
 }
@@ -370,7 +374,7 @@ double incise_look_render(const struct incise_fixed_texture *knots,
 /* Add one draw of one kind to its row. */
 static int add_draw(const struct incise_texture *texture, enum incise_realism_kind kind,
 		    uint64_t seed, const struct incise_texture_cut *cuts, int n,
-		    const struct incise_look *recorded, double *const *force,
+		    const struct incise_look *recorded, double *force,
 		    struct incise_realism_row *row)
 {
 	struct incise_look look = {.step = recorded->step, .noise = recorded->noise};
@@ -386,10 +390,10 @@ static int add_draw(const struct incise_texture *texture, enum incise_realism_ki
 				  force);
 	rc = incise_look_at(&look, cuts, n, force);
 	if (!rc) {
-		row->rate += look.rate / recorded->rate / DRAWS;
+		row->rate += look.shape.rate / recorded->shape.rate / DRAWS;
 		row->drops += incise_look_drops(&look, recorded) / DRAWS;
 		row->spectrum_dB += incise_look_distance(&look, recorded) / DRAWS;
-		row->rms += look.rms / recorded->rms / DRAWS;
+		row->rms += look.shape.rms / recorded->shape.rms / DRAWS;
 		row->skewness += look.skewness / DRAWS;
 		row->mean_force += (mean - 1) / DRAWS;
 	}
@@ -397,38 +401,30 @@ static int add_draw(const struct incise_texture *texture, enum incise_realism_ki
 	return rc;
 }
 
-/* The interval of Poisson of so many events, relative to them; Breslow and Day (1987), after Byar. */
-static void find_rates(struct incise_realism *realism)
-{
-	double n = realism->events, m = n + 1;
-
-	realism->rate_low = n > 0 ? pow(1 - 1 / (9 * n) - 1.96 / (3 * sqrt(n)), 3) : 0;
-	realism->rate_high =
-		n > 0 ? m / n * pow(1 - 1 / (9 * m) + 1.96 / (3 * sqrt(m)), 3) : 0;
-}
-
 int incise_realism_of(const struct incise_texture *texture,
 		      const struct incise_texture_cut *cuts, int n, uint64_t seed,
 		      struct incise_realism *realism)
 {
-	size_t rows = rows_of_cuts(cuts, n);
-	double *numbers = malloc((rows + 1) * sizeof(*numbers));
-	double **force = malloc((size_t)(n + 1) * sizeof(*force));
+	double *force = malloc((incise_look_rows(cuts, n) + 1) * sizeof(*force));
 	struct incise_look recorded = {0};
-	int rc = numbers && force ? incise_look_at(&recorded, cuts, n, NULL) : -ENOMEM;
+	int rc = force ? incise_look_at(&recorded, cuts, n, NULL) : -ENOMEM;
+	double events = (double)recorded.n_events, more = events + 1;
 
 	*realism = (struct incise_realism){.cuts = n,
 					   .up_to_cycles = 0.5 / recorded.step,
 					   .events = (int)recorded.n_events,
 					   .skewness = recorded.skewness};
-	find_rates(realism);
-	for (size_t i = 0, at = 0; (int)i < n && !rc; at += cuts[i++].n)
-		force[i] = numbers + at;
+	/* The interval of Poisson of so many events; Breslow and Day (1987), after Byar. */
+	if (events > 0) {
+		realism->rate_low =
+			pow(1 - 1 / (9 * events) - 1.96 / (3 * sqrt(events)), 3);
+		realism->rate_high = more / events *
+				     pow(1 - 1 / (9 * more) + 1.96 / (3 * sqrt(more)), 3);
+	}
 	for (int i = 0; i < INCISE_REALISM_KINDS * DRAWS && !rc; i++)
 		rc = add_draw(texture, i / DRAWS, seed + (uint64_t)(i % DRAWS), cuts, n,
 			      &recorded, force, &realism->kind[i / DRAWS]);
 	free(recorded.drop);
-	free(numbers);
 	free(force);
 	return rc;
 }

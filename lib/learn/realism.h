@@ -17,14 +17,14 @@
 #include <incise/realism.h>
 #include "texture.h"
 
-#define INCISE_LOOK_OCTAVES 4
+#define INCISE_DECIBEL(ratio) (10 * log10(fmax(ratio, 1e-30)))
 
 struct incise_look {
 	double step;   /* of the way; 0: the median of the rows in their parts */
 	double noise;  /* sd of the sensor's; 0: that of the rows' second differences */
 	double length; /* of the way */
-	double rate;   /* events per unit of the way */
-	double rms, skewness, octave[INCISE_LOOK_OCTAVES];
+	double skewness;
+	struct incise_texture_look shape;
 	/* Falls of the events, relative to the force before each, ascending: free(3). */
 	double *drop;
 	size_t n_events, capacity;
@@ -38,35 +38,28 @@ struct incise_texture_cut incise_look_part(const struct incise_texture_cut *cut,
 					   double *numbers);
 
 /*
- * Look at cuts as they were recorded, or with the forces of @rendered, one array for each cut, in place of
- * the recorded ones; a fall is compared with the largest recorded force in any case. @look: {0}, or with
- * step and noise of another one. 0 or -ENOMEM; the look is freed with free(look->drop) in any case.
+ * Look at cuts as they were recorded, or with the forces of @rendered, those of each cut after each other, in
+ * place of the recorded ones; a fall is compared with the largest recorded force in any case. @look: {0}, or
+ * with step and noise of another one. 0 or -ENOMEM; the look is freed with free(look->drop) in any case.
  */
 int incise_look_at(struct incise_look *look, const struct incise_texture_cut *cuts, int n,
-		   double *const *rendered);
+		   const double *rendered);
 
 /*
- * The force of each cut by the tables of a texture as a sensor with @noise would have measured it, into one
- * array for each cut; returns the sum of the force over the sum of the model's.
+ * The forces of the cuts, after each other, by the tables of a texture as a sensor with @noise would have
+ * measured them; returns their sum over the sum of the model's.
  */
 double incise_look_render(const struct incise_fixed_texture *knots,
 			  const struct incise_texture_cut *cuts, int n, double noise,
-			  uint64_t key, double *const *force);
+			  uint64_t key, double *force);
 
-/*
- * Compare cuts, rendered in each way, with what was recorded. All is 0 without cuts. 0 or -ENOMEM.
- */
+/* Compare cuts, rendered in each way, with what was recorded. All is 0 without cuts. 0 or -ENOMEM. */
 int incise_realism_of(const struct incise_texture *texture,
 		      const struct incise_texture_cut *cuts, int n, uint64_t seed,
 		      struct incise_realism *realism);
 
-/*
- * The force of each cut as its sensor would have measured it, with such noise; returns its sum over that of
- * the model.
- */
-double incise_look_render(const struct incise_fixed_texture *texture,
-			  const struct incise_texture_cut *cuts, int n, double noise,
-			  uint64_t key, double *const *force);
+/* Rows of all cuts. */
+size_t incise_look_rows(const struct incise_texture_cut *cuts, int n);
 
 /* Mean distance of the octaves of two looks, dB. */
 double incise_look_distance(const struct incise_look *a, const struct incise_look *b);

@@ -32,8 +32,6 @@
 /* An improvement by less, dB, may be chance: there is no texture. */
 #define IMPROVEMENT 0.5
 
-#define DECIBEL(ratio) (10 * log10(fmax(ratio, 1e-30)))
-
 struct candidate {
 	double window; /* steps of the look */
 	double gain;   /* 0: no texture */
@@ -49,7 +47,7 @@ struct learning {
 	struct incise_look recorded;
 	double step;	   /* of the way, between points */
 	double *tau, *sum; /* of the points of a cut */
-	double **force;	   /* of each cut, rendered */
+	double *force;	   /* of the cuts, rendered */
 };
 
 /* --- pieces --- */
@@ -80,16 +78,17 @@ static size_t find_tau(struct learning *learning, const struct incise_texture_cu
 {
 	struct incise_texture_cut part = incise_look_part(cut, learning->sum);
 	double *tau = learning->tau, least = 0, mean = 0, step = learning->step;
-	size_t n = 0, row = 0;
+	const struct incise_texture_row *row = part.row;
+	size_t n = 0, k = 0;
 
 	for (size_t i = 0; i < part.n; i++)
-		least = fmax(least, MODEL_LEAST * part.model[i]);
-	for (; row + 1 < part.n && n < POINTS_PER_ROW * part.n; n++) {
-		double at = part.way[0] + (double)n * step;
+		least = fmax(least, MODEL_LEAST * row[i].model);
+	for (; k + 1 < part.n && n < POINTS_PER_ROW * part.n; n++) {
+		double at = row->way + (double)n * step;
 
-		while (row + 1 < part.n && part.way[row + 1] - at < at - part.way[row])
-			row++;
-		tau[n] = part.force[row] / fmax(part.model[row], least);
+		while (k + 1 < part.n && row[k + 1].way - at < at - row[k].way)
+			k++;
+		tau[n] = row[k].force / fmax(row[k].model, least);
 		mean += tau[n];
 	}
 	mean /= fmax((double)n, 1);
@@ -128,12 +127,10 @@ static struct incise_texture *find_pieces(struct learning *learning,
 	uint64_t at = 0;
 	size_t points = 0;
 
-	if (texture) {
-		texture->step = learning->step;
-		texture->n = calloc(INCISE_TEXTURE_CURVES, sizeof(*texture->n));
-		texture->point = calloc(INCISE_TEXTURE_POINTS, sizeof(*texture->point));
-	}
-	for (int i = 0; i < n && texture && texture->n && texture->point; i++) {
+	if (!texture)
+		return NULL;
+	texture->step = learning->step;
+	for (int i = 0; i < n; i++) {
 		const double *tau = learning->tau;
 		size_t m = find_tau(learning, &cuts[i], candidate->window), from = 0;
 
@@ -159,6 +156,7 @@ static int render_halves(struct learning *learning, const struct candidate *cand
 			 struct incise_look *look)
 {
 	int half = learning->n / 2;
+	double *force = learning->force;
 
 	*look = (struct incise_look){.step = learning->recorded.step,
 				     .noise = learning->recorded.noise};
@@ -176,20 +174,10 @@ static int render_halves(struct learning *learning, const struct candidate *cand
 		incise_texture_fill(texture, 0, learning->seed, &knots);
 		incise_texture_free(texture);
 		incise_look_render(&knots, learning->cuts + from, n, look->noise,
-				   learning->seed + (uint64_t)i, learning->force + from);
+				   learning->seed + (uint64_t)i, force);
+		force += incise_look_rows(learning->cuts, half);
 	}
 	return incise_look_at(look, learning->cuts, learning->n, learning->force);
-}
-
-static void note_look(struct incise_texture_look *to, const struct incise_look *look)
-{
-	to->rate = look->rate;
-	to->rms = look->rms;
-	for (int i = 0; i < INCISE_TEXTURE_DECILES && look->n_events; i++)
-		to->drop[i] = look->drop[look->n_events * (size_t)(i + 1) /
-					 (INCISE_TEXTURE_DECILES + 1)];
-	for (int i = 0; i < INCISE_TEXTURE_OCTAVES; i++)
-		to->octave[i] = DECIBEL(look->octave[i]);
 }
 
 /*
@@ -213,15 +201,15 @@ static int choose_candidate(struct learning *learning, struct candidate *best,
 						       gains[(i - 1) % n_gains]};
 		rc = render_halves(learning, &candidate, &look);
 		if (!rc) {
-			double rate = fmax(look.rate / recorded->rate, 1e-3);
+			double rate = look.shape.rate / recorded->shape.rate;
 			double error = incise_look_distance(&look, recorded);
-			double score = error + fabs(DECIBEL(rate));
+			double score = error + fabs(INCISE_DECIBEL(fmax(rate, 1e-3)));
 
 			if (score < least) {
 				least = score - (i ? 0 : IMPROVEMENT);
 				*best = candidate;
 				info->error[i > 0] = error;
-				note_look(&info->rendered, &look);
+				info->rendered = look.shape;
 			}
 		}
 		free(look.drop);
@@ -265,7 +253,7 @@ static struct incise_texture *learn_pieces(struct learning *learning,
 			"the model alone, which has %.2g times their events "
 			"(cross-validated); fewer membership functions (--mf) make it "
 			"smoother",
-			info.rendered.rate / recorded->rate);
+			info.rendered.rate / recorded->shape.rate);
 	if (!rc)
 		texture = find_pieces(learning, learning->cuts, learning->n, &best);
 	if (!texture)
@@ -273,7 +261,7 @@ static struct incise_texture *learn_pieces(struct learning *learning,
 					 rc == -ECANCELED
 						 ? "training was stopped"
 						 : "no memory to learn a texture");
-	note_look(&info.recorded, recorded);
+	info.recorded = recorded->shape;
 	info.most = texture->info.most;
 	texture->info = info;
 	return texture;
@@ -286,22 +274,13 @@ struct incise_texture *incise_texture_learn(const struct incise_texture_cut *cut
 	struct learning learning = {
 		.n = n, .seed = incise_random_mix(seed + 1), .watch = watch};
 	struct incise_texture *texture = NULL;
-	size_t rows = 0, most = 0, room;
-	double *numbers;
+	size_t rows = incise_look_rows(cuts, n), room = POINTS_PER_ROW * rows + 1;
 
-	for (int i = 0; i < n; i++) {
-		rows += cuts[i].n;
-		most = most > cuts[i].n ? most : cuts[i].n;
-	}
-	room = POINTS_PER_ROW * most + 1;
-	numbers = calloc(rows + 2 * room, sizeof(*numbers));
+	learning.tau = calloc(rows + 2 * room, sizeof(*learning.tau));
 	learning.cuts = calloc((size_t)n + 1, sizeof(*cuts));
-	learning.force = calloc((size_t)n + 1, sizeof(*learning.force));
-	if (numbers && learning.cuts && learning.force) {
-		double *at = numbers + 2 * room;
-
-		learning.tau = numbers;
-		learning.sum = numbers + room;
+	if (learning.tau && learning.cuts) {
+		learning.sum = learning.tau + room;
+		learning.force = learning.sum + room;
 		for (int i = 0; i < n; i++) {
 			int j = (int)(incise_random_bits(seed, (uint64_t)i) %
 				      (uint64_t)(i + 1));
@@ -309,17 +288,14 @@ struct incise_texture *incise_texture_learn(const struct incise_texture_cut *cut
 			learning.cuts[i] = learning.cuts[j];
 			learning.cuts[j] = cuts[i];
 		}
-		for (int i = 0; i < n; at += learning.cuts[i++].n)
-			learning.force[i] = at;
 		texture = learn_pieces(&learning, err);
 	} else {
 		incise_error_set(err, ENOMEM, "no memory to learn a texture");
 	}
 	if (texture)
 		texture->info.seed = seed;
-	free(numbers);
+	free(learning.tau);
 	free(learning.cuts);
-	free(learning.force);
 	free(learning.recorded.drop);
 	return texture;
 }

@@ -8,7 +8,9 @@
 
 /* Rows of a cut in which the blade advances, in their order; the way rises from row to row. */
 struct incise_texture_cut {
-	const double *way, *force, *model; /* the latter: force by the model */
+	const struct incise_texture_row {
+		double way, force, model; /* the latter: force by the model */
+	} * row;
 	size_t n;
 };
 

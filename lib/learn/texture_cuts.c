@@ -29,9 +29,8 @@
 /* A part has at least such a share of the force of the mean part of its cut. */
 #define PART_LEAST 0.05
 
-/* Columns behind those of the model, and of a cut. */
+/* Columns behind those of the model. */
 enum further { WAY, TIME, COUNT, FURTHER };
-enum column { CUT_WAY, CUT_FORCE, CUT_MODEL, CUT_COLUMNS };
 
 struct own_cut {
 	size_t start; /* of its rows; they end where those of the next one start */
@@ -42,13 +41,14 @@ struct cuts {
 	const struct incise_trained *trained;
 	const struct incise_corpus_source *source; /* the present one */
 	int n_inputs, depth;			   /* number of the input */
-	double *column[CUT_COLUMNS];		   /* of all rows */
+	struct incise_texture_row *row;		   /* of all cuts */
 	size_t n, capacity;
 	struct own_cut *cut;
 	size_t n_cuts, most; /* the latter: capacity */
 	char name[256];	     /* of the present one */
 	double t_s, first_s; /* of the last row; of the first one of the mean */
-	double mean[CUT_COLUMNS], in_mean; /* its sums, and its rows */
+	struct incise_texture_row mean; /* its sums … */
+	double in_mean;			/* … of so many rows */
 };
 
 static int no_cuts_memory(struct incise_error *err)
@@ -79,21 +79,17 @@ static bool is_held(const struct cuts *cuts, const char *name)
 static bool end_mean(struct cuts *cuts)
 {
 	size_t start = cuts->n_cuts ? cuts->cut[cuts->n_cuts - 1].start : 0;
-	double n = cuts->in_mean, way = cuts->mean[CUT_WAY] / n;
+	double n = cuts->in_mean;
+	struct incise_texture_row mean = {cuts->mean.way / n, cuts->mean.force / n,
+					  cuts->mean.model / n};
 
+	cuts->mean = (struct incise_texture_row){0};
 	cuts->in_mean = 0;
-	if (!n || (cuts->n > start && way <= cuts->column[CUT_WAY][cuts->n - 1]))
+	if (!n || (cuts->n > start && mean.way <= cuts->row[cuts->n - 1].way))
 		return true;
-	for (int i = 0; i < CUT_COLUMNS; i++) {
-		size_t capacity = cuts->capacity;
-
-		if (!grow_array(&cuts->column[i], cuts->n, &capacity, 4096, sizeof(n)))
-			return false;
-		cuts->column[i][cuts->n] = cuts->mean[i] / n;
-		if (i == CUT_COLUMNS - 1)
-			cuts->capacity = capacity;
-	}
-	cuts->n++;
+	if (!grow_array(&cuts->row, cuts->n, &cuts->capacity, 4096, sizeof(mean)))
+		return false;
+	cuts->row[cuts->n++] = mean;
 	return true;
 }
 
@@ -113,9 +109,6 @@ static int take_cut_row(void *user, const double *row, const char *group,
 {
 	struct cuts *cuts = user;
 	const double *more = row + cuts->n_inputs + 1;
-	double way = isnan(more[WAY]) ? row[cuts->depth] : more[WAY];
-	double values[] = {way, row[cuts->n_inputs],
-			   incise_model_eval(cuts->trained->model, row, NULL)};
 	bool other = strncmp(cuts->name, group, sizeof(cuts->name) - 1);
 
 	if (!isnan(more[COUNT]))
@@ -138,8 +131,9 @@ static int take_cut_row(void *user, const double *row, const char *group,
 		return no_cuts_memory(err);
 	if (!cuts->in_mean)
 		cuts->first_s = more[TIME];
-	for (int i = 0; i < CUT_COLUMNS; i++)
-		cuts->mean[i] = (cuts->in_mean ? cuts->mean[i] : 0) + values[i];
+	cuts->mean.way += isnan(more[WAY]) ? row[cuts->depth] : more[WAY];
+	cuts->mean.force += row[cuts->n_inputs];
+	cuts->mean.model += incise_model_eval(cuts->trained->model, row, NULL);
 	cuts->in_mean++;
 	return 0;
 }
@@ -160,9 +154,9 @@ static double find_variation(const struct incise_texture_cut *cuts, int n)
 		double force[PARTS] = {0}, model[PARTS] = {0}, sum = 0;
 
 		for (size_t k = 0; k < cuts[i].n; k++) {
-			force[k * PARTS / cuts[i].n] += cuts[i].force[k];
-			model[k * PARTS / cuts[i].n] += cuts[i].model[k];
-			sum += cuts[i].model[k];
+			force[k * PARTS / cuts[i].n] += cuts[i].row[k].force;
+			model[k * PARTS / cuts[i].n] += cuts[i].row[k].model;
+			sum += cuts[i].row[k].model;
 		}
 		for (int p = 0; p < PARTS; p++) {
 			double least = PART_LEAST * sum / PARTS, ratio;
@@ -198,9 +192,7 @@ static int list_cuts(const struct cuts *cuts, bool held, struct incise_texture_c
 		size_t end = i + 1 < cuts->n_cuts ? cuts->cut[i + 1].start : cuts->n;
 
 		if (cuts->cut[i].held == held)
-			list[n++] = (struct incise_texture_cut){
-				cuts->column[CUT_WAY] + at, cuts->column[CUT_FORCE] + at,
-				cuts->column[CUT_MODEL] + at, end - at};
+			list[n++] = (struct incise_texture_cut){cuts->row + at, end - at};
 	}
 	return n;
 }
@@ -222,7 +214,7 @@ static struct incise_texture *learn_cuts(const struct cuts *cuts, uint64_t seed,
 	n = list_cuts(cuts, false, list);
 	for (int i = 0; i < n; i++)
 		if (list[i].n)
-			length += list[i].way[list[i].n - 1] - list[i].way[0];
+			length += list[i].row[list[i].n - 1].way - list[i].row->way;
 	texture = incise_texture_learn(list, n, seed, watch, err);
 	alone = !texture && errno == EDOM;
 	if (texture) {
@@ -302,12 +294,11 @@ struct incise_texture *incise_train_texture(struct incise_train_source *sources,
 	if (!rc)
 		texture = learn_cuts(&cuts, options->seed, realism, &watch, err);
 	if (texture)
-		snprintf(texture->unit, sizeof(texture->unit), "%.15s", unit);
+		snprintf(texture->info.unit, sizeof(texture->info.unit), "%.15s", unit);
 	if (watch.stopped)
 		incise_error_set(err, ECANCELED, "training was stopped");
 	rc = texture ? 0 : errno;
-	for (int i = 0; i < CUT_COLUMNS; i++)
-		free(cuts.column[i]);
+	free(cuts.row);
 	free(cuts.cut);
 	incise_readers_free(readers, n);
 	errno = rc;

@@ -9,7 +9,6 @@
 #include <incise/texture.h>
 #include "../fixed/texture.h"
 
-#define INCISE_TEXTURE_UNIT 16	    /* bytes of a unit's name */
 #define INCISE_TEXTURE_CURVES 4096  /* at most */
 #define INCISE_TEXTURE_POINTS 16384 /* of all curves, at most */
 #define INCISE_TEXTURE_PIECE 2048   /* of one curve, at most */
@@ -20,16 +19,16 @@
 
 struct incise_texture {
 	uint64_t checksum; /* of its model, incise_model_checksum() */
-	char unit[INCISE_TEXTURE_UNIT];
-	struct incise_texture_info info; /* unit is the one above */
+	struct incise_texture_info info;
 	/*
 	 * Pieces of τ over the way, a point each step, that are drawn and joined to a tape: from where τ
 	 * rises through 0 to where it does so again.
 	 */
 	double step; /* 2^INCISE_TEXTURE_SHIFT_LEAST / 65536 to … _MOST */
 	int n_curves;
-	int *n;	       /* points of each, 2 or more */
-	double *point; /* of all, after each other; whole, of 1/INCISE_TEXTURE_ONE */
+	int n[INCISE_TEXTURE_CURVES]; /* points of each, 2 or more */
+	/* Of all, after each other; whole, of 1/INCISE_TEXTURE_ONE. */
+	double point[INCISE_TEXTURE_POINTS];
 };
 
 /*

@@ -75,32 +75,26 @@ static int read_count(struct incise_lines *in, const char *key, long least, long
 
 static int read_curves(struct incise_lines *in, struct incise_texture *texture)
 {
-	double most = texture->info.most * INCISE_TEXTURE_ONE;
-	int points = 0, rc = 0;
+	double most = texture->info.most * INCISE_TEXTURE_ONE, *point = texture->point;
+	int left = INCISE_TEXTURE_POINTS, rc = 0;
 
-	texture->n = calloc((size_t)texture->n_curves, sizeof(*texture->n));
-	if (!texture->n)
-		return fail(in, ENOMEM, "no memory to read it");
-	for (int i = 0; i < texture->n_curves && !rc; points += texture->n[i++]) {
-		int left = INCISE_TEXTURE_POINTS - points;
-		double *more;
+	for (int i = 0; i < texture->n_curves && !rc; i++) {
+		int n, longest =
+			       left < INCISE_TEXTURE_PIECE ? left : INCISE_TEXTURE_PIECE;
 
-		rc = read_count(in, "curve", 2,
-				left < INCISE_TEXTURE_PIECE ? left : INCISE_TEXTURE_PIECE,
-				&texture->n[i]);
+		rc = read_count(in, "curve", 2, longest, &n);
+		if (!rc)
+			rc = incise_companion_row(in, point, n);
 		if (rc)
 			return rc;
-		more = reallocarray(texture->point, (size_t)(points + texture->n[i]),
-				    sizeof(*more));
-		if (!more)
-			return fail(in, ENOMEM, "no memory to read it");
-		texture->point = more;
-		rc = incise_companion_row(in, more + points, texture->n[i]);
-		for (int k = points; k < points + texture->n[i] && !rc; k++)
-			if (fabs(more[k]) > most || more[k] != rint(more[k]))
+		for (int k = 0; k < n && !rc; k++)
+			if (fabs(point[k]) > most || point[k] != rint(point[k]))
 				rc = fail(in, EINVAL,
 					  "%g is not a whole number up to the most, %g",
-					  more[k], most);
+					  point[k], most);
+		texture->n[i] = n;
+		point += n;
+		left -= n;
 	}
 	return rc ? rc : incise_companion_end(in);
 }
@@ -114,10 +108,10 @@ static int read_texture_file(struct incise_lines *in, struct incise_texture *tex
 
 	if (!unit)
 		return rc ? rc : -errno;
-	if (strlen(unit) >= sizeof(texture->unit) ||
+	if (strlen(unit) >= sizeof(info->unit) ||
 	    unit[strspn(unit, "abcdefghijklmnopqrstuvwxyz")])
 		return fail(in, EINVAL, "way: '%.20s' is not a unit", unit);
-	strcpy(texture->unit, unit);
+	strcpy(info->unit, unit);
 	rc = incise_companion_whole(in, "seed", 0, LONG_MAX, &seed);
 	info->seed = (uint64_t)seed;
 	if (!rc)
@@ -176,7 +170,7 @@ int incise_texture_save(const struct incise_texture *texture, const char *path,
 	fprintf(out,
 		KIND " %d\nmodel %016" PRIx64 "\nway %s\nseed %" PRIu64
 		     "\ncuts %d\nevents %d\n",
-		VERSION, texture->checksum, texture->unit, info->seed, info->n_cuts,
+		VERSION, texture->checksum, info->unit, info->seed, info->n_cuts,
 		info->n_events);
 	for (size_t i = 0; i < FIELDS; i++) {
 		const double *from =
@@ -196,18 +190,13 @@ int incise_texture_save(const struct incise_texture *texture, const char *path,
 
 void incise_texture_free(struct incise_texture *texture)
 {
-	if (!texture)
-		return;
-	free(texture->n);
-	free(texture->point);
 	free(texture);
 }
 
-void incise_texture_info(const struct incise_texture *texture,
-			 struct incise_texture_info *info)
+const struct incise_texture_info *incise_texture_info(
+	const struct incise_texture *texture)
 {
-	*info = texture->info;
-	info->unit = texture->unit;
+	return &texture->info;
 }
 
 double incise_texture_tape(const struct incise_texture *texture, uint64_t seed,

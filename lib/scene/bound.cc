@@ -731,10 +731,7 @@ static void run_paths(struct tick *t)
 		if (t->plan.has_model && at(t->plan.numbers.unloading.id).high > 0 &&
 		    state.held == INCISE_TOOL_BLADE)
 			take(&t->cutting,
-			     T_JOINED(&state,
-				      texture(&t->plan, &state, &tick,
-					      cutting_force(&t->plan, &state, &tick)))
-				     .id);
+			     T_JOINED(&state, cutting_force(&t->plan, &state, &tick)).id);
 		run_forces(t, &state, &tick);
 		if (paths->dead)
 			continue;

@@ -562,7 +562,7 @@ static int read_texture(struct incise_scene *scene, const config_setting_t *grou
 	if (!texture)
 		return incise_error_set(err, why.code, "%s: its texture %s", scene->path,
 					why.text);
-	incise_texture_info(texture, &scene->learned);
+	scene->learned = *incise_texture_info(texture);
 	incise_texture_fill(texture, scene->tissue.variation,
 			    (uint64_t)scene->tissue.seed, scene->texture);
 	if (strcmp(scene->learned.unit, "mm"))
@@ -571,7 +571,6 @@ static int read_texture(struct incise_scene *scene, const config_setting_t *grou
 				      "one over mm",
 				      scene->path, scene->texture_path,
 				      scene->learned.unit);
-	scene->learned.unit = "mm";
 	incise_texture_free(texture);
 	return rc;
 }

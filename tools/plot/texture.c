@@ -18,9 +18,9 @@
 /* The tape is drawn over so many events. */
 #define EVENTS 30
 
-static void put_data(FILE *script, const struct incise_texture *texture,
-		     const struct incise_texture_info *info)
+static void put_data(FILE *script, const struct incise_texture *texture)
 {
+	const struct incise_texture_info *info = incise_texture_info(texture);
 	const struct incise_texture_look *was = &info->recorded, *is = &info->rendered;
 	static double tau[INCISE_TEXTURE_TAPE];
 	double step = incise_texture_tape(texture, info->seed, tau);
@@ -48,28 +48,27 @@ FILE *figure_of_texture(const struct figure *figure)
 	struct incise_texture *texture =
 		cli_require(incise_texture_load(figure->path, NULL, &err), &err);
 	FILE *script = plot_begin(figure->folder, figure->name, FIGURE_WIDTH, HEIGHT);
-	struct incise_texture_info info;
+	const struct incise_texture_info *info = incise_texture_info(texture);
 
-	incise_texture_info(texture, &info);
-	put_data(script, texture, &info);
+	put_data(script, texture);
 	fprintf(script,
 		"set multiplot\nset size 1,0.45\nset origin 0,0.55\nunset key\n"
 		"set title 'texture of %d events in %d cuts, at most %.0f %%'\n"
 		"set xlabel 'way / %s'\nset ylabel 'of the model''s force / %%'\n"
 		"set autoscale xfix\nplot $tape with lines lt 1\nset autoscale x\n",
-		info.n_events, info.n_cuts, 100 * info.most, info.unit);
+		info->n_events, info->n_cuts, 100 * info->most, info->unit);
 	fprintf(script,
 		"set size 0.5,0.55\nset origin 0,0\nset key inside top left\n"
 		"set title 'drops: %.3g events per %s recorded, %.3g rendered'\n"
 		"set xlabel 'share of the drops / %%'\nset ylabel 'drop / %%'\n"
 		"plot $drops%s",
-		info.recorded.rate, info.unit, info.rendered.rate, looks);
+		info->recorded.rate, info->unit, info->rendered.rate, looks);
 	fprintf(script,
 		"set origin 0.5,0\nset logscale x 2\nset key bottom left\n"
 		"set title 'spectrum: %.2g dB apart, %.2g dB without texture'\n"
 		"set xlabel 'frequency / (1/%s)'\nset ylabel 'power / dB'\nplot $octaves%s"
 		"unset multiplot\n",
-		info.error[1], info.error[0], info.unit, looks);
+		info->error[1], info->error[0], info->unit, looks);
 	incise_texture_free(texture);
 	return script;
 }

@@ -29,6 +29,8 @@ struct incise_texture;
 
 /** Points of a tape. */
 #define INCISE_TEXTURE_TAPE 8192
+/** Bytes of a unit's name. */
+#define INCISE_TEXTURE_UNIT 16
 
 /** Cuts by the metrics of their texture. */
 struct incise_texture_look {
@@ -42,9 +44,9 @@ struct incise_texture_look {
 
 /** Numbers of a texture; lengths in the unit of the way that it was learned on, mm for scenes. */
 struct incise_texture_info {
-	const char *unit; /**< of the way: "mm", "deg" …; valid as long as the texture */
-	uint64_t seed;	  /**< of its learning */
-	double most;	  /**< largest |τ|, 0 … 0.9 */
+	char unit[INCISE_TEXTURE_UNIT]; /**< of the way: "mm", "deg" … */
+	uint64_t seed;			/**< of its learning */
+	double most;			/**< largest |τ|, 0 … 0.9 */
 	double variation;     /**< sd of the logarithm of a cut's factor, ≥ 0 */
 	double up_to_cycles;  /**< per unit of the way: half of the recordings' rate */
 	int n_cuts, n_events; /**< that it was learned from */
@@ -79,9 +81,9 @@ INCISE_API int incise_texture_save(const struct incise_texture *texture, const c
 /** NULL is accepted. */
 INCISE_API void incise_texture_free(struct incise_texture *texture);
 
-/** The numbers of a texture; the unit is valid as long as it. */
-INCISE_API void incise_texture_info(const struct incise_texture *texture,
-				    struct incise_texture_info *info);
+/** Its numbers; owned by the texture. */
+INCISE_API const struct incise_texture_info *incise_texture_info(
+	const struct incise_texture *texture);
 
 /**
  * The tape that ticks read: τ at multiples of a step, from which each cut starts at another place. It begins

@@ -11,8 +11,8 @@
 
 /* Cuts with a force each, over a way of even steps. */
 struct made {
-	double way[2][ROWS], force[2][ROWS], other[2][ROWS];
-	double *others[2];
+	struct incise_texture_row row[2][ROWS];
+	double other[2][ROWS];
 	struct incise_texture_cut cuts[2];
 };
 
@@ -23,10 +23,8 @@ static struct made *make_cuts(double step)
 	assert_non_null(made);
 	for (int c = 0; c < 2; c++) {
 		for (int i = 0; i < ROWS; i++)
-			made->way[c][i] = step * i;
-		made->others[c] = made->other[c];
-		made->cuts[c] = (struct incise_texture_cut){made->way[c], made->force[c],
-							    made->force[c], ROWS};
+			made->row[c][i].way = step * i;
+		made->cuts[c] = (struct incise_texture_cut){made->row[c], ROWS};
 	}
 	return made;
 }
@@ -50,13 +48,13 @@ TEST(teeth_are_counted_and_their_drops_measured)
 
 		for (int c = 0; c < 2; c++)
 			for (int i = 0; i < ROWS; i++)
-				made->force[c][i] =
-					3 * saw_tooth(made->way[c][i], length, high);
+				made->row[c][i].force =
+					3 * saw_tooth(made->row[c][i].way, length, high);
 		assert_int_equal(incise_look_at(&look, made->cuts, 2, NULL), 0);
 		assert_float_equal(look.step, 0.04, 1e-9);
 		assert_true(look.noise < 1e-9);
 		/* A tooth at either end of a cut may be cut off. */
-		assert_float_equal(look.rate, 1 / length, 2 / look.length);
+		assert_float_equal(look.shape.rate, 1 / length, 2 / look.length);
 		/* A cell is a mean over a step: the edge loses a step of rise at either end at most. */
 		assert_true(look.drop[0] <= drop + 1e-9);
 		assert_true(look.drop[0] > drop * (1 - 2 * 0.04 / length) - 1e-9);
@@ -74,7 +72,7 @@ TEST(noise_is_found_and_makes_no_events)
 
 	for (int c = 0; c < 2; c++)
 		for (int i = 0; i < ROWS; i++)
-			made->force[c][i] =
+			made->row[c][i].force =
 				2 +
 				0.1 * incise_random_normal(7, (uint64_t)(c * ROWS + i));
 	assert_int_equal(incise_look_at(&look, made->cuts, 2, NULL), 0);
@@ -100,28 +98,28 @@ TEST(scales_of_force_and_way_change_no_shape)
 
 		for (int c = 0; c < 2; c++)
 			for (int i = 0; i < ROWS; i++) {
-				made->force[c][i] =
-					saw_tooth(made->way[c][i], length, high) +
+				made->row[c][i].force =
+					saw_tooth(made->row[c][i].way, length, high) +
 					0.01 * incise_random_normal(
 						       key + (uint64_t)k,
 						       (uint64_t)(c * ROWS + i));
-				made->other[c][i] = 4 * made->force[c][i];
+				made->other[c][i] = 4 * made->row[c][i].force;
 			}
 		assert_int_equal(incise_look_at(&is, made->cuts, 2, NULL), 0);
 		other.step = is.step;
-		assert_int_equal(incise_look_at(&other, made->cuts, 2, made->others), 0);
+		assert_int_equal(incise_look_at(&other, made->cuts, 2, *made->other), 0);
 		assert_float_equal(incise_look_distance(&is, &is), 0, 0);
 		assert_float_equal(incise_look_drops(&is, &is), 0, 0);
 		assert_float_equal(incise_look_distance(&is, &other), 20 * log10(4),
 				   1e-6);
-		assert_float_equal(other.rms, is.rms, 1e-9);
+		assert_float_equal(other.shape.rms, is.shape.rms, 1e-9);
 		assert_float_equal(other.skewness, is.skewness, 1e-6);
 		for (int c = 0; c < 2; c++)
 			for (int i = 0; i < ROWS; i++)
-				made->way[c][i] *= 8;
+				made->row[c][i].way *= 8;
 		assert_int_equal(incise_look_at(&wide, made->cuts, 2, NULL), 0);
 		assert_int_equal(wide.n_events, is.n_events);
-		assert_float_equal(wide.rate * 8, is.rate, 1e-9);
+		assert_float_equal(wide.shape.rate * 8, is.shape.rate, 1e-9);
 		assert_float_equal(incise_look_distance(&is, &wide), 0, 1e-6);
 		free(is.drop);
 		free(other.drop);
@@ -165,11 +163,11 @@ TEST(any_rows_are_looked_at)
 			for (size_t i = 0; i < made->cuts[c].n; i++) {
 				double more = steps[incise_random_bits(key, at++) % 5];
 
-				made->way[c][i] = way;
+				made->row[c][i].way = way;
 				/* Rising, whatever is rounded. */
 				way = fmin(fmax(way + more, nextafter(way, INFINITY)),
 					   1e307);
-				made->force[c][i] =
+				made->row[c][i].force =
 					incise_random_normal(key, at++) * 1e10;
 			}
 		}

@@ -13,7 +13,7 @@
 #define ROWS 1500
 
 struct made {
-	double way[CUTS][ROWS], force[CUTS][ROWS], model[CUTS][ROWS];
+	struct incise_texture_row row[CUTS][ROWS];
 	struct incise_texture_cut cuts[CUTS];
 	uint64_t key, at;
 	double events, length;
@@ -40,8 +40,7 @@ static struct made *make_cuts(uint64_t key, double step, double tooth, double hi
 		double factor = 0.8 + 0.4 * draw(made), rise = draw(made);
 		double from = -draw(made) * tooth, length = tooth;
 
-		made->cuts[c] = (struct incise_texture_cut){made->way[c], made->force[c],
-							    made->model[c], ROWS};
+		made->cuts[c] = (struct incise_texture_cut){made->row[c], ROWS};
 		for (int i = 0; i < ROWS; i++) {
 			double way = step * i;
 
@@ -50,10 +49,10 @@ static struct made *make_cuts(uint64_t key, double step, double tooth, double hi
 				length = tooth * (0.5 + draw(made));
 				made->events++;
 			}
-			made->way[c][i] = way;
-			made->model[c][i] = 2 + rise * i / ROWS;
-			made->force[c][i] =
-				factor * made->model[c][i] *
+			made->row[c][i].way = way;
+			made->row[c][i].model = 2 + rise * i / ROWS;
+			made->row[c][i].force =
+				factor * made->row[c][i].model *
 					(1 + high * (2 * (way - from) / length - 1)) +
 				noise * incise_random_normal(~key, made->at++);
 		}
@@ -152,11 +151,12 @@ TEST(a_model_that_has_the_teeth_needs_no_texture)
 {
 	struct made *made = make_cuts(7, 0.05, 1, 0.2, 0);
 
-	memcpy(made->model, made->force, sizeof(made->model));
 	for (int c = 0; c < CUTS; c++)
-		for (int i = 0; i < ROWS; i++)
-			made->force[c][i] +=
+		for (int i = 0; i < ROWS; i++) {
+			made->row[c][i].model = made->row[c][i].force;
+			made->row[c][i].force +=
 				0.01 * incise_random_normal(9, (uint64_t)(c * ROWS + i));
+		}
 	assert_error(learn(made, 1), EDOM, &err, "model alone");
 	free(made);
 }
@@ -217,11 +217,11 @@ TEST(any_rows_are_learned_from_or_refused)
 
 				way = fmax(way + (wild ? more : 0.05),
 					   nextafter(way, INFINITY));
-				made->way[c][i] = way = fmin(way, 1e307);
+				made->row[c][i].way = way = fmin(way, 1e307);
 				if (wild)
-					made->force[c][i] = (draw(made) - 0.3) * more;
+					made->row[c][i].force = (draw(made) - 0.3) * more;
 				if (draw(made) < 0.02)
-					made->model[c][i] = (draw(made) - 0.5) * more;
+					made->row[c][i].model = (draw(made) - 0.5) * more;
 			}
 		}
 		texture = learn(made, (uint64_t)k);

@@ -13,8 +13,6 @@
 /* Pieces of one tooth each: up from 0, a fall to below 0, and up to 0. */
 struct made {
 	struct incise_texture texture;
-	int n[PIECES];
-	double point[PIECES * 200];
 	int points;
 	double rise; /* largest from point to point */
 };
@@ -23,23 +21,21 @@ static void make_teeth(struct made *made, uint64_t *draws)
 {
 	struct incise_texture *texture = &made->texture;
 
-	*made = (struct made){0};
-	*texture = (struct incise_texture){
-		.step = ldexp(1, (int)(incise_random_draw(draws, 12)) - 8),
-		.n_curves = 1 + (int)incise_random_draw(draws, PIECES),
-		.n = made->n,
-		.point = made->point};
+	memset(made, 0, sizeof(*made));
+	texture->step = ldexp(1, (int)(incise_random_draw(draws, 12)) - 8);
+	texture->n_curves = 1 + (int)incise_random_draw(draws, PIECES);
 	for (int i = 0; i < texture->n_curves; i++) {
 		int up = 10 + (int)incise_random_draw(draws, 90),
 		    down = 10 + (int)incise_random_draw(draws, 90);
 		double top = 1000 + incise_random_draw(draws, 9000);
 
-		made->n[i] = up + down;
+		texture->n[i] = up + down;
 		made->rise = fmax(made->rise, top / (up < down ? up : down));
 		for (int k = 0; k < up; k++)
-			made->point[made->points++] = rint(top * (k + 0.5) / up);
+			texture->point[made->points++] = rint(top * (k + 0.5) / up);
 		for (int k = 0; k < down; k++)
-			made->point[made->points++] = rint(top * (k + 0.5 - down) / down);
+			texture->point[made->points++] =
+				rint(top * (k + 0.5 - down) / down);
 	}
 }
 

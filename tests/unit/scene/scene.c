@@ -490,8 +490,6 @@ TEST(test_inputs_of_a_model)
 /* A file of a texture of this model, or of any, over this way. */
 static void write_texture(const char *unit, bool of_model, double variation)
 {
-	int n[2] = {3, 2};
-	double point[5] = {2000, 4000, -3000, 1000, -1000};
 	struct incise_model *model = incise_model_load(model_path, &err);
 	struct incise_texture texture = {.checksum =
 						 incise_model_checksum(model) + !of_model,
@@ -502,11 +500,10 @@ static void write_texture(const char *unit, bool of_model, double variation)
 						  .length = 100},
 					 .step = 0.25,
 					 .n_curves = 2,
-					 .n = n,
-					 .point = point};
+					 .n = {3, 2},
+					 .point = {2000, 4000, -3000, 1000, -1000}};
 
-	strcpy(texture.unit, unit);
-	texture.info.unit = texture.unit;
+	strcpy(texture.info.unit, unit);
 	succeeds(!incise_texture_save(&texture, texture_path, &err));
 	incise_model_free(model);
 }
