@@ -206,7 +206,7 @@ static struct device draw_device(uint64_t seed)
 {
 	static const double rates_hz[] = {500, 1000, 1000, 2000, 3000, 4000, 5000};
 	static const double of[] = {1, 1, 1, 0.5, 2};
-	struct device d;
+	struct device d = {0};
 
 	d.mass_kg = sized(&seed, 0.02, 0.5);
 	d.damping_N_s_mm = sized(&seed, 0.001, 0.05);

@@ -166,8 +166,8 @@ static void assert_varied(const struct seen *seen, int scenes)
 	assert_true(seen->with_force > seen->ticks / 10);
 	for (int i = 0; seen->left_out[i].name; i++)
 		out += seen->left_out[i].plans > 0;
-	/* Tool, normal, incision, membrane, work, and each force. */
-	assert_int_equal(out, 5 + incise_n_tissue_forces);
+	/* Tool, normal, incision, membrane, work, texture, and each force. */
+	assert_int_equal(out, 6 + incise_n_tissue_forces);
 }
 
 TEST(test_a_plan_needs_no_more_than_its_scene)
