@@ -84,8 +84,9 @@ static int search_inputs(struct incise_plan *plan,
 }
 
 /*
- * With a texture, first as if its largest factor were constant: while a tool swings in one place, the front stays where
- * it was deepest, and so does its factor. Then by the texture itself, of the first cut.
+ * A texture counts as if its largest factor were constant: while a tool swings in one place, the front stays where it was
+ * deepest, and so does its factor. Teeth themselves do not swing: each is met once, as the way only grows, though a tool
+ * that creeps may fall from one long after it began to lean.
  */
 static int search_check(struct incise_plan *plan,
 			const struct incise_tracker_info *tracker,
@@ -93,7 +94,6 @@ static int search_check(struct incise_plan *plan,
 {
 	const struct incise_fixed_texture *texture = plan->texture;
 	struct incise_fixed_texture *constant = NULL;
-	struct incise_rest here;
 	int rc;
 
 	if (!texture)
@@ -110,11 +110,6 @@ static int search_check(struct incise_plan *plan,
 	rc = search_inputs(plan, tracker, as_is, rest);
 	plan->texture = texture;
 	free(constant);
-	if (rc || !rest->rests)
-		return rc;
-	rc = search_inputs(plan, tracker, as_is, &here);
-	if (!rc)
-		add_search(rest, &here);
 	return rc;
 }
 

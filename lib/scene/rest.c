@@ -1034,9 +1034,7 @@ static void search_rest(struct search *s, const struct incise_plan *plan,
 					.reserve = RESERVE,
 					.every = guided[i].every};
 
-		/* Along teeth a blade goes up and down; along their largest factor it does not. */
-		if (model && (!plan->texture || plan->texture != plan->scene->texture) &&
-		    !lean_all(s, plan, trial, &way, number, rest))
+		if (model && !lean_all(s, plan, trial, &way, number, rest))
 			return;
 	}
 }
