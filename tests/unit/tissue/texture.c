@@ -284,4 +284,3 @@ TEST(test_same_way_at_any_rate)
 	       n, lines, apart, worst, (double)turns / all);
 	assert_true(lines > n && apart < n / 10 && turns < all / 10);
 }
-
