@@ -1041,8 +1041,8 @@ static void train_texture_alone(const struct train_options *options)
 	if (texture)
 		cli_check(incise_texture_save(texture, options->tex, &err), &err);
 	if (options->json) {
-		json_print(json_pack("{so ss}", "texture", texture_json(texture),
-				     "texture_file", options->tex));
+		json_print(json_pack("{so ss?}", "texture", texture_json(texture),
+				     "texture_file", texture ? options->tex : NULL));
 	} else if (texture) {
 		texture_print(texture);
 		cli_written();

@@ -156,7 +156,7 @@ static bool helps(struct incise_plan *plan, const struct incise_tracker_info *tr
 #define ATTEMPTS 6
 #define HOST_ATTEMPTS 16 /* shorter steps swing in other ways */
 
-/* For a message, to the bit as it is read again: a texture leaps at less. */
+/* For a message, to the bit as it is read again. */
 static double three_digits(double value, double (*round)(double))
 {
 	double part = pow(10, 2 - floor(log10(value)));

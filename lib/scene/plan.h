@@ -201,13 +201,13 @@ bool incise_plan_kind_range(const struct incise_plan *plan, enum incise_model_in
 /* Scale all numbers of a checked plan that go with the gain. incise_plan_set_numbers() takes it over. */
 void incise_plan_set_gain(struct incise_plan *plan, double gain);
 
-/* The most by which the plan's texture multiplies its model's force, (1 + max τ) · factor; 1 without one. */
+/* The most by which the plan's texture multiplies the force of its front, (1 + max τ) · factor; 1 without one. */
 double incise_plan_texture_most(const struct incise_plan *plan);
 
 /* Fill in the plan in double, by all that was found of the scene. */
 void incise_plan_set_numbers(struct incise_plan *plan);
 
-/* Take in a tick of new tissue: its model's force and the texture of that, which are along the normal. */
+/* Take in a tick of new tissue: the force of its front and the texture of that, which are along the normal. */
 void incise_plan_feel(struct incise_plan *plan, const struct incise_tick *tick,
 		      double mean_N, double texture_N) INCISE_REALTIME;
 

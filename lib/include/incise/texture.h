@@ -2,9 +2,9 @@
 /*
  * Texture of a cut: the saw-tooth of Song et al. (2006), figure 2a, "a repeated process from elastic
  * deformation to abrupt fracturing", and the variation from cut to cut, learned from recordings at full
- * rate. A model gives the mean force; a texture multiplies it:
+ * rate. The front of a cut renders the model's mean force; a texture multiplies that:
  *
- *   F = F_model(inputs) · (1 + τ(s)) · factor(cut)
+ *   F = F_front · (1 + τ(s)) · factor(cut)
  *
  * with s the way of the front through new tissue. A texture is saved beside its model, MODEL.fis.tex
  * (incise-tex(5)), with a checksum of the parameters of its model.
