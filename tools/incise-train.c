@@ -954,12 +954,13 @@ static void run_training(struct train_options *options,
 			 struct incise_trained *trained, struct incise_outfile **history)
 {
 	const char *output = options->factor ? options->factor : options->model;
-	struct show show = {.options = options};
+	static struct show show; /* the texture is learned with it, too */
 	struct incise_error err = {0};
 	bool pipe = false;
 	char *progress;
 	int rc;
 
+	show.options = options;
 	for (int i = 0; i < options->n_paths; i++)
 		pipe |= source_is_pipe(&sources[i]);
 	progress = pipe ? NULL : path_beside(output, ".progress");
