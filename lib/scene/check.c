@@ -85,8 +85,8 @@ static int search_inputs(struct incise_plan *plan,
 
 /*
  * A texture counts as if its largest factor were constant: while a tool swings in one place, the front stays where it was
- * deepest, and so does its factor. Teeth themselves do not swing: each is met once, as the way only grows, though a tool
- * that creeps may fall from one long after it began to lean.
+ * deepest, and so does its factor. A tool meets each tooth once, as the way only grows, though one that creeps may fall from
+ * it long after it began to lean. Swings by the account of work, which a smaller factor may have, are not found.
  */
 static int search_check(struct incise_plan *plan,
 			const struct incise_tracker_info *tracker,

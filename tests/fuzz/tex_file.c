@@ -30,7 +30,7 @@ static struct incise_texture *load(const void *data, size_t size)
 	return texture;
 }
 
-/* What is written of it: free(3). */
+/* The bytes of its file: free(3). */
 static char *save(const struct incise_texture *texture, size_t *size)
 {
 	char path[] = "/tmp/incise-fuzz-tex-XXXXXX", *text;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * How alike the texture of rendered and of recorded cuts is, on cuts that nothing was learned from. Part of
- * libincise-learn; incise_train_texture() measures it.
+ * Realism: distances between the texture of rendered cuts and of recorded ones, which nothing was learned from. Part of
+ * libincise-learn; incise_train_texture() measures them.
  */
 #ifndef INCISE_REALISM_H
 #define INCISE_REALISM_H
