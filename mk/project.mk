@@ -8,10 +8,11 @@ PROJECT_CONTACT ?=
 export PROJECT_HOME PROJECT_TRACKER PROJECT_CONTACT
 
 # What has them is made again when they change.
-$(O)/obj/project: every-time
-	@mkdir -p $(@D); echo '$(PROJECT_HOME) $(PROJECT_TRACKER) $(PROJECT_CONTACT)' | cmp -s - $@ || \
-		echo '$(PROJECT_HOME) $(PROJECT_TRACKER) $(PROJECT_CONTACT)' >$@
-$(O)/obj/tools/incise.o $(man_pages:%=$(O)/%): $(O)/obj/project
-ifneq ($(PROJECT_HOME)$(PROJECT_TRACKER)$(PROJECT_CONTACT),)
-$(O)/obj/tools/incise.o: cppflags += -DPROJECT='$(shell mk/project help)'
+project := $(PROJECT_HOME) $(PROJECT_TRACKER) $(PROJECT_CONTACT)
+ifneq ($(strip $(project)),$(strip $(file <$(O)/obj/project)))
+$(O)/obj/project.h: every-time
 endif
+$(O)/obj/project.h: mk/project
+	@mkdir -p $(@D); mk/project help >$@ && echo '$(project)' >$(O)/obj/project
+$(O)/obj/tools/incise.o: cppflags += -include $(O)/obj/project.h
+$(O)/obj/tools/incise.o $(man_pages:%=$(O)/%): $(O)/obj/project.h

@@ -137,7 +137,7 @@ refuses() { # WORDS [MAKE-VARIABLE…]
 
 	export PROJECT_HOME=$home PROJECT_TRACKER=$tracker PROJECT_CONTACT=$contact
 	cd "$root"
-	[ "$(mk/project help)" = "\"Home page: $home\nReport faults: $tracker\nContact: $contact\n\"" ]
+	[ "$(mk/project help)" = "#define PROJECT \"Home page: $home\nReport faults: $tracker\nContact: $contact\n\"" ]
 	mk/project debian/control >"$BATS_TEST_TMPDIR/control"
 	grep -qx "Homepage: $home" "$BATS_TEST_TMPDIR/control"
 	grep -qx "Maintainer: incise maintainers <$contact>" "$BATS_TEST_TMPDIR/control"
@@ -152,9 +152,10 @@ scope = {"os": os, "re": re}
 exec(compile(ast.Module(part, []), "setup.py", "exec"), scope)
 print(scope["project_urls"]())' >"$BATS_TEST_TMPDIR/urls"
 	grep -qF "{'Homepage': '$home', 'Tracker': '$tracker', 'Contact': 'mailto:$contact'}" "$BATS_TEST_TMPDIR/urls"
-	# --help is compiled with them
-	make -s O="$INCISE_BUILD" -n -W tools/incise.c "$INCISE_BUILD/obj/tools/incise.o" V=1 2>/dev/null |
-		grep -qF -- "-DPROJECT='\"Home page: $home"
+	# The program of such a build, from a compiler's own view.
+	mk/project help >"$BATS_TEST_TMPDIR/project.h"
+	${CC:-cc} -E -Ilib/include -Itools -include "$BATS_TEST_TMPDIR/project.h" -D_GNU_SOURCE tools/incise.c |
+		grep -qF "printf(\"\n%s\", \"Home page: $home"
 	PROJECT_HOME="a b" run -1 --separate-stderr mk/project help
 	[ "$stderr" = "mk/project: a b is no address; give one without blanks and quotes" ]
 }
