@@ -62,7 +62,7 @@ endif
 
 # Goals that need no compiler or install it first; a kernel's headers name its own one.
 unbuilt_goals := help clean deps check check-full check-debian12 check-debian13 check-module-newest demo texture bench \
-	deb check-deb doc check-doc dist wheel check-wheel uninstall readme-figures \
+	deb check-deb doc check-doc release wheel check-wheel uninstall readme-figures \
 	module module_install module_uninstall dkms_install dkms_uninstall check-module
 ifneq ($(filter-out $(unbuilt_goals),$(or $(MAKECMDGOALS),all)),)
 missing := $(foreach tool,$(firstword $(CC)) $(firstword $(AR)),$(if $(call there,$(tool)),,$(tool))) $(missing)
@@ -126,6 +126,7 @@ core: $(O)/lib/libincise.so ## what a loop needs: libincise.so, of libc and libc
 
 include mk/lib.mk
 include mk/tools.mk
+include mk/project.mk
 include mk/bench.mk
 include mk/test.mk
 include mk/check.mk
@@ -134,6 +135,7 @@ include mk/fuzz.mk
 include mk/rtsan.mk
 include mk/vm.mk
 include mk/install.mk
+include mk/release.mk
 include mk/module.mk
 
 help:

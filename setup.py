@@ -5,6 +5,7 @@ INCISE_BUNDLE names a folder that `make bundle` has written, for another system:
 """
 
 import os
+import re
 import shutil
 import subprocess
 
@@ -39,7 +40,20 @@ class AnyPython(bdist_wheel):
         return "py3", "none", super().get_tag()[2]
 
 
+def project_urls():
+    """Addresses of mk/project.mk; make exports those that are given to it."""
+    with open("mk/project.mk", encoding="utf-8") as file:
+        stated = dict(re.findall(r"^PROJECT_(\w+) \?= *(.*)$", file.read(), re.M))
+    urls = {name: os.environ.get(f"PROJECT_{name}") or value for name, value in stated.items()}
+    labels = {"HOME": "Homepage", "TRACKER": "Tracker", "CONTACT": "Contact"}
+    urls = {labels[name]: url for name, url in urls.items() if url}
+    if "@" in urls.get("Contact", ""):
+        urls["Contact"] = "mailto:" + urls["Contact"]
+    return urls
+
+
 setup(
+    project_urls=project_urls(),
     distclass=OneArchitecture,
     cmdclass={"build_py": BuildWithBundle, "bdist_wheel": AnyPython},
     options={"build": {"build_base": "build/python"}},  # build/lib is make's

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-# install, uninstall, dist.
+# install, uninstall, packages and wheels.
 
 headers := $(wildcard lib/include/incise/*.h)
 scenes := $(wildcard scenes/*.scene scenes/*.fis scenes/*.tex)
@@ -121,13 +121,6 @@ uninstall: ## remove what install recorded as installed
 		rmdir "$(DESTDIR)$$folder" 2>/dev/null || :; \
 	done
 
-dist: ## a tarball of the committed tree
-	@mkdir -p $(O)
-	@git rev-parse -q --verify HEAD >/dev/null 2>&1 || \
-		{ echo "make dist: packs what git has committed, and this is no clone of it" >&2; exit 1; }
-	git archive --prefix=incise-$(version)/ -o $(O)/incise-$(version).tar.gz HEAD
-	@echo $(O)/incise-$(version).tar.gz
-
 # All that a wheel holds beside python/incise; programs and libraries find each other in it.
 BUNDLE ?= $(O)/bundle
 bundle: all ## programs, libraries, scenes and pages in one folder, BUNDLE, that may be moved
@@ -163,4 +156,4 @@ check-deb: ## the packages: lintian, then installed, tried and purged in a clean
 		echo "skipped: Debian packages, for what builds them is missing"; \
 	fi
 
-.PHONY: install uninstall dist bundle wheel check-wheel deb check-deb
+.PHONY: install uninstall bundle wheel check-wheel deb check-deb

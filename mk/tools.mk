@@ -35,8 +35,11 @@ tools: $(left_out_of_tools:%=left-out-%)
 
 # incise doctor prints what this build leaves out, and is built again when that changes.
 left_out_names := $(subst $() $(),$(comma) ,$(sort $(left_out) $(left_out_of_tools) $(left_out_commands:%=incise-%)))
+ifneq ($(left_out_names),$(file <$(O)/obj/left-out))
 $(O)/obj/left-out: every-time
-	@mkdir -p $(@D); echo '$(left_out_names)' | cmp -s - $@ || echo '$(left_out_names)' >$@
+endif
+$(O)/obj/left-out:
+	@mkdir -p $(@D); echo '$(left_out_names)' >$@
 $(O)/obj/tools/incise-doctor.o: $(O)/obj/left-out
 $(O)/obj/tools/incise-doctor.o: cppflags += -DLEFT_OUT='"$(left_out_names)"'
 .PHONY: every-time

@@ -96,6 +96,9 @@ static void help(void)
 		"need: several machines, old recordings, benchmarks. New here? Start with "
 		"'incise demo'.",
 		0, 0);
+#ifdef PROJECT /* mk/project.mk */
+	printf("\n%s", PROJECT);
+#endif
 }
 
 /* Whether PATH leads to a file of this name, runnable or not. */

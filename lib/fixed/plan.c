@@ -219,7 +219,7 @@ static int open_parts(struct incise_fixed_plan *plan, const uint8_t *bytes,
 		return BAD;
 	if (!rc && head->texture_at) {
 		plan->texture = (const void *)(bytes + head->texture_at);
-		/* It goes by the way of a front. */
+		/* A rise of it is as steep as the tissue unloads. */
 		if (!head->numbers.unloading || !incise_fixed_texture_good(plan->texture))
 			return BAD;
 	}

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later OR GPL-2.0-only */
 /*
- * The texture of a cut, as a tick reads it: F = F_front · (1 + τ(s)) · factor(cut), with F_front the force
- * of the front without a texture, and s its way through new tissue. Both are tables, made once by lib/model/texture.c from a learned
- * texture and a seed, so that double, integers and the kernel have the same τ of the same way.
+ * The texture of a cut, as a tick reads it: F = F_model · (1 + τ(s)) · factor(cut) where the blade
+ * cuts, with s the way of the front through new tissue. Both are tables, made once by lib/model/texture.c
+ * from a learned texture and a seed, so that double, integers and the kernel have the same τ of the same way.
  *
  *   τ of s   knot[(start[cut] + s / step) mod N], linear between knots, wraps around
  *

@@ -677,6 +677,8 @@ static void run_texture(const struct T(plan) *plan, struct T(state) *state)
 		return;
 	state->fresh = joined(state, [&] { return advance(state); });
 	state->tooth = T(texture_at)(plan, &state->front.way, &state->factor);
+	state->front.rises = choose(2);
+	state->front.climbs = true;
 }
 
 typedef void stage(const struct T(plan) *, struct T(state) *, struct T(tick) *);
@@ -731,7 +733,10 @@ static void run_paths(struct tick *t)
 		if (t->plan.has_model && at(t->plan.numbers.unloading.id).high > 0 &&
 		    state.held == INCISE_TOOL_BLADE)
 			take(&t->cutting,
-			     T_JOINED(&state, cutting_force(&t->plan, &state, &tick)).id);
+			     T_JOINED(&state,
+				      texture(&t->plan, &state, &tick,
+					      cutting_force(&t->plan, &state, &tick)))
+				     .id);
 		run_forces(t, &state, &tick);
 		if (paths->dead)
 			continue;
@@ -773,6 +778,8 @@ static void settle_front(struct tick *t)
 
 			if (choose(2))
 				advance = num::of(put({0, 1, 0, 0, 16, false}));
+			next.climbs = t->plan.texture && choose(2);
+			next.rises = next.climbs;
 			T(front_force)(&next, numbers->unloading, numbers->friction,
 				       depth, advance, cutting);
 			if (paths->dead)

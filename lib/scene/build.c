@@ -155,9 +155,8 @@ static bool gives_back(const struct incise_plan *plan)
 	const struct incise_scene *scene = plan->scene;
 
 	return plan->inserts || plan->average_ticks > 1 || plan->surface->mesh ||
-	       plan->texture || plan->stability.damping_N_s_mm > 0 ||
-	       scene->membrane.thickness_mm > 0 || scene->cut[INCISE_PUNCTURE].path ||
-	       scene->cut[INCISE_WITHDRAW].path ||
+	       plan->stability.damping_N_s_mm > 0 || scene->membrane.thickness_mm > 0 ||
+	       scene->cut[INCISE_PUNCTURE].path || scene->cut[INCISE_WITHDRAW].path ||
 	       (scene->cut[INCISE_CUT].path &&
 		(!scene->tissue.dissipates || scene->cut[INCISE_CUT].n_inputs > 2));
 }

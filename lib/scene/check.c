@@ -86,7 +86,7 @@ static int search_inputs(struct incise_plan *plan,
 /*
  * A texture counts as if its largest factor were constant: while a tool swings in one place, the front stays where it was
  * deepest, and so does its factor. A tool meets each tooth once, as the way only grows, though one that creeps may fall from
- * it long after it began to lean. Swings by the account of work, which a smaller factor may have, are not found.
+ * it long after it began to lean.
  */
 static int search_check(struct incise_plan *plan,
 			const struct incise_tracker_info *tracker,

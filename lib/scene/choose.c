@@ -50,7 +50,11 @@ static const char *no_membrane(const struct incise_plan *plan)
 
 static const char *no_texture(const struct incise_plan *plan)
 {
-	return plan->texture ? zero(plan, NULL) : "the scene has no texture";
+	const char *left_out = plan->scene->texture_left_out;
+
+	if (plan->texture)
+		return zero(plan, NULL);
+	return left_out ? left_out : "the scene has no texture";
 }
 
 static const char *no_work(const struct incise_plan *plan)

@@ -4,7 +4,7 @@
  *
  *   acting = a + b · mean + share · texture
  *
- * with the force of the front and its texture: a share of 1 is all of it, at once. Neither an
+ * with the model's force and its texture as they are before the front: a share of 1 is all of it, at once. Neither an
  * actuator aside of the normal nor a ramp of the force counts, as both act on the mean as well.
  */
 #include <math.h>

@@ -607,6 +607,9 @@ static int read_model(struct incise_scene *scene, const config_setting_t *root,
 
 	int rc = 0;
 
+	if (override && setting && config_setting_is_group(setting) &&
+	    config_setting_get_member(setting, "texture"))
+		scene->texture_left_out = "its texture is of the scene's own model";
 	if (override)
 		return load_model(scene, &scene->cut[INCISE_CUT], strdup(override), err);
 	if (setting && config_setting_is_group(setting))
@@ -764,6 +767,8 @@ void incise_scene_set_full(struct incise_scene *scene, bool full)
 
 void incise_scene_leave_texture_out(struct incise_scene *scene)
 {
+	if (scene->texture)
+		scene->texture_left_out = "its texture is left out";
 	free(scene->texture);
 	free(scene->texture_path);
 	scene->texture = NULL;

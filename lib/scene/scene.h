@@ -49,6 +49,7 @@ struct incise_scene {
 	struct incise_fixed_texture
 		*texture; /* its tables; NULL: each cut is the mean one */
 	struct incise_texture_info learned; /* 0 without one in the file */
+	const char *texture_left_out;	    /* why, if the file has one; or NULL */
 	struct incise_surface *surface;	    /* or NULL: the rig's plane */
 	const char *surface_kind;	    /* as the file names it */
 	struct incise_scene_surface named;

@@ -14,8 +14,8 @@
 
 /*
  * The unloading is steeper than any slope of the model, so that the force can follow it: by as
- * much that the force may rise with the speed on the work that a cut has taken. A texture's largest factor is a part of
- * that, as it multiplies the force that unloads.
+ * much that the force may rise with the speed on the work that a cut has taken. With a texture it is also as steep as the
+ * model is by the texture's largest factor.
  */
 #define STEEPER 1.25
 
@@ -162,9 +162,9 @@ static void set_tissue(struct incise_plan *plan)
 
 	plan->beyond_N_mm = fmin(fmax(plan->gain * plan->edge_N_mm, 0), steepest_N_mm);
 	/* Softer than the model, it could not follow it. */
-	if (!(own > 0))
-		own = STEEPER / incise_plan_texture_most(plan) * steepest_N_mm;
-	plan->unloading_N_mm = fmax(fmax(own, steepest_N_mm), LEAST_N_mm);
+	plan->unloading_N_mm =
+		fmax(fmax(own > 0 ? own : STEEPER * steepest_N_mm, LEAST_N_mm),
+		     incise_plan_texture_most(plan) * steepest_N_mm);
 }
 
 /* Take the slopes of a phase's model into the plan's, where they are larger. */
@@ -394,7 +394,6 @@ void incise_plan_set_gain(struct incise_plan *plan, double gain)
 		/* Not checked, it may be stiffer. */
 		if (plan->scene->unchecked)
 			model_N_mm = fmax(plan->unloading_N_mm, 1);
-		model_N_mm *= incise_plan_texture_most(plan);
 	}
 	add_up(plan, model_N_mm);
 }

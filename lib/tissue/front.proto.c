@@ -21,7 +21,8 @@
  *
  * A blade that moves along the skin meets new tissue at each mm, which the front has not reached: front
  * and rest come up by as much, as long as the elastic energy stays below the work that was put in since
- * the blade entered, a sixteenth of which is never given back. Back within its own cut it meets nothing
+ * the blade entered, a sixteenth of which is never given back. So they do where a texture lets the model's force
+ * rise on the way of the front, to all of that force at once. Back within its own cut it meets nothing
  * new. The cuts that it left before stay as well: as deep as the front was when it left them.
  */
 
@@ -30,6 +31,9 @@
 
 /* A blade so far beside the line of its cut is in new tissue: half the width of a blade. */
 #define BESIDE N(1)
+
+/* A force of this share of the model's follows a rise of its texture. */
+#define NEAR N_OF(3, 4)
 
 /* Share of the shorter of two ways across each other in their length: to 8 %. */
 #define ASIDE N_OF(53, 128)
@@ -139,6 +143,7 @@ bool T(front_enter)(struct T(front) *front, const num at[3], const dir normal[3]
 	/* The work of an earlier visit pays for nothing now. */
 	front->depth = front->force = front->rest = front->cut = 0;
 	front->work2 = front->most2 = 0;
+	front->rises = front->climbs = false;
 	if (there < 0) {
 		begin_cut_of(front, at, normal, side);
 		front->way = (struct T(way)){.number = front->begun++};
@@ -194,6 +199,7 @@ num T(front_force)(struct T(front) *front, num unloading, num friction, num dept
 		   num advance, num cutting)
 {
 	num K = n_max(unloading, LEAST), rubs, upper, elastic, trial, force, way;
+	bool climbs = front->rises && front->climbs;
 
 	depth = n_max(depth, 0);
 	advance = n_max(advance, 0);
@@ -204,14 +210,16 @@ num T(front_force)(struct T(front) *front, num unloading, num friction, num dept
 	elastic = n_times(K, n_sub(depth, front->rest));
 	front->rest = n_sub(front->rest, advance);
 	trial = force = n_times(K, n_sub(depth, front->rest));
-	if (n_below(0, advance)) {
+	upper = n_max(rubs, n_times(K, n_sub(depth, front->cut)));
+	if (climbs || n_below(0, advance)) {
 		wide work2 = w_work(front->work2, front->force,
 				    n_max(elastic, n_neg(rubs)), way);
-
 		/* Elastic energy is F²/2K. Nothing pulls with more than the friction. */
-		force = n_min(trial, n_max(elastic, w_paid(K, work2, front->most2)));
+		num most = n_max(elastic, w_paid(K, work2, front->most2));
+
+		force = climbs ? most : n_min(trial, most);
+		upper = climbs ? cutting : upper;
 	}
-	upper = n_max(rubs, n_times(K, n_sub(depth, front->cut)));
 	force = n_max(n_neg(rubs), n_min(force, n_min(upper, cutting)));
 	/* Else the line stays to the bit, and no rounding adds up. */
 	if (n_below(force, trial) || n_below(trial, force))
@@ -219,6 +227,9 @@ num T(front_force)(struct T(front) *front, num unloading, num friction, num dept
 	/* The blade cuts where all of the model's force acts. */
 	if (!n_below(force, cutting))
 		front->cut = n_max(front->cut, n_sub(depth, n_over(cutting, K)));
+	if (climbs)
+		front->cut = n_min(front->cut, n_max(n_sub(depth, n_over(force, K)), 0));
+	front->climbs = climbs || !n_below(force, n_times(NEAR, cutting));
 	front->work2 = w_work(front->work2, front->force, force, way);
 	front->most2 = front->work2 > front->most2 ? front->work2 : front->most2;
 	front->depth = depth;

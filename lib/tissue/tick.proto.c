@@ -619,20 +619,21 @@ static num front_friction(const struct T(plan) *plan, const struct T(state) *sta
 }
 
 /*
- * The texture of a cut, a saw-tooth over the way of the front. It scales the force of the front, which goes on as it
- * would without: so its mean stays, where a front that met the teeth would climb no steeper than it unloads. While the
- * way is constant the factor is, so that a blade that swings does so on tissue that is stiffer by it; what teeth could
- * give back is left out by the account of the work.
+ * The texture of a cut, a saw-tooth over the way of the front. It scales the force at which the tissue gives way,
+ * before the front: a fall of that loses elastic energy, and a rise is as steep as the work pays for; see front.proto.c.
  */
 void T(stage_texture)(const struct T(plan) *plan, struct T(state) *state,
 		      struct T(tick) *tick)
 {
+	num before = state->tooth;
+
 	if (!plan->texture || tick->phase != INCISE_PHASE_CUTTING)
 		return;
 	state->fresh = T_JOINED(state, advance(state));
 	state->goes_on =
 		!state->membrane.hit && T(front_way)(&state->front, state->depth);
 	state->tooth = T(texture_at)(plan, &state->front.way, &state->factor);
+	state->front.rises = n_below(before, state->tooth);
 }
 
 static num texture(const struct T(plan) *plan, const struct T(state) *state,
@@ -664,12 +665,12 @@ void T(stage_reaction)(const struct T(plan) *plan, struct T(state) *state,
 		size = T_JOINED(state, cutting_force(plan, state, tick));
 	} else {
 		fresh = plan->texture ? state->fresh : T_JOINED(state, advance(state));
-		size = T_JOINED(state, cutting_force(plan, state, tick));
+		size = texture(plan, state, tick,
+			       T_JOINED(state, cutting_force(plan, state, tick)));
 		friction = front_friction(plan, state, tick, size);
 		size = T_JOINED(state,
 				T(front_force)(&state->front, numbers->unloading,
 					       friction, state->depth, fresh, size));
-		size = texture(plan, state, tick, size);
 	}
 	push_out(plan, state, size);
 }

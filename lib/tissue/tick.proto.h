@@ -120,6 +120,8 @@ struct T(front) {
 	struct T(way) way;
 	num off[3];	/* from the line to the place of the last advance */
 	uint32_t begun; /* cuts, so far */
+	int32_t rises, /* for the caller to set, before a call: the cutting force rises by its texture … */
+		climbs; /* … and the front's follows it, which was near it at the last call */
 };
 
 /*

@@ -12,7 +12,7 @@ import os
 import re
 from typing import Union
 
-VERSION = "0.1.0"
+VERSION = "0.2.0"
 SOVERSION = 2
 
 c_double, c_int, c_bool, c_char = ctypes.c_double, ctypes.c_int, ctypes.c_bool, ctypes.c_char

@@ -150,20 +150,6 @@ setup() {
 	[ -f "$dest/usr/share/incise/scenes/mine.scene" ]
 }
 
-@test "dist makes a tarball of the source" {
-	git -C "$root" rev-parse -q --verify HEAD >/dev/null 2>&1 ||
-		skip "the source is no git repository with a commit"
-	version=$(incise info --version | cut -d' ' -f2)
-	run -0 project dist
-	[ "${lines[-1]}" = "$INCISE_BUILD/incise-$version.tar.gz" ]
-	tar tzf "${lines[-1]}" >list
-	rm "${lines[-1]}"
-	for file in README.md Makefile lib/include/incise/version.h man/incise.1; do
-		grep -qx "incise-$version/$file" list
-	done
-	run ! grep -v "^incise-$version/" list
-}
-
 # Of three forms that once removed another folder; and characters that a shell reads.
 @test "a path with a blank is refused before anything is done, by each target that removes" {
 	mkdir -p "$PWD/lab" && touch "$PWD/lab/data.rec"

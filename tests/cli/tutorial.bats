@@ -43,6 +43,7 @@ setup() {
 	grep -q "liver.rec: complete, and as it was written" out
 	grep -q "certified to 0\.0" out
 	grep -q "^liver: running since" seen
+	grep -qx "9 of 9 criteria met" out
 	[ "$(awk -F, 'NR > 1' felt.csv | wc -l)" -gt 100000 ]
 	# the scene that the service is given
 	bash -c "$(grep -o "sed 's/model = .*;/'" "$page") $root/scenes/liver.scene" >mine.scene

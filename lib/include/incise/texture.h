@@ -2,11 +2,11 @@
 /*
  * Texture of a cut: the saw-tooth of Song et al. (2006), figure 2a, "a repeated process from elastic
  * deformation to abrupt fracturing", and the variation from cut to cut, learned from recordings at full
- * rate. The front of a cut renders the model's mean force; a texture multiplies that:
+ * rate. A model's force is the mean; a texture multiplies it where the blade cuts:
  *
- *   F = F_front · (1 + τ(s)) · factor(cut)
+ *   F = F_model · (1 + τ(s)) · factor(cut)
  *
- * with s the way of the front through new tissue. A texture is saved beside its model, MODEL.fis.tex
+ * with s the way of the cut's front through new tissue. A texture is saved beside its model, MODEL.fis.tex
  * (incise-tex(5)), with a checksum of the parameters of its model.
  */
 #ifndef INCISE_TEXTURE_H

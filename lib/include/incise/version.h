@@ -10,7 +10,7 @@
 INCISE_BEGIN_DECLS
 
 /** Version of the headers. */
-#define INCISE_VERSION "0.1.0"
+#define INCISE_VERSION "0.2.0"
 
 /**
  * Version of the library in use, which may differ from INCISE_VERSION.

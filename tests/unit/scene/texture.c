@@ -232,7 +232,7 @@ TEST(test_a_scene_is_refused_by_its_largest_factor)
 	assert_error(incise_plan_new_fed(scene, &tracker, &err), EDOM, &err,
 		     "liver.scene", "not stable", words, "leave out its texture");
 	scene->tissue.gain = atof(strstr(err.text, words) + strlen(words));
-	assert_true(scene->tissue.gain > 0.05 && scene->tissue.gain < 0.5);
+	assert_true(scene->tissue.gain > 0.2 && scene->tissue.gain < 1);
 	plan = incise_plan_new_fed(scene, &tracker, &err);
 	succeeds(plan);
 	incise_plan_free(plan);

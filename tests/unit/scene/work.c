@@ -169,7 +169,7 @@ static struct incise_scene *cut_of(const struct drawn *d, uint64_t seed)
 	return scene;
 }
 
-/* First a stiff front that was drawn back sideways and gave work. */
+/* By the front alone; first a stiff one that was drawn back sideways and gave work. */
 TEST(test_no_cut_with_texture_returns_more_than_it_takes)
 {
 	int cuts = cases_are_all() ? CUTS : CUTS_FEW;
@@ -183,7 +183,7 @@ TEST(test_no_cut_with_texture_returns_more_than_it_takes)
 		draw(seed, &d);
 		scene = cut_of(&d, seed);
 		if (scene)
-			walk(seed, &d, scene, true, &met);
+			walk(seed, &d, scene, false, &met);
 	}
 	printf("%d contacts of up to %.3g mJ, %d return more\n", met.contacts,
 	       met.most_mJ, met.returned);

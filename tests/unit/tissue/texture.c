@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * The texture of a cut, in both kinds of numbers: its tape; and the way of the front, which depends on places alone.
+ * The texture of a cut, in both kinds of numbers: its tape; the way of the front, which depends on places alone;
+ * closed motions through a saw-tooth, which give no work back.
  */
 #include "../unit.h"
 #include "../cases.h"
@@ -9,6 +10,7 @@
 #include "../../../lib/tissue/tick.h"
 #include "kinds.h"
 
+#define K 0.3
 #define BOTH 2 /* kinds: double, integers */
 
 static const double up[3] = {0, 0, 1}, side[3] = {0, 1, 0};
@@ -78,6 +80,16 @@ static double tooth(const struct front *f, double *factor)
 	share = incise_fixed_texture_at(&in_integers, &f->i.way, &whole);
 	*factor = whole / ONE;
 	return share / ONE;
+}
+
+static double force(struct front *f, double stiff, double friction, double depth,
+		    double fresh, double cutting)
+{
+	return f->whole ? incise_fixed_front_force(&f->i, q16(stiff), q16(friction),
+						   q16(depth), q16(fresh), q16(cutting)) /
+				  ONE
+			: incise_double_front_force(&f->d, stiff, friction, depth, fresh,
+						    cutting);
 }
 
 static double go_to(struct front *f, double x, double y, double depth)
@@ -283,4 +295,80 @@ TEST(test_same_way_at_any_rate)
 	printf("%d ways, %d lines left, %d apart, %.2g mm at most, %.2g of them by more than a turn\n",
 	       n, lines, apart, worst, (double)turns / all);
 	assert_true(lines > n && apart < n / 10 && turns < all / 10);
+}
+
+/* --- work ------------------------------------------------------------------------------- */
+
+/* A law of depth and speed; a tooth of it may be steeper than K. */
+static double law(double depth_mm, double speed_mm_s)
+{
+	return (0.05 * depth_mm + 0.004 * depth_mm * depth_mm) *
+	       (1 + 0.35 * speed_mm_s / (speed_mm_s + 15));
+}
+
+/* Work by the mean of both forces of a step, so much of it put in; rounded by integers at most, and by a turn in a step. */
+struct taken {
+	double work, put, rounded, turned;
+};
+
+static struct taken take(struct front *f, uint64_t *seed, double friction)
+{
+	const int steps = 2000;
+	struct taken taken = {0};
+	double u[6], last_N = 0, before = 0, x = 0, factor, share = 0;
+
+	for (int i = 0; i < 6; i++)
+		u[i] = (1 + incise_random_symmetric(seed)) / 2;
+	for (int i = 1; i <= steps; i++) {
+		double t = 2 * M_PI * i / steps, d, dx, fresh, cutting, step, was_N;
+		double at[3] = {0};
+
+		d = (3 + 12 * u[0]) * pow(sin(t / 2), 2) *
+		    (1 + 0.5 * u[1] * sin((1 + floor(8 * u[2])) * t));
+		d = i == steps ? 0 : q16(fmax(d, 0)) / ONE;
+		dx = 0.02 * u[3] * (1 + sin((1 + floor(20 * u[4])) * t + u[5]));
+		at[0] = x = q16(x + dx) / ONE;
+		was_N = last_N;
+		fresh = advance(f, at, d);
+		*(f->whole ? &f->i.rises : &f->d.rises) = share < tooth(f, &factor);
+		share = tooth(f, &factor);
+		cutting = law(d, 1e3 * hypot(d - before, dx)) * share * factor;
+		last_N = force(f, K, friction, d, fresh, cutting);
+		step = (was_N + last_N) / 2 * (d - before);
+		taken.work += step;
+		taken.put += fmax(step, 0);
+		/* Of a force half a bit, of the rest another one. */
+		if (f->whole)
+			taken.rounded += (fabs(d - before) + fabs(last_N)) / ONE / 2;
+		taken.turned += fabs(last_N - was_N) * fabs(d - before) / 2;
+		before = d;
+	}
+	return taken;
+}
+
+/* Through any saw-tooth, with falls of up to 1.8 from one knot to the next; twice in the same cut. */
+TEST(test_takes_work)
+{
+	int n = cases_of(10000, 500), back = 0, lossy = 0;
+	uint64_t seed = cases_seed(1);
+
+	for (int k = 0; k < n; k++) {
+		struct front f = {.whole = k % 2};
+
+		if (k % 8 == 0)
+			incise_fx_trial_texture(&seed, INCISE_TEXTURE_MOST, &tape);
+		for (int i = 0; i < 2; i++) {
+			struct taken taken;
+
+			assert_int_equal(enter(&f, (const double[]){0, 0, 0}), !i);
+			taken = take(&f, &seed, 0.05 * (k % 3));
+			/* In the open cut it may be little that is taken. */
+			back += !(taken.work >=
+				  -1e-9 - taken.rounded - (i ? 2 * taken.turned : 0));
+			lossy += !i && taken.work > 0.1 * taken.put;
+		}
+	}
+	printf("%d closed motions, %d of them took a tenth of the work\n", 2 * n, lossy);
+	assert_int_equal(back, 0);
+	assert_true(lossy > n / 4);
 }
