@@ -539,17 +539,24 @@ static void draw_force(const struct session *s, const struct session *reference,
 
 /* --- the page -------------------------------------------------------------------------- */
 
+/* Values, and what was asked where it is not met. */
 static json_t *cells_json(const struct assessed *a)
 {
 	json_t *list = json_array();
-	char text[40];
+	char text[40], asked[48];
 
 	for (int k = 0; k < INCISE_CRITERIA; k++) {
 		const struct session_verdict *verdict = &a->verdict[k];
+		bool bad = verdict->judged && !verdict->met;
 
 		session_criterion_value(k, verdict->value, text, sizeof(text));
-		json_array_append_new(list, json_pack("{ss sb}", "value", text, "bad",
-						      verdict->judged && !verdict->met));
+		session_criterion_asked(k, &a->session->criteria[k], asked,
+					sizeof(asked));
+		json_array_append_new(list,
+				      json_pack("{so sb}", "value",
+						bad ? json_sprintf("%s (%s)", text, asked)
+						    : json_string(text),
+						"bad", bad));
 	}
 	return list;
 }
@@ -562,11 +569,13 @@ static json_t *lines_json(const struct assessed *a, const struct assessed *refer
 		struct assess_line line = line_of(a, reference, i);
 
 		json_array_append_new(
-			list, json_pack("{ss ss ss ss ss ss ss sb}", "label", line.label,
-					"value", line.value, "unit", line.unit, "asked",
-					line.asked, "met", line.met, "reference",
-					line.reference, "difference", line.difference,
-					"bad", !strcmp(line.met, "no")));
+			list,
+			json_pack("{ss so ss ss ss ss sb}", "label", line.label, "value",
+				  json_sprintf("%s%s%s", line.value,
+					       *line.unit ? " " : "", line.unit),
+				  "asked", line.asked, "met", line.met, "reference",
+				  line.reference, "difference", line.difference, "bad",
+				  !strcmp(line.met, "no")));
 	}
 	return list;
 }
@@ -678,7 +687,10 @@ static void write_page(const struct assess_job *job)
 		json_array_append_new(sessions, shown_json(job, &job->session[i]));
 	}
 	for (int k = 0; k < INCISE_CRITERIA; k++)
-		json_array_append_new(heads, json_string(session_criterion_head(k)));
+		json_array_append_new(heads,
+				      json_sprintf("%s%s%s", session_criterion_label(k),
+						   *session_criterion_unit(k) ? ", " : "",
+						   session_criterion_unit(k)));
 	cli_progress_end();
 	page = json_pack("{ss so so sb}", "title", "Sessions", "heads", heads, "sessions",
 			 sessions, "compared", job->reference != NULL);

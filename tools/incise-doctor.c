@@ -574,7 +574,7 @@ static void check_display(struct doctor *doctor)
 		    wayland && *wayland ? wayland : x11);
 	else
 		add(doctor, "display", "window", WARNING,
-		    "incise view SCENE --procedure -o FILE.mkv    # needs no display",
+		    "incise view SCENE --procedure -o FILE.mp4    # needs no display",
 		    "neither DISPLAY nor WAYLAND_DISPLAY is set: incise view has no window");
 }
 

@@ -21,7 +21,7 @@ struct export_job {
 	const char *output;
 	bool json, damaged, no_lineage;
 	int min_count; /* 0: not given */
-	int percent;   /* of the bar */
+	struct cli_bar progress;
 	enum { PLAIN, ROS2 } profile;
 	int uncertainty; /* enum incise_export_uncertainty */
 	struct calibration_used calibration;
@@ -188,7 +188,7 @@ static int progress(void *context, double share)
 {
 	struct export_job *job = context;
 
-	cli_progress_bar(job->output, share, &job->percent);
+	cli_progress_bar(job->output, share, &job->progress);
 	return 0;
 }
 
@@ -227,7 +227,7 @@ static void parse_export(struct export_job *job, int argc, char **argv)
 {
 	struct incise_export_options *how = &job->how;
 
-	*job = (struct export_job){.output = "-", .percent = -1};
+	*job = (struct export_job){.output = "-"};
 	incise_export_options_init(how);
 	cli_parse(&command, argc, argv, job);
 	if (optind == argc)

@@ -146,7 +146,7 @@ static void draw_plot(struct plot *plot)
 struct sink {
 	FILE *out; /* or NULL */
 	bool bar;  /* false: it would run through rows on the same terminal */
-	int percent;
+	struct cli_bar progress;
 	const char *name;
 	struct plot plot;
 };
@@ -158,7 +158,7 @@ static int put_tick(void *context, const struct incise_replay_tick *tick,
 	struct sink *sink = context;
 
 	if (sink->bar)
-		cli_progress_bar(sink->name, tick->done, &sink->percent);
+		cli_progress_bar(sink->name, tick->done, &sink->progress);
 	if (sink->plot.data)
 		add_to_plot(&sink->plot, tick);
 	if (!sink->out)
@@ -279,7 +279,7 @@ int main(int argc, char **argv)
 	struct incise_outfile *file = NULL;
 	struct incise_error err = {0};
 	struct incise_scene *scene;
-	struct sink sink = {.percent = -1};
+	struct sink sink = {0};
 	struct replay_job job;
 	double rate_hz;
 	int rc;

@@ -53,6 +53,7 @@ struct sink {
 	const char *path;
 	uint64_t left_out;
 	uint64_t times; /* rows whose times are not to be trusted */
+	struct cli_bar progress;
 };
 
 static json_t *known(int64_t value, bool is)
@@ -108,11 +109,12 @@ static void found(void *user, const struct incise_verify_finding *finding)
 
 static int progress(void *user, double share)
 {
-	(void)user;
+	struct sink *sink = user;
+
 	if (share < 0)
-		cli_progress("checking the pages of the database");
+		cli_progress("%s: checking the pages of the database", sink->path);
 	else
-		cli_progress("verifying %.0f %%", 100 * share);
+		cli_progress_bar(sink->path, share, &sink->progress);
 	return cli_stop;
 }
 

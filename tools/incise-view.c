@@ -71,8 +71,8 @@ static const struct cli_option options[] = {
 	 "no window: write a PNG file for each frame into this folder; none: write "
 	 "nothing, draw in real time and report the frame rate",
 	 CLI_OUTPUTS(struct view_job, output.folder)},
-	{'o', "output", "FILE.mkv", "no window: write a film (Matroska)",
-	 CLI_OUTPUT(struct view_job, output.film_path), .extensions = ".mkv"},
+	{'o', "output", "FILE.mp4|FILE.mkv", "no window: write a film (MP4 or Matroska)",
+	 CLI_OUTPUT(struct view_job, output.film_path), .extensions = ".mp4 .mkv"},
 	{'o', "output", "FILE.png",
 	 "no window: write a few frames side by side, with --at",
 	 CLI_OUTPUT(struct view_job, output.strip_path), .extensions = ".png"},
@@ -107,13 +107,12 @@ static const struct cli_command command = {
 		 "the wheel zooms; b blade, n handle, t tube, + and - the depth of a "
 		 "press, s saves the image, q ends.",
 	.examples = "incise view neck --rig sim:mouse\n"
-		    "incise view neck --procedure -o neck.mkv",
+		    "incise view neck --procedure -o neck.mp4",
 };
 
 static void parse(struct view_job *job, int argc, char **argv)
 {
-	*job = (struct view_job){.output = {.width = 1280, .height = 720, .fps = 60},
-				 .percent = -1};
+	*job = (struct view_job){.output = {.width = 1280, .height = 720, .fps = 60}};
 	cli_parse(&command, argc, argv, job);
 	scene_argument_operand(&job->argument, argc, argv, optind);
 	session_options_check(&job->session);

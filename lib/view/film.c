@@ -59,6 +59,7 @@ static int name_files(struct incise_film *film, const char *path)
 struct incise_film *incise_film_new(const char *path, int width, int height, int rate_hz,
 				    struct incise_error *err)
 {
+	const char *dot = strrchr(path, '.');
 	struct incise_film *film;
 
 	if (width < 16 || height < 16 || width > INCISE_FILM_SIDE_MAX ||
@@ -76,7 +77,8 @@ struct incise_film *incise_film_new(const char *path, int width, int height, int
 		goto no_memory;
 	film->module = load_film(err);
 	if (film->module)
-		film->coder = film->module->open(film->part, width, height, rate_hz, err);
+		film->coder = film->module->open(film->part, dot && !strcmp(dot, ".mp4"),
+						 width, height, rate_hz, err);
 	if (film->coder)
 		return film;
 	forget(film);

@@ -5,18 +5,20 @@
 #ifndef INCISE_VIEW_FILM_H
 #define INCISE_VIEW_FILM_H
 
+#include <stdbool.h>
 #include <incise/film.h>
 
-#define INCISE_FILM_ABI 1
+#define INCISE_FILM_ABI 2
 #define INCISE_FILM_SYMBOL "incise_film_module"
 
 struct incise_film_coder;
 
 struct incise_film_module {
 	int abi;
-	/* As in incise/film.h, but writes to the path itself. */
-	struct incise_film_coder *(*open)(const char *path, int width, int height,
-					  int rate_hz, struct incise_error *err);
+	/* As in incise/film.h, but writes to the path itself, MP4 if @mp4. */
+	struct incise_film_coder *(*open)(const char *path, bool mp4, int width,
+					  int height, int rate_hz,
+					  struct incise_error *err);
 	int (*add)(struct incise_film_coder *coder, const uint8_t *rgb,
 		   struct incise_error *err);
 	/* Frees it. */

@@ -4,6 +4,7 @@
 
 load cli
 load report
+load browser
 
 # One report for all that only look at it. What fails here is in it, with the reason. What each
 # benchmark says of itself is looked at in tests of their own.
@@ -304,64 +305,11 @@ report_of() {
 
 # ---- in a browser ----
 
-browser() {
-	command -v chromium >/dev/null || skip "chromium is not installed"
-	chromium --headless=new --no-sandbox --disable-gpu --hide-scrollbars --no-first-run \
-		--user-data-dir="$PWD/profile" --enable-logging=stderr --force-prefers-reduced-motion \
-		"$@" 2>said || complain "chromium: $(tail -n 3 said)"
-}
-
-# The page as it is, with a script that has it say how it came out.
-asked() {
-	sed '/<\/main>/r /dev/stdin' "$r/report.html" <<-'EOF'
-		<script>
-		addEventListener("load", () => {
-			const small = [...document.querySelectorAll("p, li, td, th, figcaption, pre")]
-				.filter(e => parseFloat(getComputedStyle(e).fontSize) < 16).length;
-			const blank = [...document.images].filter(image => {
-				const canvas = document.createElement("canvas");
-				canvas.width = 300;
-				canvas.height = 300;
-				const context = canvas.getContext("2d");
-				context.drawImage(image, 0, 0, 300, 300);
-				return new Set(new Uint32Array(
-					context.getImageData(0, 0, 300, 300).data.buffer)).size < 20;
-			}).length;
-			const broken = [...document.querySelectorAll('a[href^="#"]')]
-				.filter(a => !document.getElementById(a.hash.slice(1))).length;
-			const ids = [...document.querySelectorAll("[id]")].map(e => e.id);
-			// boxes with more in them than they show, which would scroll sideways
-			const wide = [...document.querySelectorAll("body, body *")]
-				.filter(e => getComputedStyle(e).display != "inline" &&
-					e.scrollWidth > e.clientWidth + 1).length;
-			// cells that show the name of their column
-			const named = [...document.querySelectorAll("td")].filter(e =>
-				getComputedStyle(e, "::before").content.startsWith('"') &&
-				e.dataset.label == e.closest("table").querySelectorAll("th")
-					[e.cellIndex].textContent.trim()).length;
-			parent.postMessage([innerWidth, document.documentElement.scrollWidth,
-				small, document.images.length, blank, broken,
-				ids.length - new Set(ids).size, wide, named,
-				document.querySelectorAll("td").length].join(" "), "*");
-		});
-		</script>
-	EOF
-}
-
 @test "a browser shows it: no error, no text that is small, nothing wider than a phone" {
 	browser --dump-dom 'data:text/html,<script>console.error("heard")</script>' >/dev/null
 	grep -q 'CONSOLE.*heard' said # so that silence means something
-	asked >asked.html
 	for width in 390 1280; do
-		# a window is no narrower than 500 pixels; a frame may be
-		cat >frame.html <<-EOF
-			<script>addEventListener("message",
-				e => document.body.dataset.asked = e.data);</script>
-			<body><iframe src="asked.html" style="width:${width}px;height:844px;border:0">
-		EOF
-		browser --virtual-time-budget=10000 --dump-dom "file://$PWD/frame.html" >dom
-		run ! grep CONSOLE said
-		answer=$(grep -oE 'data-asked="[^"]*' dom | cut -d'"' -f2)
+		answer=$(shown_in $width "$r/report.html")
 		echo "$width: $answer"
 		read -r inner page small pictures blank broken twice wide named cells <<<"$answer"
 		[ "$inner" = "$width" ]

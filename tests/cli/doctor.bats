@@ -24,7 +24,7 @@ finding() { # GROUP NAME
 		[[ "$(finding devices $device)" == "  ok "*opens ]]
 	done
 	[[ "$(finding devices camera)" == "  ok "*"names none" ]]
-	[[ "$(finding display window)" == *warning*"no window"*"FILE.mkv"* ]]
+	[[ "$(finding display window)" == *warning*"no window"*"FILE.mp4"* ]]
 	[[ "$(finding calibration file)" == *warning*"calibration.conf: No such file"*"incise help calibrate" ]]
 	# the disk's space over the bytes of a row (2 of force, 84 of tracker) and of blocks (3000 of each), as capture
 	# expects them; the space may change by a minute's worth meanwhile

@@ -220,6 +220,7 @@ replaces_when_told() {
 	fails incise view wall --procedure -o f $small -- f/frame-000001.png exists
 	incise view wall --procedure -o a.mkv $small 2>why || skip "no film here: $(cat why)"
 	replaces_when_told b.mkv view wall --procedure -o b.mkv $small
+	replaces_when_told b.mp4 view wall --procedure -o b.mp4 $small
 	# A link stays one, and a pipe a pipe.
 	ln -s b.mkv link.mkv
 	incise view wall --procedure -o link.mkv --overwrite $small
@@ -382,7 +383,7 @@ full() {
 		capture -o out.odd|expected a name that ends in .rec
 	END
 	if [ -x "$INCISE_BUILD/bin/incise-view" ]; then
-		misused incise view wall --procedure -o a.mp4 -- "--output: a.mp4:"
+		misused incise view wall --procedure -o a.avi -- "--output: a.avi:"
 	fi
 	# No extension is none that is wrong.
 	incise export d.rec -o out

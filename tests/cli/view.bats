@@ -57,12 +57,27 @@ teardown() {
 	[ "$(key r.json texels_uploaded)" = 0 ]
 }
 
+# Names of the outer boxes of an MP4.
+boxes_of() {
+	python3 -c 'import struct, sys
+data, at = open(sys.argv[1], "rb").read(), 0
+while at < len(data):
+    size, name = struct.unpack(">I4s", data[at:at + 8])
+    assert size >= 8
+    print(name.decode(), end=" ")
+    at += size' "$1"
+}
+
 @test "a film and a strip are whole files, or none" {
 	[ -e "$INCISE_BUILD/lib/incise/film_mkv.so" ] || skip "film_mkv.so is not built"
 	incise view neck --procedure -o n.mkv -o n.png --at 1s,2s --rate 10 --duration 3s $small
 	[ "$(head -c 4 n.mkv | od -An -tx1 | tr -d ' \n')" = 1a45dfa3 ]
 	[ "$(stat -c %s n.mkv)" -gt 2000 ]
 	[ ! -e n.mkv.part ]
+	incise view neck --procedure -o n.mp4 --rate 10 --duration 3s $small
+	# the boxes of an MP4, its index before the frames
+	[[ "$(boxes_of n.mp4)" == ftyp*moov*mdat* ]] || complain "$(boxes_of n.mp4)"
+	[ ! -e n.mp4.part ]
 	[ "$(head -c 24 n.png | tail -c 8 | od -An -tu1 | tr -s ' \n' ' ')" = " 0 0 1 64 0 0 0 120 " ]
 	run --separate-stderr incise view neck --procedure -o no/n.mkv --duration 1s $small
 	failed_with no/n.mkv.part "No such file"
@@ -104,10 +119,10 @@ wrote s.session" ]
 	[ "$output" = "wrote w.mkv: 20 frames, 2.0 s" ]
 }
 
-@test "on a terminal view shows the frame of so many, and the percentage" {
+@test "on a terminal view shows the frame of so many, the percentage and the time left" {
 	export TERM=xterm
 	run -0 --separate-stderr python3 "$root/tests/cli/terminal.py" 2 incise view wall --procedure -o f --rate 4 --duration 1s $small
-	[[ "$output" == *"frame 1 of 4 ["*"] 25 %"*"frame 2 of 4 ["*"] 50 %"*"frame 4 of 4 ["*"] 100 %"* ]]
+	[[ "$output" =~ "frame 1 of 4 ["[\ \#]*"] 25 %, "[0-9]+" "(s|min)" left".*"frame 2 of 4 ["[\ \#]*"] 50 %, ".*"frame 4 of 4 ["\#*"] 100 %"[^,] ]]
 	run -0 --separate-stderr python3 "$root/tests/cli/terminal.py" 2 incise view wall --procedure -o n.png --at 0.25s,0.5s --rate 4 $small
 	[[ "$output" == *"frame 0 of 2 ["*"] 0 %"*"frame 1 of 2 ["*"] 50 %"*"frame 2 of 2 ["*"] 100 %"* ]]
 	# of a recording: by its length
@@ -255,7 +270,7 @@ begin_view() {
 @test "view: a screen that is not there" {
 	fails incise view neck --rig sim:clock=simulated --duration 1s -o f -- "simulated time"
 	run --separate-stderr env -u DISPLAY -u WAYLAND_DISPLAY SDL_VIDEODRIVER=x11 incise view neck --procedure
-	failed_with "without a display give -o FILE.mkv"
+	failed_with "without a display give -o FILE.mp4"
 }
 
 # SDL has a driver that draws where nobody sees it, and takes it by itself.
@@ -266,7 +281,7 @@ begin_view() {
 		# shellcheck disable=SC2086
 		run --separate-stderr timeout 60 env -u DISPLAY -u WAYLAND_DISPLAY -u SDL_VIDEODRIVER \
 			XDG_RUNTIME_DIR="$PWD" incise view neck.scene $source $small
-		failed_with "no screen for a window" "without a display give -o FILE.mkv" || complain "$source"
+		failed_with "no screen for a window" "without a display give -o FILE.mp4" || complain "$source"
 	done
 	# Who names that driver has asked for it.
 	run -0 --separate-stderr timeout 60 env -u DISPLAY -u WAYLAND_DISPLAY SDL_VIDEODRIVER=offscreen \

@@ -138,7 +138,7 @@ static const struct {
 	{"view", "--no-output", "-o none"},
 	{"view", "--session", "-o FILE.session"},
 	{"view", "--strip", "-o FILE.png"},
-	{"view", "--video", "-o FILE.mkv"},
+	{"view", "--video", "-o FILE.mp4"},
 };
 
 /* Bad usage if @option, "-x" or "--name", is an old name. */
@@ -981,15 +981,27 @@ void cli_progress(const char *fmt, ...)
 	status_line = true;
 }
 
-void cli_progress_bar(const char *name, double share, int *percent)
+void cli_progress_bar(const char *name, double share, struct cli_bar *bar)
 {
 	static const char full[] = "##############################";
-	int now = (int)(100 * share), n = (int)(share * (sizeof(full) - 1));
+	int percent = (int)(100 * share), n = (int)(share * (sizeof(full) - 1));
+	int64_t now_ns = cli_now_ns();
+	char left[40] = "";
+	double left_s;
 
-	if (now == *percent)
+	if (!bar->begin_ns)
+		bar->begin_ns = now_ns;
+	else if (percent == bar->percent && now_ns - bar->drawn_ns < INCISE_NS_PER_S)
 		return;
-	*percent = now;
-	cli_progress("%s [%-*.*s] %d %%", name, (int)sizeof(full) - 1, n, full, now);
+	bar->percent = percent;
+	bar->drawn_ns = now_ns;
+	left_s = 1e-9 * (double)(now_ns - bar->begin_ns) * (1 - share) / share;
+	if (share > 0 && share < 1)
+		snprintf(left, sizeof(left),
+			 left_s < 100 ? ", %.0f s left" : ", %.0f min left",
+			 left_s < 100 ? left_s : left_s / 60);
+	cli_progress("%s [%-*.*s] %d %%%s", name, (int)sizeof(full) - 1, n, full, percent,
+		     left);
 }
 
 void cli_progress_end(void)

@@ -301,8 +301,12 @@ int64_t cli_now_ns(void);
  */
 void cli_progress(const char *fmt, ...) INCISE_PRINTF(1, 2);
 
-/* A bar of it, redrawn only when *percent changes; starts with -1. */
-void cli_progress_bar(const char *name, double share, int *percent);
+/* A bar with the time left, redrawn when the percentage changes, and once a second. */
+struct cli_bar { /* begins with zeros */
+	int percent;
+	int64_t begin_ns, drawn_ns;
+};
+void cli_progress_bar(const char *name, double share, struct cli_bar *bar);
 
 /* Remove them. */
 void cli_progress_end(void);

@@ -197,7 +197,7 @@ struct recorded {
 	struct event event[EVENTS_MOST];
 	struct recording_range range[PANELS];
 	uint64_t rows, rows_read; /* for the progress */
-	int percent;
+	struct cli_bar progress;
 };
 
 static struct ArrowArrayStream open_stream(struct recorded *r, const char *name)
@@ -222,7 +222,7 @@ static bool next_batch(struct recorded *r, struct ArrowArrayStream *stream,
 	if (r->rows)
 		cli_progress_bar(r->figure->path,
 				 fmin(1, (double)r->rows_read / (double)r->rows),
-				 &r->percent);
+				 &r->progress);
 	return true;
 }
 
@@ -747,7 +747,6 @@ FILE *figure_of_recording(const struct figure *figure)
 	FILE *script;
 
 	r->figure = figure;
-	r->percent = -1;
 	r->recording = recording_open(figure->path);
 	cli_check(incise_recording_info(r->recording, &r->info, &err), &err);
 	for (int i = 0; i < PANELS; i++)

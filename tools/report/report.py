@@ -261,15 +261,17 @@ class Page(Skin):
 
     def cell(self, heading, cell):
         right = RIGHT if isinstance(cell, Number) else ""
+        right += ' class="strong"' if isinstance(cell, Strong) else ""
         line = self.escape(cell)
         line = f'<span class="long">{line}</span>' if len(cell) > LONG else line
         return f'<td{right} data-label="{self.escape(heading)}">{line}</td>'
 
-    def grid(self, caption, headings, rows):
+    def grid(self, caption, headings, rows, kind=""):
         right = [any(isinstance(row[k], Number) for row in rows) for k in range(len(headings))]
+        kind = f' class="{kind}"' if kind else ""
         head = "".join(f"<th{RIGHT if r else ''}>{self.escape(h)}</th>" for r, h in zip(right, headings))
         body = "".join("<tr>" + "".join(map(self.cell, headings, row)) + "</tr>\n" for row in rows)
-        return (f'<div class="scroll" role="region" tabindex="0" aria-label="{self.escape(caption)}">\n<table>\n'
+        return (f'<div class="scroll" role="region" tabindex="0" aria-label="{self.escape(caption)}">\n<table{kind}>\n'
                 f"<caption><span>{self.escape(caption)}</span></caption>\n<thead>\n<tr>{head}</tr>\n</thead>\n"
                 f"<tbody>\n{body}</tbody>\n</table>\n</div>\n")
 
@@ -305,7 +307,7 @@ def render(template, skin, title, data):
     body = environment.get_template(template).render(
         data, table=skin.table, facts=skin.facts, plot=skin.plot, heading=skin.heading, command=skin.command,
         grid=skin.grid, n=number, at=at, first=first, objects=objects, largest=largest, least=least, total=total,
-        span=span, holding=holding, link=Link, number=Number, contents=lambda: mark)
+        span=span, holding=holding, link=Link, anchor=anchor, number=Number, contents=lambda: mark)
     before, _, behind = body.partition(mark)
     return skin.whole(title, before, skin.contents(), behind)
 

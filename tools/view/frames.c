@@ -354,13 +354,13 @@ static void show_progress(struct view_job *job, double t_s)
 
 		name = cli_text("frame %d of %d", output->stripped, output->n_strip);
 		cli_progress_bar(name, end_s > 0 ? fmin(1, t_s / end_s) : 1,
-				 &job->percent);
+				 &job->progress);
 		free(name);
 	} else {
 		name = cli_text("frame %llu of %.0f", (unsigned long long)output->frames,
 				all);
 		cli_progress_bar(name, fmin(1, (double)output->frames / all),
-				 &job->percent);
+				 &job->progress);
 		free(name);
 	}
 }
@@ -427,7 +427,7 @@ void view_job_view(struct view_job *job)
 	job->view = incise_view_new(job->scene, job->plan, &setup, &err);
 	if (!job->view)
 		cli_fail("%s%s", err.text,
-			 window ? "; without a display give -o FILE.mkv, FILE.png "
+			 window ? "; without a display give -o FILE.mp4, FILE.png "
 				  "or DIR"
 				: "");
 	incise_view_panel(job->view, !job->no_panel, false);

@@ -15,6 +15,7 @@
 #include <incise/scene.h>
 #include <incise/sim.h>
 #include <incise/view.h>
+#include "../cli/cli.h"
 #include "../cli/scene_argument.h"
 #include "../session/log.h"
 #include "live.h"
@@ -56,7 +57,7 @@ struct view_job {
 	int64_t begin_ns, end_ns; /* CLOCK_MONOTONIC, of the frames */
 	bool keep;		  /* write the next frame to a file of its own */
 	double total_s;		  /* of the run; 0: not known */
-	int percent;		  /* that the progress bar shows */
+	struct cli_bar progress;
 };
 
 void view_pause_until(int64_t t_ns);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * A film for viewing: Matroska with H.264 if libavcodec has an encoder for it (libx264), else
- * MJPEG. Compression is lossy: keep measurements in recordings. Part of libincise-view; the
+ * A film for viewing, H.264 by libavcodec's libx264: MP4, or Matroska, which without that encoder
+ * has MJPEG. Compression is lossy: keep measurements in recordings. Part of libincise-view; the
  * first call loads a module on libavformat, incise/film_mkv.so.
  */
 #ifndef INCISE_FILM_H
@@ -21,9 +21,10 @@ struct incise_film;
 /**
  * Start a film at PATH.part; PATH is unchanged until incise_film_close().
  *
+ * @param path          ends with .mp4: MP4; else Matroska
  * @param width, height even, 16 … INCISE_FILM_SIDE_MAX
  * @param rate_hz       frames per second, 1 … 1000; whole
- * @return film; NULL with errno EINVAL, ENOENT, ENOEXEC (the module), ENOTSUP (no encoder),
+ * @return film; NULL with errno EINVAL, ENOENT, ENOEXEC (the module), ENOTSUP (no encoder for it),
  *         ENOMEM, errno of open(2)
  */
 INCISE_API struct incise_film *incise_film_new(const char *path, int width, int height,

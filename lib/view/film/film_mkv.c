@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * A film in Matroska by libavformat: H.264 by libx264, else MJPEG; see ../film.h.
+ * A film in Matroska or MP4 by libavformat: H.264 by libx264, else in Matroska MJPEG; see
+ * ../film.h.
  *
- *     RGB ─► Y'CbCr 4:2:0 (BT.709 for H.264, BT.601 full range for MJPEG) ─► coder ─► .mkv
+ *     RGB ─► Y'CbCr 4:2:0 (BT.709 for H.264, BT.601 full range for MJPEG) ─► coder ─► .mkv, .mp4
  */
 #include <errno.h>
 #include <stdbool.h>
@@ -104,12 +105,14 @@ static void free_coder(struct incise_film_coder *coder)
 	free(coder);
 }
 
-static int open_codec(struct incise_film_coder *coder, int width, int height, int rate_hz)
+static int open_codec(struct incise_film_coder *coder, bool mp4, int width, int height,
+		      int rate_hz)
 {
 	const AVCodec *codec = avcodec_find_encoder_by_name("libx264");
 	AVCodecContext *c;
 
-	if (!codec)
+	/* Players of MP4 expect H.264. */
+	if (!codec && !mp4)
 		codec = avcodec_find_encoder(AV_CODEC_ID_MJPEG);
 	if (!codec)
 		return AVERROR(ENOTSUP);
@@ -152,8 +155,9 @@ static int open_frame(struct incise_film_coder *coder)
 	return av_frame_get_buffer(coder->frame, 0);
 }
 
-static int open_film_mkv_file(struct incise_film_coder *coder)
+static int open_film_file(struct incise_film_coder *coder)
 {
+	AVDictionary *options = NULL; /* Matroska has no movflags, and ignores them */
 	AVStream *stream = avformat_new_stream(coder->format, NULL);
 	int rc;
 
@@ -164,14 +168,23 @@ static int open_film_mkv_file(struct incise_film_coder *coder)
 	rc = avcodec_parameters_from_context(stream->codecpar, coder->codec);
 	if (rc >= 0)
 		rc = avio_open(&coder->format->pb, coder->path, AVIO_FLAG_WRITE);
+	/* The index of an MP4 comes first, so that a page plays it while it loads; in a pipe, by
+	 * fragments. */
 	if (rc >= 0)
-		rc = avformat_write_header(coder->format, NULL);
+		av_dict_set(&options, "movflags",
+			    coder->format->pb->seekable ? "faststart"
+							: "frag_keyframe+delay_moov",
+			    0);
+	if (rc >= 0)
+		rc = avformat_write_header(coder->format, &options);
+	av_dict_free(&options);
 	coder->begun = rc >= 0;
 	return rc;
 }
 
-static struct incise_film_coder *film_open(const char *path, int width, int height,
-					   int rate_hz, struct incise_error *err)
+static struct incise_film_coder *film_open(const char *path, bool mp4, int width,
+					   int height, int rate_hz,
+					   struct incise_error *err)
 {
 	struct incise_film_coder *coder = calloc(1, sizeof(*coder));
 	int rc = AVERROR(ENAMETOOLONG);
@@ -182,18 +195,22 @@ static struct incise_film_coder *film_open(const char *path, int width, int heig
 	av_log_set_level(AV_LOG_ERROR);
 	if (strlen(path) < sizeof(coder->path)) {
 		strcpy(coder->path, path);
-		rc = avformat_alloc_output_context2(&coder->format, NULL, "matroska",
-						    path);
+		rc = avformat_alloc_output_context2(&coder->format, NULL,
+						    mp4 ? "mp4" : "matroska", path);
 	}
 	if (rc >= 0)
-		rc = open_codec(coder, width, height, rate_hz);
+		rc = open_codec(coder, mp4, width, height, rate_hz);
 	if (rc >= 0)
 		rc = open_frame(coder);
 	if (rc >= 0)
-		rc = open_film_mkv_file(coder);
+		rc = open_film_file(coder);
 	if (rc >= 0)
 		return coder;
-	rc = av_fail(coder, rc, "the film cannot be started", err);
+	rc = av_fail(coder, rc,
+		     mp4 && rc == AVERROR(ENOTSUP)
+			     ? "MP4 needs libavcodec's libx264; give a name in .mkv"
+			     : "the film cannot be started",
+		     err);
 	free_coder(coder);
 	errno = -rc;
 	return NULL;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Films, read back by libavformat and libavcodec: the number of frames, their times, and their
- * colours up to coding losses; and files that cannot be written.
+ * Films in Matroska, MP4 and an MP4 of a pipe, read back by libavformat and libavcodec: coding, the
+ * number of frames, their times, and their colours up to coding losses; and files that cannot be
+ * written.
  */
 #include "../unit.h"
 #include <libavcodec/avcodec.h>
@@ -16,6 +17,14 @@
 extern const struct incise_film_module incise_film_module;
 
 static char path[] = "/tmp/incise-film-XXXXXX";
+static bool without_h264;
+
+const AVCodec *__real_avcodec_find_encoder_by_name(const char *name);
+
+const AVCodec *__wrap_avcodec_find_encoder_by_name(const char *name)
+{
+	return without_h264 ? NULL : __real_avcodec_find_encoder_by_name(name);
+}
 
 /* A red square that moves over a grey that brightens to the right. */
 static void picture(int n, uint8_t *rgb)
@@ -87,24 +96,31 @@ static int decode(AVFormatContext *format, AVCodecContext *codec)
 	return n;
 }
 
-TEST(test_what_is_put_is_there)
+static void write_film(const char *to, bool mp4)
 {
-	AVFormatContext *format = NULL;
 	struct incise_film_coder *coder;
 	uint8_t rgb[W * H * 3];
-	AVCodecContext *codec;
 
-	coder = incise_film_module.open(path, W, H, FPS, &err);
+	coder = incise_film_module.open(to, mp4, W, H, FPS, &err);
 	succeeds(coder);
 	for (int n = 0; n < N; n++) {
 		picture(n, rgb);
 		assert_int_equal(incise_film_module.add(coder, rgb, &err), 0);
 	}
 	assert_int_equal(incise_film_module.close(coder, &err), 0);
+}
+
+/* A film has no sound. */
+static void check_film(const char *kind, enum AVCodecID id)
+{
+	AVFormatContext *format = NULL;
+	AVCodecContext *codec;
 
 	assert_int_equal(avformat_open_input(&format, path, NULL, NULL), 0);
+	assert_non_null(strstr(format->iformat->name, kind));
 	assert_true(avformat_find_stream_info(format, NULL) >= 0);
 	assert_int_equal(format->nb_streams, 1);
+	assert_int_equal(format->streams[0]->codecpar->codec_id, id);
 	assert_int_equal(format->streams[0]->codecpar->width, W);
 	codec = avcodec_alloc_context3(
 		avcodec_find_decoder(format->streams[0]->codecpar->codec_id));
@@ -115,16 +131,55 @@ TEST(test_what_is_put_is_there)
 	avformat_close_input(&format);
 }
 
+TEST(test_what_is_put_is_there)
+{
+	bool h264 = __real_avcodec_find_encoder_by_name("libx264");
+
+	write_film(path, false);
+	check_film("matroska", h264 ? AV_CODEC_ID_H264 : AV_CODEC_ID_MJPEG);
+	if (!h264)
+		return;
+	write_film(path, true);
+	check_film("mp4", AV_CODEC_ID_H264);
+}
+
+TEST(test_an_mp4_in_a_pipe_is_whole)
+{
+	char command[100], to[20];
+	FILE *pipe;
+
+	if (!__real_avcodec_find_encoder_by_name("libx264"))
+		return;
+	snprintf(command, sizeof(command), "cat >%s", path);
+	pipe = popen(command, "w");
+	assert_non_null(pipe);
+	snprintf(to, sizeof(to), "/dev/fd/%d", fileno(pipe));
+	write_film(to, true);
+	assert_int_equal(pclose(pipe), 0);
+	check_film("mp4", AV_CODEC_ID_H264);
+}
+
+TEST(test_without_h264_matroska_only)
+{
+	without_h264 = true;
+	write_film(path, false);
+	check_film("matroska", AV_CODEC_ID_MJPEG);
+	assert_error(incise_film_module.open("x.mp4", true, W, H, FPS, &err), ENOTSUP,
+		     &err, "x.mp4", "libx264", ".mkv");
+	without_h264 = false;
+}
+
 TEST(test_files_that_cannot_be)
 {
 	struct incise_film_coder *coder;
 	uint8_t *rgb = calloc(1024 * 1024, 3);
 	int rc = 0;
 
-	assert_error(incise_film_module.open("/tmp/no/such/x.mkv", W, H, FPS, &err),
+	assert_error(incise_film_module.open("/tmp/no/such/x.mkv", false, W, H, FPS,
+					     &err),
 		     ENOENT, &err, "/tmp/no/such/x.mkv");
 	/* A full disk is reported when the film ends, at the latest. */
-	coder = incise_film_module.open("/dev/full", 1024, 1024, FPS, &err);
+	coder = incise_film_module.open("/dev/full", false, 1024, 1024, FPS, &err);
 	if (coder) {
 		srand(1);
 		for (int i = 0; i < 3 * 1024 * 1024; i++)
