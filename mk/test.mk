@@ -44,6 +44,7 @@ $(unit_together:$(O)/tests/%=$(O)/obj/tests/%.o): test_main = -Dmain=unit_$(*F)
 # that of HDF5, and vision's, which is then found without being loaded.
 unit_parts_tools := $(tool_parts) $(extremes)
 unit_parts_scene := $(extremes)
+unit_parts_view := $(tool_parts)
 unit_parts_number := $(O)/obj/tests/unit/number/kinds.o
 unit_parts_polhemus := $(emulator)
 unit_parts_hdf5 := $(objects_export_hdf5)

@@ -270,19 +270,20 @@ void view_hand_move(struct view_hand *hand, double dt_s)
 	double wanted_mm = hand->press > 0 ? -hand->press * hand->depth_mm : ABOVE_MM;
 	bool turned = hand->tool == INCISE_TOOL_HANDLE;
 	double share = 1 - exp(-fmax(dt_s, 0) / FOLLOW_S), most = SINK_MM_S * dt_s;
-	double velocity[3], tip[3], q[4], axis[3], before[3];
+	double velocity[3], tip[3], q[4], axis[3], next_mm;
 
 	if (!(dt_s > 0))
 		return;
-	/* The scalpel is turned over only well above the tissue. */
+	/* The scalpel is turned over only well above the tissue: an end of it comes down by 0.18 of
+	 * its length. */
 	if (hand->round != turned) {
-		wanted_mm = 3 * ABOVE_MM;
-		if (hand->height_mm > 2 * ABOVE_MM)
+		wanted_mm = ABOVE_MM + 0.2 * hand->handle_mm;
+		if (hand->height_mm > 0.2 * hand->handle_mm)
 			hand->round += fmax(-dt_s / TURN_S,
 					    fmin(dt_s / TURN_S, turned - hand->round));
 	}
-	memcpy(before, hand->at_mm, sizeof(before));
 	hand->height_mm += fmax(-most, fmin(most, wanted_mm - hand->height_mm));
+	next_mm = hand->height_mm + fmax(-most, fmin(most, wanted_mm - hand->height_mm));
 	hand->point_mm[0] += hand->stick[0] * STICK_MM_S * dt_s;
 	hand->point_mm[1] -= hand->stick[1] * STICK_MM_S * dt_s;
 	attitude(hand->normal, hand->round, q);
@@ -293,7 +294,11 @@ void view_hand_move(struct view_hand *hand, double dt_s)
 		double to = hand->point_mm[i] + hand->height_mm * hand->normal[i];
 
 		hand->at_mm[i] += share * (to - hand->at_mm[i]);
-		velocity[i] = (hand->at_mm[i] - before[i]) / dt_s;
+		/* The tool goes on until the next frame: no further than it will be then. */
+		velocity[i] =
+			share *
+			(hand->point_mm[i] + next_mm * hand->normal[i] - hand->at_mm[i]) /
+			dt_s;
 		tip[i] = hand->at_mm[i] - hand->round * hand->handle_mm * axis[i];
 	}
 	incise_sim_hold(hand->sim, tip, velocity, q);
