@@ -181,7 +181,7 @@ void model_plot_functions(FILE *script, const struct incise_model *model, int in
 	fit = peaks_fit(peak, n);
 	fprintf(script,
 		"set title '%s'\nset xrange [%.9g:%.9g]\nset yrange [0:%s]\n"
-		"set ytics 0,0.25,1\nset ylabel 'degree of membership / 1'\n",
+		"set ytics 0,0.25,1\nset ylabel 'degree of membership'\n",
 		title, v->min, v->max, fit ? "1.25" : "1.05");
 	put_axis(script, "x", v);
 	for (int k = 0; k < n && fit; k++) {
@@ -277,9 +277,11 @@ void model_plot_contours(FILE *script, const struct model_surface *surface,
 			 const char *data, const char *title)
 {
 	struct contours contours = contours_of(surface);
+	const char *unit = strrchr(surface->output.name, '_');
 
-	fprintf(script, "set title '%s%scontours every %g'\n", title, *title ? "; " : "",
+	fprintf(script, "set title '%s%scontours every %g", title, *title ? "; " : "",
 		contours.step);
+	fprintf(script, unit && unit[1] ? " %.16s'\n" : "'\n", unit ? unit + 1 : "");
 	put_axis(script, "x", &surface->input[0]);
 	put_axis(script, "y", &surface->input[1]);
 	put_axis(script, "cb", &surface->output);
