@@ -182,12 +182,12 @@ void model_plot_functions(FILE *script, const struct incise_model *model, int in
 	fprintf(script,
 		"set title '%s'\nset xrange [%.9g:%.9g]\nset yrange [0:%s]\n"
 		"set ytics 0,0.25,1\nset ylabel 'degree of membership'\n",
-		title, v->min, v->max, fit ? "1.25" : "1.05");
+		title, v->min, v->max, fit ? "1.35" : "1.05");
 	put_axis(script, "x", v);
 	for (int k = 0; k < n && fit; k++) {
 		fprintf(script, "set label %d ", k + 1);
 		put_model_plot_name(script, peak[k].name, "\\n");
-		fprintf(script, " at %.9g,1.14 center noenhanced font small\n",
+		fprintf(script, " at %.9g,1.2 center noenhanced font small\n",
 			peak[k].x);
 	}
 	fputs("plot", script);

@@ -127,7 +127,7 @@ static char *label_of(const struct series *series)
 		{"force_mV_N", "sensitivity of the force"},
 		{"depth_mm_px", "scale of the depth"},
 		{"stepper_N_step", "force of a microstep"},
-		{"stepper_steps_s", "largest rate of the stepper"},
+		{"stepper_steps_s", "largest rate"},
 	};
 	const char *unit = series->unit, *last = strrchr(series->key, '_');
 	char *name = cli_text("%.*s", (int)(last ? last - series->key : 32), series->key);
@@ -185,7 +185,7 @@ static void put_panel(FILE *script, const struct series *series, const char *nam
 	double margin_s = fmax(0.06 * (series->last_s - series->first_s), DAY_S);
 	char *label = label_of(series);
 
-	fputs("set title ", script);
+	fputs("set ylabel ", script);
 	plot_put_text(script, label);
 	fputc('\n', script);
 	put_dates(script, series, series->first_s - margin_s, series->last_s + margin_s);

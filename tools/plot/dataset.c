@@ -309,7 +309,7 @@ FILE *figure_of_dataset(const struct figure *figure)
 			    rows * HEIGHT + TITLE_HEIGHT);
 	put_title(script, &table, figure->path);
 	fprintf(script,
-		"set key outside bottom center horizontal\nset cblabel 'cut'\n"
+		"set key outside bottom center horizontal width 2\nset cblabel 'cut'\n"
 		"set palette maxcolors %d\nset cbrange [0.5:%d.5]\nset size %g,%g\n"
 		"set origin 0,%g\n",
 		table.n_groups > 1 ? table.n_groups : 2,
