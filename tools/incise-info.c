@@ -810,10 +810,11 @@ static void check_exists(const char *path)
 	struct stat st;
 
 	if (strcmp(path, "-") && stat(path, &st))
-		cli_fail("%s: %s; give a model (.fis, .fx), a compiled scene (.plan), a "
-			 "recording (NAME.rec), stepper, devices or a bus such as "
-			 "can:can0",
-			 path, strerror(errno));
+		cli_fail(
+			"%s: %s; give a model (.fis, .fx), a texture (.tex), a compiled "
+			"scene (.plan), a recording (NAME.rec), stepper, devices or a bus such as "
+			"can:can0",
+			path, strerror(errno));
 }
 
 /* A factor, which incise merge makes models of. */

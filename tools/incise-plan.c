@@ -245,11 +245,15 @@ static void print_texture(const struct incise_plan *plan)
 {
 	struct incise_plan_texture t;
 
-	if (incise_plan_texture(plan, &t))
-		printf("texture     up to ±%.3g %% of the force, %.3g %% rms, %.3g events/mm; "
-		       "a cut has %.3g to %.3g times the force\n",
-		       100 * t.most, 100 * t.rms, t.events_per_mm, t.factor_least,
+	if (!incise_plan_texture(plan, &t))
+		return;
+	printf("texture     up to ±%.3g %% of the force, %.3g %% rms, %.3g events/mm; ",
+	       100 * t.most, 100 * t.rms, t.events_per_mm);
+	if (t.factor_least < t.factor_most)
+		printf("a cut has %.3g to %.3g times the force\n", t.factor_least,
 		       t.factor_most);
+	else
+		puts("all cuts have the mean force (tissue.variation is 0)");
 }
 
 static void report_plan_json(const struct plan_job *job, const struct incise_plan *plan,

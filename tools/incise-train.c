@@ -334,9 +334,10 @@ static void parse_train(struct train_options *options, int argc, char **argv)
 			  options->factor);
 	if (options->tex &&
 	    (options->model || options->factor || options->initial || options->history ||
-	     options->premises || options->how.check > 0 || options->mpi))
+	     options->premises || options->how.check > 0 || options->mpi ||
+	     options->n_mfs || options->auto_mfs || options->wanted))
 		cli_usage("-o %s writes the texture of a model that is there; leave out "
-			  "other outputs, --premises, --check and --share",
+			  "other outputs, --inputs, --mf, --premises, --check and --share",
 			  options->tex);
 	options->texture |= options->tex != NULL;
 	if (options->texture && (options->factor || options->mpi))
@@ -1060,7 +1061,8 @@ static void save_model(const struct train_options *options,
 		       struct incise_outfile *history)
 {
 	char *sd = path_beside(options->model, ".sd");
-	char *tex = texture ? path_beside(options->model, ".tex") : NULL;
+	char *tex = path_beside(options->model, ".tex");
+	struct incise_texture *old = NULL;
 	struct incise_error err = {0};
 
 	hold_signals(SIG_BLOCK);
@@ -1069,10 +1071,14 @@ static void save_model(const struct train_options *options,
 	    incise_model_save_notes(trained->model, options->model, trained->notes,
 				    &err) ||
 	    (sd && incise_uncertainty_save(trained->uncertainty, sd, &err)) ||
-	    (tex && incise_texture_save(texture, tex, &err)))
+	    (texture && incise_texture_save(texture, tex, &err)))
 		cli_fail_with(&err);
 	whole_file_end(history);
 	hold_signals(SIG_UNBLOCK);
+	if (tex && !texture && !access(tex, F_OK) &&
+	    !(old = incise_texture_load(tex, trained->model, &err)))
+		cli_warn("%s", err.text);
+	incise_texture_free(old);
 	free(sd);
 	free(tex);
 }

@@ -206,8 +206,7 @@ static struct incise_texture *learn_cuts(const struct cuts *cuts, uint64_t seed,
 	struct incise_texture_cut *list = calloc(cuts->n_cuts + 1, sizeof(*list));
 	struct incise_texture *texture = NULL;
 	double length = 0;
-	bool alone;
-	int n;
+	int n, rc = 0;
 
 	if (!list)
 		return no_cuts_memory(err), NULL;
@@ -216,7 +215,7 @@ static struct incise_texture *learn_cuts(const struct cuts *cuts, uint64_t seed,
 		if (list[i].n)
 			length += list[i].row[list[i].n - 1].way - list[i].row->way;
 	texture = incise_texture_learn(list, n, seed, watch, err);
-	alone = !texture && errno == EDOM;
+	rc = texture ? 0 : errno;
 	if (texture) {
 		texture->checksum = incise_model_checksum(cuts->trained->model);
 		texture->info.length = length;
@@ -224,16 +223,15 @@ static struct incise_texture *learn_cuts(const struct cuts *cuts, uint64_t seed,
 	}
 	/* Where no texture helps, the model alone is compared. */
 	if ((texture && isnan(texture->info.variation)) ||
-	    ((texture || alone) && realism &&
+	    ((texture || rc == EDOM) && realism &&
 	     incise_realism_of(texture, list, list_cuts(cuts, true, list), seed,
 			       realism))) {
 		incise_texture_free(texture);
 		texture = NULL;
-		no_cuts_memory(err);
+		rc = -no_cuts_memory(err);
 	}
 	free(list);
-	if (alone)
-		errno = EDOM;
+	errno = rc;
 	return texture;
 }
 

@@ -22,9 +22,10 @@
 	{                                                                    \
 		key, offsetof(struct incise_texture, member), n, least, most \
 	}
-#define LOOK(key, of)                                                                 \
-	FIELD(key "-rate", of.rate, 1, 0, 1e9), FIELD(key "-rms", of.rms, 1, 0, 1e9), \
-		FIELD(key "-drops", of.drop, INCISE_TEXTURE_DECILES, 0, 1e9),         \
+#define LOOK(key, of, least_rate)                                             \
+	FIELD(key "-rate", of.rate, 1, least_rate, 1e9),                      \
+		FIELD(key "-rms", of.rms, 1, 0, 1e9),                         \
+		FIELD(key "-drops", of.drop, INCISE_TEXTURE_DECILES, 0, 1e9), \
 		FIELD(key "-octaves", of.octave, INCISE_TEXTURE_OCTAVES, -1e3, 1e3)
 
 static const struct {
@@ -35,11 +36,11 @@ static const struct {
 } fields[] = {
 	FIELD("most", info.most, 1, 0, (double)INCISE_TEXTURE_MOST / INCISE_TEXTURE_ONE),
 	FIELD("variation", info.variation, 1, 0, 1),
-	FIELD("cycles", info.up_to_cycles, 1, 0, 1e9),
+	FIELD("cycles", info.up_to_cycles, 1, 1e-9, 1e9),
 	FIELD("length", info.length, 1, 0, 1e12),
 	FIELD("error", info.error, 2, 0, 1e3),
-	LOOK("recorded", info.recorded),
-	LOOK("rendered", info.rendered),
+	LOOK("recorded", info.recorded, 1e-9),
+	LOOK("rendered", info.rendered, 0),
 	FIELD("step", step, 1, 1. / 256, 16),
 };
 

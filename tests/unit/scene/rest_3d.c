@@ -41,7 +41,6 @@
 #define STILL_MM 1e-4
 #define STILL_MM_S 1e-3
 #define SWING_MM 0.01
-#define SLIDE_MM 0.5
 #define SAMPLE_S 1e-3
 #define SAMPLES (RUN_S / 4 * 1000 + 2)
 #define UNDERWAY 64
@@ -64,7 +63,7 @@ struct body {
 
 /*
  * Comes to rest; goes on as fast as it goes, as a tool that slips on a plane; slides over facets until the
- * end; slid off, or sank out of reach; moves by less than counts; slides through the teeth of a texture, which come one
+ * end; slid off, or sank out of reach; moves by less than counts; goes through the teeth of a texture, which come one
  * after the other, and swings with none of them that stays; in a host, moves by as much more as its step is
  * longer than a tick, where only the account of work keeps a force that gives work from swinging; swings where the skin
  * is none, deeper than half its radius; swings.
@@ -87,7 +86,7 @@ static const char *const outcomes[] = {"rest",	"steady", "slide", "left", "quiet
 struct end {
 	enum outcome outcome;
 	double swing_mm, swing_N, hz, share; /* share: of the last half in the first */
-	double depth_mm, time_s, way_mm;     /* of the last quarter */
+	double depth_mm, time_s;
 	unsigned int flags;
 };
 
@@ -342,7 +341,7 @@ static struct ripple ripple_of(const double *x, int first, int last, double mean
 static void judge(struct end *end, bool faceted)
 {
 	static const double means_s[] = {0.5, 2};
-	double way2 = 0;
+	double way_mm = 0;
 
 	end->outcome = QUIET;
 	for (int i = 0; i < 3; i++) {
@@ -369,13 +368,13 @@ static void judge(struct end *end, bool faceted)
 			mean[0] += seen.at[i][j] / tenth;
 			mean[1] += seen.at[i][seen.n - 1 - j] / tenth;
 		}
-		way2 += (mean[1] - mean[0]) * (mean[1] - mean[0]);
+		way_mm += (mean[1] - mean[0]) * (mean[1] - mean[0]);
 	}
-	end->way_mm = sqrt(way2);
+
 	if (end->swing_mm > SWING_MM)
 		end->outcome = SWINGS;
 	/* Over facets the way itself goes up and down, and what falls off goes faster and faster. */
-	if (end->way_mm > fmax(SLIDE_MM, end->swing_mm * (faceted ? 1 : 50)))
+	if (sqrt(way_mm) > fmax(0.5, end->swing_mm * (faceted ? 1 : 50)))
 		end->outcome = SLIDES;
 }
 
@@ -622,18 +621,24 @@ static void tell(uint64_t seed, int i, const struct leaned *l, const struct lean
 		keep(seed, l, plan->scene->tissue.gain, line);
 }
 
-/* Whether a lean swings with the deepest, no or the highest tooth of its texture all the way. */
+/* Whether a lean swings with one tooth of its texture all the way: the last, the lowest, none, or the highest. */
 static bool swings_by_a_tooth(struct incise_plan *plan, const struct leaned *l,
 			      const struct lean *lean, int64_t *from_ns, uint64_t seed)
 {
 	struct incise_fixed_texture *texture = plan->scene->texture;
 	static struct incise_fixed_texture was;
+	double last =
+		(plan->integers ? plan->integers->state.tooth / (double)INCISE_FIXED_ONE
+				: plan->doubles.state.tooth) -
+		1;
+	const double teeth[] = {last * INCISE_TEXTURE_ONE, -texture->most, 0,
+				texture->most};
 	bool swings = false;
 
 	was = *texture;
-	for (int k = -1; k < 2 && !swings; k++) {
+	for (int k = 0; k < 4 && !swings; k++) {
 		for (int i = 0; i < INCISE_TEXTURE_KNOTS; i++)
-			texture->knot[i] = (int16_t)(k * was.most);
+			texture->knot[i] = (int16_t)lrint(teeth[k]);
 		swings = lean_on(plan, l, lean, from_ns, seed).outcome == SWINGS;
 	}
 	*texture = was;
@@ -655,7 +660,7 @@ static int lean_all(uint64_t seed, struct incise_plan *plan, const struct leaned
 		if (!any_lean(&random, plan, l, &lean))
 			continue;
 		end = lean_on(plan, l, &lean, &from_ns, random);
-		if (end.outcome == SWINGS && plan->texture && end.way_mm > SLIDE_MM &&
+		if (end.outcome == SWINGS && plan->texture &&
 		    !swings_by_a_tooth(plan, l, &lean, &from_ns, random))
 			end.outcome = TEETH;
 		swings += end.outcome == SWINGS;
