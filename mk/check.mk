@@ -62,9 +62,10 @@ part_clocks := check-clocks
 part_deb := check-deb
 part_module := check-module
 part_wheel := check-wheel
+part_site := check-site
 part_bare := check-debian12 check-debian13
 part_programs := all cli-needs peers unit-programs
-full_parts := check plain cli attack fuzz python tsan rtsan vm clocks module deb wheel bare
+full_parts := check plain cli attack fuzz python tsan rtsan vm clocks module deb wheel site bare
 PARTS ?= $(full_parts)
 deps_rtsan := rtsan
 deps_vm := vm
@@ -72,6 +73,7 @@ deps_clocks := vm
 deps_module := module vm
 deps_deb := deb debian
 deps_wheel := wheel
+deps_site := site
 deps_bare := debian
 
 # Guests in real time, and the check on other Debians, run alone at the end.
@@ -83,7 +85,7 @@ check-parts:
 	$(foreach part,$(filter clocks bare,$(PARTS)),$(call timed,$(part)) || status=$$?;) \
 	exit $$status
 
-check-full: ## everything; PARTS="vm attack" for some of: check plain cli attack fuzz python tsan rtsan vm clocks module deb wheel bare
+check-full: ## everything; PARTS="vm attack" for some of: check plain cli attack fuzz python tsan rtsan vm clocks module deb wheel site bare
 	@$(if $(filter-out $(full_parts),$(PARTS)),echo "make check-full: no part $(filter-out $(full_parts),$(PARTS)); there are: $(full_parts)" >&2; exit 2)
 	+@mk/deps build check full demo; $(foreach part,$(PARTS),$(if $(deps_$(part)),\
 		mk/deps $(deps_$(part)) || echo "going on without what $(part) needs";))

@@ -19,4 +19,8 @@ CHECK ?= check
 release: ## checks and tags vVERSION: clean tree, a branch, CHANGELOG, check, dist; DRY=yes: only says what it would do
 	+@MAKE="$(MAKE)" DRY="$(DRY)" mk/release $(version) $(CHECK)
 
-.PHONY: example-data dist release
+site: all doc ## README, documents, manual, references of C and Python and a search as files, build/site/index.html
+	@mk/deps site
+	@mk/site/make $(O) $(version)
+
+.PHONY: example-data dist release site

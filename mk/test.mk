@@ -274,7 +274,12 @@ notebooks: all ## run doc/notebooks and write them with their figures to build/n
 
 check-doc: doc
 
-.PHONY: rest doc notebooks check-doc check-style check-layers check-unit unit-programs check-kept check-cli cli-needs \
+check-site: ## the site: dead links, nothing from a network, no page wider than 390 or 1280 pixels in Chromium
+	@mk/deps site
+	+@$(MAKE) --no-print-directory site
+	@tests/site/check $(O)/site
+
+.PHONY: rest doc notebooks check-doc check-site check-style check-layers check-unit unit-programs check-kept check-cli cli-needs \
 	peers check-attack check-python check-tsan can-drive mcap-reader python-peers stream-peers ros2-peers
 
 # Sums of very many pairs: time and memory, next to numpy.
