@@ -545,9 +545,9 @@ static int read_texture(struct incise_scene *scene, const config_setting_t *grou
 
 	if (!config_setting_get_member(group, "texture"))
 		return 0;
-	if (!config_setting_lookup_string(group, "texture", &name))
+	if (!config_setting_lookup_string(group, "texture", &name) || !*name)
 		return incise_conf_error(group, "texture", scene->path, err,
-					 "text in quotes");
+					 "a .tex file in quotes");
 	if (!scene->tissue.dissipates)
 		return incise_conf_error(
 			group, "texture", scene->path, err,
