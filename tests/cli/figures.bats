@@ -60,7 +60,7 @@ finds() {
 	finds "the label of an axis is missing"
 	figure 'plot x title "line", NaN with points title "ghost"'
 	finds "the legend's 'ghost' has no data"
-	figure 'set label "median 12 us" at 0.2,0.2 front' 'plot x'
+	figure 'set label "median 12 us" at 0.2,0.8 front' 'plot x'
 	finds "'median 12 us' is in the form of a program"
 	figure 'set format y "%.0e"' 'set yrange [1e-6:1e-5]' 'set ytics (1e-6)' 'plot 2e-6'
 	finds "'1e?06' is in the form of a program"

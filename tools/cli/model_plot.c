@@ -187,8 +187,7 @@ void model_plot_functions(FILE *script, const struct incise_model *model, int in
 	for (int k = 0; k < n && fit; k++) {
 		fprintf(script, "set label %d ", k + 1);
 		put_model_plot_name(script, peak[k].name, "\\n");
-		fprintf(script, " at %.9g,1.2 center noenhanced font small\n",
-			peak[k].x);
+		fprintf(script, " at %.9g,1.2 center noenhanced font small\n", peak[k].x);
 	}
 	fputs("plot", script);
 	for (int k = 0; k < n; k++) {
