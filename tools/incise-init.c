@@ -26,7 +26,7 @@
 
 enum device { TRACKER, FORCE, CAMERA, STEPPER, HAPTIC, DEVICES };
 
-/* What a rig has: a key of rig.conf, where one is attached, and its backend. */
+/* Devices of a rig: key of rig.conf, where one is attached, and its backend. */
 static const struct {
 	const char *key, *what, *pattern, *spec;
 } devices[DEVICES] = {
@@ -39,7 +39,7 @@ static const struct {
 	[HAPTIC] = {"haptic", "Haptic device", NULL, NULL},
 };
 
-/* Of the actuator what its maker knows: numbers that have no default. */
+/* Numbers of an actuator that have no default: its maker knows them. */
 static const struct {
 	const char *key, *what, *value;
 } mechanics[] = {
