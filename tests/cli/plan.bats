@@ -22,7 +22,7 @@ setup() {
 # bats test_tags=check
 @test "plan reports as JSON: every stage is kept or left out" {
 	incise plan liver.scene --json >r.json
-	[ "$(key r.json kept)" = '["pose","predict","contact","texture","reaction","fracture","start","work","limit"]' ]
+	[ "$(key r.json kept)" = '["pose","predict","contact","texture","reaction","fracture","start","limit"]' ]
 	holds "$(key r.json margin) > 1 && $(key r.json margin) == $(key r.json weakest.margin)"
 	holds "$(key r.json weakest.states) >= 3 && $(key r.json weakest.hz) > 5"
 	holds "$(key r.json tick_ns) > 0"
