@@ -116,6 +116,7 @@ Q := $(if $(V),,@)
 step = $(if $(V),,@printf '  %-4s %s\n' $1 '$(patsubst $(O)/%,%,$@)')
 
 all: libs tools pages
+	@$(if $(left_out_names),echo "left out: $(left_out_names); 'make deps' installs what is in brackets")
 
 core: $(O)/lib/libincise.so ## what a loop needs: libincise.so, of libc and libconfig alone
 .PHONY: core

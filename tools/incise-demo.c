@@ -383,10 +383,7 @@ int main(int argc, char **argv)
 		film_scene(options.scene, demo->folder);
 		return 0;
 	}
-	if (!plot_possible())
-		cli_fail(
-			"gnuplot is not installed, it draws the pictures: apt-get install "
-			"gnuplot-nox, or run 'make demo'");
+	plot_require();
 	begin_ns = cli_now_ns();
 	begin_folder(demo->folder);
 	plot = demo_path(demo, "plot");
