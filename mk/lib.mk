@@ -87,7 +87,8 @@ commands_incise-view := view bench-view
 
 lacks = $(strip $(if $(pc_$1),$(shell $(PKG_CONFIG) --exists '$(pc_$1)' || echo '$(pc_$1)')) \
 	$(if $(headers_$1),$(shell $(CXX) -E -x c++ $(flags_$1) $(headers_$1:%=-include %) /dev/null \
-	>/dev/null 2>&1 || echo '$(headers_$1)')))
+	>/dev/null 2>&1 || echo '$(headers_$1)') \
+	$(if $(libs_$1),$(shell $(CXX) -shared -o /dev/null -x c /dev/null $(libs_$1) >/dev/null 2>&1 || echo '$(libs_$1)'))))
 take_module = $(eval folder_$1 := $2)$(eval beside_$1 := $(filter-out $1,$(modules)))\
 	$(eval lacks_$1 := $(call lacks,$1))$(eval $(if $(lacks_$1),left_out,add_ons) += $1)
 take_modules = $(foreach name,$(modules),$(call take_module,$(name),$1))

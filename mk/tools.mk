@@ -72,7 +72,7 @@ peer := $(if $(shell $(CXX) -E -x c++ -include fl/Headers.h /dev/null >/dev/null
 $(O)/lib/incise/peer_%.so: tools/bench/references/%.cc $(O)/lib/libincise.so
 	@mkdir -p $(@D) $(O)/obj/tools/bench/references
 	$(call step,LD)
-	$(Q)$(CXX) -std=c++14 -fPIC -fvisibility=hidden -Wall -Wextra $(cppflags) $(CPPFLAGS) $(CFLAGS) \
+	$(Q)$(CXX) -std=c++14 -fPIC -fvisibility=hidden -Wall -Wextra $(cppflags) $(CPPFLAGS) $(CXXFLAGS) \
 		-MMD -MP -MF $(O)/obj/tools/bench/references/$*.d -shared $(LDFLAGS) -o $@ $< \
 		-L$(O)/lib -lincise -l$*
 

@@ -363,6 +363,33 @@ static void film_scene(const char *scene, const char *folder)
 	free(name), free(film), free(strip);
 }
 
+static double count_of_loop(const struct demo *demo, const char *key)
+{
+	return json_number_value(
+		json_object_get(json_object_get(demo->summary, "haptic"), key));
+}
+
+/* Of its ticks, that can be late without a loop that feels nothing. */
+#define LATE_SHARE 0.1
+
+/* A loop that gave no force shows nothing: the demo fails, and says why. */
+static void require_force(const struct demo *demo)
+{
+	const double skipped = count_of_loop(demo, "skipped"),
+		     all = count_of_loop(demo, "ticks") + skipped,
+		     late = skipped + count_of_loop(demo, "stale");
+
+	if (count_of_loop(demo, "force_max_N") > 0)
+		return;
+	if (late > LATE_SHARE * all)
+		cli_fail("the haptic loop gave no force: this machine is busy, and %.0f of "
+			 "%.0f ticks were skipped or had no new pose; run the demo again when "
+			 "less else runs",
+			 late, all);
+	cli_fail("the haptic loop gave no force: it ended before the scalpel was in the "
+		 "tissue; run the demo again with --duration 6s or more");
+}
+
 int main(int argc, char **argv)
 {
 	struct demo_options options = {.demo = {.folder = "demo.out", .seed = 1},
@@ -411,6 +438,7 @@ int main(int argc, char **argv)
 		       demo->folder);
 	}
 	cli_finish();
+	require_force(demo);
 	incise_model_free(model);
 	json_decref(demo->summary);
 	return 0;

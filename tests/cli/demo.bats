@@ -112,6 +112,13 @@ pictures="fig2-force fig3a-membership fig3b-surface fig5-prediction tick-latenes
 	[ "$(stat -c %s ../fig3b-surface.png)" -gt 5000 ]
 }
 
+@test "a demo whose loop ended above the tissue says so, and fails with its results in place" {
+	run -1 --separate-stderr incise demo -o short --duration 0.5s
+	[[ "${stderr##*$'\n'}" == "incise demo: the haptic loop gave no force: "*"run the demo again"* ]] || complain "$stderr"
+	[ -s short/summary.json ]
+	[ ! -e short/.unfinished ]
+}
+
 @test "demo does not write into a folder that exists" {
 	need_demo
 	before=$(sha256sum <"$demo/summary.json")
