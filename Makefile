@@ -70,7 +70,7 @@ unexport PKG_CONFIG
 endif
 
 # Goals that need no compiler or install it first; a kernel's headers name its own one.
-unbuilt_goals := help clean deps check check-full check-debian12 check-debian13 check-module-newest demo texture bench \
+unbuilt_goals := help clean deps check check-full check-debian12 check-debian13 check-container check-module-newest demo texture bench \
 	deb check-deb doc check-doc release wheel check-wheel uninstall readme-figures \
 	module module_install module_uninstall dkms_install dkms_uninstall check-module
 ifneq ($(filter-out $(unbuilt_goals),$(or $(MAKECMDGOALS),all)),)
