@@ -34,4 +34,12 @@ bench-all: all $(bench_programs) ## build the benchmarks for developers, build/t
 # Their tests are slow ones.
 check-cli: $(bench_programs)
 
-.PHONY: bench-all
+# A page shows half the pixels of a figure.
+doc-pictures: all ## doc/force-surface.png and doc/neck.png, as the demo and incise view draw them today
+	rm -rf $(O)/pictures
+	$(O)/bin/incise demo -o $(O)/pictures >/dev/null
+	cd $(O)/pictures/plot && sed -i '/pngcairo/,/pointscale/{s/2 [*] figure_/figure_/g;s/1[.]5/0.75/;s/2[.]4/1.2/;s/2[.]6/1.3/}' style.gp && \
+		gnuplot fig3b-surface.gp && cp ../fig3b-surface.png $(abspath doc)/force-surface.png
+	$(O)/bin/incise view neck --procedure -o doc/neck.png --at 2.5s,8s,13s,21s --size 480x360 --overwrite >/dev/null
+
+.PHONY: bench-all doc-pictures

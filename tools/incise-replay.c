@@ -109,8 +109,9 @@ static void add_to_plot(struct plot *plot, const struct incise_replay_tick *tick
 		tick->predicted_N, tick->depth_mm, tick->tick->depth_mm);
 }
 
-static void draw_plot(struct plot *plot)
+static void draw_plot(struct plot *plot, const char *recording, const char *scene)
 {
+	const char *slash = strrchr(scene, '/');
 	FILE *script;
 	int n = 0;
 
@@ -118,11 +119,14 @@ static void draw_plot(struct plot *plot)
 	script = plot_begin(plot->folder, plot->name, 1000, 740);
 	fprintf(script,
 		"layout = panels(80, 20, below(1), above(1), 0, between)\n"
-		"set multiplot layout 2,1 @layout "
-		"title 'Recording replayed through the scene'\n"
-		"data = '%s'\nset xlabel 'time / s'\nset key off\nset autoscale xfix\n"
-		"set title '(a) force'\nset ylabel 'force / N'\n",
+		"data = '%s'\nset xlabel 'time / s'\nset key off\nset autoscale fix\n"
+		"set offsets 0, 0, graph 0.05, graph 0.02\nset xrange [0:*]\n"
+		"set multiplot layout 2,1 @layout title ",
 		plot->file);
+	plot_put_text(script, recording);
+	fputs(".' replayed through '.", script);
+	plot_put_text(script, slash ? slash + 1 : scene);
+	fputs(" noenhanced\nset title '(a) force'\nset ylabel 'force / N'\n", script);
 	if (plot->has_force)
 		plot_add(script, &n, "data using 1:2 with lines lc rgb grey lw 0.8");
 	plot_add(script, &n, "data using 1:3 with lines lt 2");
@@ -317,7 +321,7 @@ int main(int argc, char **argv)
 		cli_fail("%s: interrupted %.1f s after its beginning%s", job.recording,
 			 report.seconds, job.csv ? "; nothing was written" : "");
 	if (job.plot)
-		draw_plot(&sink.plot);
+		draw_plot(&sink.plot, job.recording, incise_scene_file(scene, 0));
 	if (job.json) {
 		report_replay_json(&job, rate_hz, &stats, &report);
 	} else if (sink.bar) {

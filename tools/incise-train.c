@@ -336,9 +336,10 @@ static void parse_train(struct train_options *options, int argc, char **argv)
 	    (options->model || options->factor || options->initial || options->history ||
 	     options->premises || options->how.check > 0 || options->mpi ||
 	     options->n_mfs || options->auto_mfs || options->wanted))
-		cli_usage("-o %s writes the texture of a model that is there; leave out "
-			  "other outputs, --inputs, --mf, --premises, --check and --share",
-			  options->tex);
+		cli_usage(
+			"-o %s writes the texture of a model that is there; leave out "
+			"other outputs, --inputs, --mf, --premises, --check and --share",
+			options->tex);
 	options->texture |= options->tex != NULL;
 	if (options->texture && (options->factor || options->mpi))
 		cli_usage("--texture needs a model and all sources in one process; leave "

@@ -25,7 +25,7 @@ measured() {
 # A figure of gnuplot with commands before its one plot, in the style of all.
 figure() {
 	printf '%s\n' 'ext = "svg"' 'load "style.gp"' 'set output "made.svg"' \
-		'set xlabel "time / s"' 'set ylabel "force / N"' 'set xrange [0:1]' "$@" 'unset output' >made.gp
+		'set xlabel "time / s"' 'set ylabel "force / N"' 'set xrange [0:1]' 'set key top left' "$@" 'unset output' >made.gp
 	[ -e style.gp ] || cp "$root/tools/cli/style.gp" .
 	gnuplot made.gp
 }
@@ -42,12 +42,16 @@ finds() {
 	measured made.svg
 	figure 'set label "far out" at graph 0.99, graph 0.5 front' 'plot x'
 	finds "'far out' leaves the canvas by *.* px"
-	figure 'set label "one" at 0.5,0.5 front' 'set label "two" at 0.51,0.5 front' 'plot x'
+	figure 'set label "one" at 0.5,0.2 front' 'set label "two" at 0.51,0.2 front' 'plot x'
 	finds "'one' and 'two' overlap by *.* px"
 	# a turned text next to an upright one
-	figure 'set label "upright and long" at 0.5,0.5 front' \
-		'set label "turned / 1" at 0.55,0.45 rotate by 45 front' 'plot x'
-	finds "'upright and long' and 'turned / 1' overlap by *.* px"
+	figure 'set label "upright and long" at 0.5,0.2 front' \
+		'set label "turned / s" at 0.55,0.15 rotate by 45 front' 'plot x'
+	finds "'upright and long' and 'turned / s' overlap by *.* px"
+	figure 'set label "in the way" at 0.5,0.5 center front' 'plot x'
+	finds "data cross 'in the way'"
+	figure 'set yrange [0:1]' 'plot 0.9 + 0.1 * sin(200 * x) title "over the key"'
+	finds "data cross 'over the key'"
 	figure 'set xlabel "time, s"' 'plot x'
 	finds "the label 'time, s' is no 'quantity / unit'"
 	figure 'set ylabel "force / lbf"' 'plot x'
@@ -56,7 +60,7 @@ finds() {
 	finds "the label of an axis is missing"
 	figure 'plot x title "line", NaN with points title "ghost"'
 	finds "the legend's 'ghost' has no data"
-	figure 'set label "median 12 us" at 0.2,0.2 front' 'plot x'
+	figure 'set label "median 12 us" at 0.2,0.8 front' 'plot x'
 	finds "'median 12 us' is in the form of a program"
 	figure 'set format y "%.0e"' 'set yrange [1e-6:1e-5]' 'set ytics (1e-6)' 'plot 2e-6'
 	finds "'1e?06' is in the form of a program"

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """figures.py FILE.svg...: measures figures that gnuplot wrote, and prints a line for each text that
-leaves the canvas, two texts that overlap, an axis that is not labelled "quantity / unit", a number
-or unit in the form of a program, and a legend entry without data. Exit 1 if there is any.
+leaves the canvas, two texts that overlap, a text that data cross, an axis that is not labelled
+"quantity / unit", a number or unit in the form of a program, and a legend entry without data. Exit 1 if there is any.
 
 Text is measured with the advance widths of DejaVu Sans, the font of the figures, so that no font
 has to be installed. A box reaches from the top of ascenders to the baseline, or to the bottom of
@@ -32,9 +32,10 @@ DESCENDS = set("gjpqy,;()[]{}|_Q/µ@$")
 # its ink at either end; gnuplot rounds positions to 0.01 px.
 TOLERANCE_PX = 0.5
 
-UNITS = (r"1|µm|mm|px|mrad|s|ms|µs|ns|N|mN|mV|Hz|kHz|%|texel|SD|\(mm/s\)|\(N/m\)|\(N/mm\)|\(mV/N\)|"
+UNITS = (r"µm|mm|px|mrad|s|ms|µs|ns|N|mN|mV|Hz|kHz|%|texel|SD|\(mm/s\)|\(N/m\)|\(N/mm\)|\(mV/N\)|"
          r"\(mm/s²\)|\(mN s/mm\)|\(N s/mm\)|\(mm/px\)|°|\(°/s\)|dB|\(1/mm\)")
-LABEL = re.compile(r".*[^ ] / (%s)" % UNITS)
+COUNTS = "cut|degree of membership|number of the reading|share of the ticks"  # without a unit
+LABEL = re.compile(r".*[^ ] / (%s)|%s|(device damping bT|wall stiffness KT²)/m" % (UNITS, COUNTS))
 NUMBER = re.compile(r"[−-]?[\d.]+")
 PROGRAM = re.compile(r"(?<![\w.])\d[\d.]*e[-+−]?\d|\d us\b|/ us\b|\bnan\b|\b[a-z]+_[a-z0-9]")
 
@@ -98,6 +99,28 @@ def overlap(a, b):
     return max(0, least)
 
 
+def crosses(a, b, low, high):
+    """Whether the line from a to b is within a rectangle anywhere (Liang and Barsky)."""
+    enter, leave = 0.0, 1.0
+    for k in (0, 1):
+        way = b[k] - a[k]
+        if abs(way) < 1e-9:
+            if not low[k] <= a[k] <= high[k]:
+                return False
+            continue
+        first, last = sorted(((low[k] - a[k]) / way, (high[k] - a[k]) / way))
+        enter, leave = max(enter, first), min(leave, last)
+    return enter <= leave
+
+
+def data_cross(text, lines):
+    """Whether a line or marker is in what surely is ink of a text."""
+    (left, top), _, (right, bottom), _ = text.corners()
+    ink = 0.1 * text.size
+    low, high = (left + ink, top + ink), (right - ink, min(bottom, text.y) - ink)
+    return any(crosses(a, b, low, high) for line in lines for a, b in zip(line, line[1:] or line))
+
+
 class Figure:
     def __init__(self, path):
         self.root = tree.parse(path).getroot()
@@ -105,6 +128,7 @@ class Figure:
         self.texts = []
         self.segments = []  # of each plot: texts before its first series, and after
         self.shapes = []  # place, colour
+        self.lines = []  # of series: lists of points
         self.entries = []  # of legends: title, text, colours of its sample
         self.walk(self.root.find("./%sg[@id='gnuplot_canvas']" % SVG), "black", None)
         # gnuplot 6 writes the labels of axes behind the series, where 5 has the next plot's title only:
@@ -131,6 +155,10 @@ class Figure:
             if series:
                 series["texts"].append(text)
         if element.tag in (SVG + "path", SVG + "use", SVG + "polygon", SVG + "rect", SVG + "image"):
+            if series and element.tag != SVG + "image":
+                data = element.get("d") or element.get("points") or element.get("transform") or ""
+                flat = map(numbers, re.sub(r"scale\(.*", "", data).split("M"))
+                self.lines += [list(zip(at[::2], at[1::2])) for at in flat]
             # Where each line of a path begins, and where a marker is.
             for part in places_of(element):
                 self.shapes.append((*part, colour, series))
@@ -180,6 +208,9 @@ def check(path):
             yield "'%s' leaves the canvas by %.1f px" % (text.text, out)
         if PROGRAM.search(text.text):
             yield "'%s' is in the form of a program" % text.text
+    for text in figure.texts:
+        if not text.degrees and data_cross(text, figure.lines):
+            yield "data cross '%s'" % text.text
     for i, a in enumerate(boxes):
         for k in range(i):
             over = overlap(a, boxes[k])

@@ -46,12 +46,12 @@ shows() {
 # bats test_tags=check
 @test "a model: functions, surface and contours" {
 	draws m.fis
-	shows "depth / mm" "velocity / (mm/s)" "force / N" "degree of membership / 1" shallow
+	shows "depth / mm" "velocity / (mm/s)" "force / N" "degree of membership" shallow
 	! grep -q residual texts
 	# a curve for each function: 5 over the depth and 4 over the velocity
 	[ "$(grep -cxE '(very )?(shallow|medium|deep|slow|fast)' texts)" = 9 ]
 	# both intervals; no calibration of a rig is stated, and degrees have their unit
-	shows "a new cut" "the mean of all cuts" "95 % intervals; other inputs at the middle of their support"
+	shows "a new cut" "the mean of all cuts" "95 % intervals at depth / mm = 10"
 	sed '1s/_mm/_deg/g' pairs.csv >deg.csv
 	incise train deg.csv --inputs depth_deg,velocity_deg_s -o deg.fis >/dev/null 2>&1
 	draws deg.fis
@@ -78,7 +78,7 @@ shows() {
 @test "a dataset: over depth and velocity, and by cut" {
 	draws pairs.csv
 	shows "pairs.csv: 288 rows" "depth / mm" "velocity / (mm/s)" "force / N" \
-		"mean and SD" "cut / 1" mean SD "cut 1" "cut 6"
+		"mean and SD" cut mean SD "cut 1" "cut 6"
 	! grep -qx "cut 7" texts
 	cut -d, -f2,4 pairs.csv >two.csv
 	draws two.csv
@@ -119,7 +119,7 @@ shows() {
 @test "the kind is that of the content, not of the name" {
 	cp m.fis dataset.csv
 	draws dataset.csv
-	shows "degree of membership / 1"
+	shows "degree of membership"
 	cp m.fx model.fis
 	draws model.fis
 	! grep -q degree texts
@@ -333,7 +333,7 @@ entry() {
 	END
 	draws c.conf
 	shows "c.conf: 4 calibrations" "sensitivity of the force / (mV/N)" "scale of the depth / (mm/px)" before \
-		"in force" "value and U (k = 2)" "not passed" 2026-04-05
+		"active" "value and U (k = 2)" "not passed" "2026-04-06 00:00"
 	[ "$(grep -cx "not passed" texts)" = 1 ]
 	keep_data c.conf
 	# UNIX time, value, U = 2 u, passed

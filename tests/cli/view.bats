@@ -106,7 +106,7 @@ while at < len(data):
 @test "view prints the files that it wrote" {
 	run -0 --separate-stderr incise view neck --procedure -o f -o n.png --at 0s,0.75s -o s.session \
 		--rate 4 --duration 1s $small
-	[ "$output" = "wrote n.png: 2 frames
+	[ "$output" = "wrote n.png: 2 frames at 0, 0.75 s
 wrote f/frame-000000.png to frame-000003.png
 wrote s.session" ]
 	[ -z "$stderr" ]

@@ -10,6 +10,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 #include <incise/corpus.h>
 #include "../cli/child.h"
 #include "../cli/folder.h"

@@ -624,7 +624,7 @@ static void draw_fit(const struct depth *r, bool line, bool outliers, FILE *scri
 		"set title '%s'\nset xlabel '%s'\nset ylabel '%s'\neval key_below\n",
 		line ? "Depth over the exposed length"
 		     : "Exposed length in the air, reading by reading",
-		line ? "exposed length / px" : "number of the reading / 1",
+		line ? "exposed length / px" : "number of the reading",
 		line ? "depth / mm" : "exposed length / px");
 	plot_add(script, &n, "'depth.dat' using %s with points lt 1 title '%s'", columns,
 		 line ? "pairs" : "readings");
@@ -664,7 +664,7 @@ static void draw_depth_plots(const void *run, const char *folder)
 			"set xlabel '%s'\nset ylabel 'residual of the depth / mm'\n"
 			"plot 'depth.dat' using %d:($5 > 0 ? $4 : NaN) with points lt 1, "
 			"0 lt 3 lw 1\n",
-			line ? "exposed length / px" : "number of the reading / 1",
+			line ? "exposed length / px" : "number of the reading",
 			line ? 2 : 1);
 	else
 		fputs("set title 'Residuals of the corners in the plane, 100 times as large'\n"

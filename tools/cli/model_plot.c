@@ -181,14 +181,13 @@ void model_plot_functions(FILE *script, const struct incise_model *model, int in
 	fit = peaks_fit(peak, n);
 	fprintf(script,
 		"set title '%s'\nset xrange [%.9g:%.9g]\nset yrange [0:%s]\n"
-		"set ytics 0,0.25,1\nset ylabel 'degree of membership / 1'\n",
-		title, v->min, v->max, fit ? "1.25" : "1.05");
+		"set ytics 0,0.25,1\nset ylabel 'degree of membership'\n",
+		title, v->min, v->max, fit ? "1.35" : "1.05");
 	put_axis(script, "x", v);
 	for (int k = 0; k < n && fit; k++) {
 		fprintf(script, "set label %d ", k + 1);
 		put_model_plot_name(script, peak[k].name, "\\n");
-		fprintf(script, " at %.9g,1.14 center noenhanced font small\n",
-			peak[k].x);
+		fprintf(script, " at %.9g,1.2 center noenhanced font small\n", peak[k].x);
 	}
 	fputs("plot", script);
 	for (int k = 0; k < n; k++) {
@@ -277,9 +276,11 @@ void model_plot_contours(FILE *script, const struct model_surface *surface,
 			 const char *data, const char *title)
 {
 	struct contours contours = contours_of(surface);
+	const char *unit = strrchr(surface->output.name, '_');
 
-	fprintf(script, "set title '%s%scontours every %g'\n", title, *title ? "; " : "",
+	fprintf(script, "set title '%s%scontours every %g", title, *title ? "; " : "",
 		contours.step);
+	fprintf(script, unit && unit[1] ? " %.16s'\n" : "'\n", unit ? unit + 1 : "");
 	put_axis(script, "x", &surface->input[0]);
 	put_axis(script, "y", &surface->input[1]);
 	put_axis(script, "cb", &surface->output);

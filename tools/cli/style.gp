@@ -64,6 +64,7 @@ set y2label noenhanced
 set zlabel noenhanced
 set cblabel noenhanced
 set key noautotitle noenhanced Left reverse samplen 2 spacing 1.15 height 0.3
+set pointintervalbox 0 # no white disc on error bars
 # Panels with margins in px: above(n) for a title of n lines and a title of each panel, below(rows)
 # for tics, label and a key of so many rows, between for the tics, label and title of two panels.
 above(n) = (n + 2.6) * line_px

@@ -272,6 +272,7 @@ static void figure_force(const struct demo *demo)
 	      "set multiplot layout 2,1 @layout title 'Cutting force of the simulated liver "
 	      "(compare figure 2 of Song et al., 2006)'\n"
 	      "set autoscale fix\nset offsets 0, 0, graph 0.14, graph 0.03\n"
+	      "set xrange [0:*]\n"
 	      "set xlabel 'time in the recording / s'\nset ylabel 'force / N'\n"
 	      "set title '(a) raw samples, three or four cuts at each depth'\n",
 	      script);
@@ -322,14 +323,17 @@ static void figure_surface(const struct demo *demo, const struct incise_model *m
 
 	model_plot_write_surface(&surface, demo->folder, "surface.dat");
 	script = plot_begin(demo->folder, "fig3b-surface", 1000, 720);
-	model_plot_surface(script, &surface, "surface.dat",
-			   "Cutting force of the trained model; markers: averaged pairs "
-			   "(compare figure 3b of Song et al., 2006)",
-			   ", \\\n  'pairs.dat' with points pt 7 ps 0.5 lc rgb ink");
+	model_plot_surface(
+		script, &surface, "surface.dat",
+		"Cutting force of the trained model; markers: averaged pairs, with their "
+		"distance from it (compare figure 3b of Song et al., 2006)",
+		", \\\n  'pairs.dat' using 1:2:4:(0):(0):($3-$4) with vectors nohead "
+		"lw 2 lc rgb vermillion, \\\n  '' with points pt 7 ps 0.5 lc rgb ink");
 	draw_results(demo, script, "fig3b-surface");
 }
 
-static void write_pairs(const struct demo *demo)
+/* The pairs, with the model's force at each. */
+static void write_pairs(const struct demo *demo, const struct incise_model *model)
 {
 	static const char *const columns[] = {"depth_mm", "velocity_mm_s", "force_N"};
 	struct incise_dataset *pairs =
@@ -339,7 +343,8 @@ static void write_pairs(const struct demo *demo)
 	for (size_t i = 0; i < incise_dataset_rows(pairs); i++) {
 		const double *row = incise_dataset_row(pairs, i);
 
-		fprintf(data, "%g %g %g\n", row[0], row[1], row[2]);
+		fprintf(data, "%g %g %g %g\n", row[0], row[1], row[2],
+			incise_model_eval(model, row, NULL));
 	}
 	plot_data_end(data, demo->folder);
 	incise_dataset_free(pairs);
@@ -463,13 +468,17 @@ static void figure_lateness(const struct demo *demo, const json_t *haptic)
 	fprintf(script,
 		"set title \"Lateness of %g ticks of the haptic loop at 1 kHz, %s\\n"
 		"median %s, 99.9th percentile %s, largest %.0f µs\"\n"
-		"set xlabel 'lateness / µs'\nset ylabel 'share of the ticks / 1'\n"
+		"set xlabel 'lateness / µs'\nset ylabel 'share of the ticks'\n"
 		"set logscale xy\nset format xy power\nset style fill solid 0.8 noborder\n"
 		"stats 'lateness.dat' using 1 prefix 'low' nooutput\n"
 		"stats 'lateness.dat' using 2 prefix 'high' nooutput\n"
+		"set xrange [*:1200<*]\n"
+		"set arrow from 1000, graph 0 to 1000, graph 1 nohead lc rgb ink dt 2\n"
+		"set label 'next tick due' at 1000, graph 0.97 right offset -0.6,0 font small\n"
+		"high_max = high_max > 1200 ? high_max : 1200\n"
 		"if (high_max / low_min < 1e3) { set format x '%%g'; "
 		"eval 'set xtics ('.log_tics(low_min, high_max).')' }\n"
-		"set autoscale xfix\nset yrange [%g:1]\n"
+		"set yrange [%g:1]\n"
 		"plot 'lateness.dat' using (sqrt($1*$2)):3:1:2:(%g):3 "
 		"with boxxyerror fc rgb blue\n",
 		ticks, json_string_value(json_object_get(haptic, "scheduling")), median,
@@ -582,7 +591,7 @@ void demo_figures(struct demo *demo, const struct incise_model *model)
 {
 	const json_t *replay = json_object_get(demo->summary, "replay_new_cut");
 
-	write_pairs(demo);
+	write_pairs(demo, model);
 	figure_force(demo);
 	figure_membership(demo);
 	figure_surface(demo, model);

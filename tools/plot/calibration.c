@@ -13,7 +13,8 @@
 #include "figure.h"
 
 #define TITLE_HEIGHT 50
-#define PANEL_HEIGHT 260
+#define PANEL_HEIGHT 240
+#define KEY_HEIGHT 40
 #define COLUMNS 2
 #define DAY_S 86400.0
 
@@ -22,8 +23,8 @@ struct series {
 	const char *kind, *key, *unit;
 	int n, passed, failed;
 	double first_s, last_s; /* UNIX time */
-	double before;		/* in force before the first one, NAN: nothing */
-	double in_force;
+	double before;		/* active before the first one, NAN: nothing */
+	double active;
 };
 
 struct history {
@@ -66,12 +67,12 @@ static struct series *find_series(struct history *history, const char *kind,
 
 static struct history read_history(const char *path)
 {
-	struct incise_calibration in_force;
+	struct incise_calibration active;
 	struct history history = {0};
 	struct incise_error err = {0};
 
 	history.n = incise_calibration_history(path, &history.record, &err);
-	cli_check(history.n < 0 || incise_calibration_load(path, &in_force, &err), &err);
+	cli_check(history.n < 0 || incise_calibration_load(path, &active, &err), &err);
 	for (int i = 0; i < history.n; i++) {
 		const struct incise_calibration_record *record = &history.record[i];
 		double t_s = date_s(record->date);
@@ -87,8 +88,8 @@ static struct history read_history(const char *path)
 		}
 	}
 	for (int i = 0; i < history.n_series; i++)
-		history.series[i].in_force =
-			incise_calibration_get(&in_force, history.series[i].key);
+		history.series[i].active =
+			incise_calibration_get(&active, history.series[i].key);
 	if (!history.n_series)
 		cli_fail("%s: has no history to draw; 'incise calibrate' adds to it",
 			 path);
@@ -126,10 +127,9 @@ static char *label_of(const struct series *series)
 		{"force_mV_N", "sensitivity of the force"},
 		{"depth_mm_px", "scale of the depth"},
 		{"stepper_N_step", "force of a microstep"},
-		{"stepper_steps_s", "largest rate of the stepper"},
+		{"stepper_steps_s", "largest rate"},
 	};
-	const char *unit = *series->unit ? series->unit : "1",
-		   *last = strrchr(series->key, '_');
+	const char *unit = series->unit, *last = strrchr(series->key, '_');
 	char *name = cli_text("%.*s", (int)(last ? last - series->key : 32), series->key);
 	char *label;
 
@@ -139,17 +139,29 @@ static char *label_of(const struct series *series)
 		if (!strcmp(names[i].key, series->key))
 			snprintf(name = cli_resize(name, strlen(names[i].name) + 1, 1),
 				 strlen(names[i].name) + 1, "%s", names[i].name);
-	label = cli_text(strchr(unit, '/') ? "%s / (%s)" : "%s / %s", name, unit);
+	label = cli_text(!*unit		     ? "%s"
+			 : strchr(unit, '/') ? "%s / (%s)"
+					     : "%s / %s",
+			 name, unit);
 	free(name);
 	return label;
 }
 
-/* An axis with three days, or fewer where they are one. */
-static void put_dates(FILE *script, double from_s, double to_s)
+/* An axis with three days, or fewer where they are one; of one calibration its time. */
+static void put_dates(FILE *script, const struct series *series, double from_s,
+		      double to_s)
 {
 	static const double shares[] = {0.18, 0.5, 0.82};
 	double last_s = -INFINITY;
+	time_t only = (time_t)series->first_s;
 
+	if (series->n == 1) {
+		fprintf(script,
+			"set xrange [%.0f:%.0f]\n"
+			"set xtics (strftime('%%Y-%%m-%%d %%H:%%M', %.0f) %.0f)\n",
+			from_s, to_s, (double)only, (double)only);
+		return;
+	}
 	fprintf(script, "set xrange [%.0f:%.0f]\nset xtics (", from_s, to_s);
 	for (int i = 0; i < 3; i++) {
 		double day_s =
@@ -176,33 +188,51 @@ static void put_panel(FILE *script, const struct series *series, const char *nam
 	fputs("set ylabel ", script);
 	plot_put_text(script, label);
 	fputc('\n', script);
-	put_dates(script, series->first_s - margin_s, series->last_s + margin_s);
+	put_dates(script, series, series->first_s - margin_s, series->last_s + margin_s);
 	fputs("plot ", script);
 	if (!isnan(series->before))
-		fprintf(script, "%.9g with lines lc rgb grey dt 2 title 'before', \\\n  ",
+		fprintf(script, "%.9g with lines lc rgb grey dt 2, \\\n  ",
 			series->before);
-	if (!isnan(series->in_force))
-		fprintf(script, "%.9g with lines lt 3 title 'in force', \\\n  ",
-			series->in_force);
+	if (!isnan(series->active))
+		fprintf(script, "%.9g with lines lt 3, \\\n  ", series->active);
 	if (series->passed)
 		fprintf(script,
-			"'%s' using 1:($4>0?$2:NaN):3 with yerrorbars lt 1 title 'value and U (k = 2)', "
+			"'%s' using 1:($4>0?$2:NaN):3 with yerrorbars lt 1, "
 			"\\\n  '' using 1:($4>0?$2:NaN) with lines lt 1 lw 0.8 dt 3, \\\n  ",
 			name);
 	if (series->failed)
 		fprintf(script,
-			"'%s' using 1:($4>0?NaN:$2):3 with yerrorbars lt 2 pt 2 title 'not passed', "
+			"'%s' using 1:($4>0?NaN:$2):3 with yerrorbars lt 2 pt 2, "
 			"\\\n  ",
 			name);
 	fputs("NaN\n", script);
 	free(label);
 }
 
+/* One for all panels, of what they have. */
+static void put_key(FILE *script, const struct history *history)
+{
+	bool before = false, active = false, passed = false, failed = false;
+
+	for (int i = 0; i < history->n_series; i++) {
+		before |= !isnan(history->series[i].before);
+		active |= !isnan(history->series[i].active);
+		passed |= history->series[i].passed > 0;
+		failed |= history->series[i].failed > 0;
+	}
+	fprintf(script,
+		"set size 1,1\nset origin 0,0\neval key_panel\nplot %s%s%s%sNaN notitle\n",
+		before ? "NaN with lines lc rgb grey dt 2 title 'before', " : "",
+		active ? "NaN with lines lt 3 title 'active', " : "",
+		passed ? "NaN with yerrorbars lt 1 title 'value and U (k = 2)', " : "",
+		failed ? "NaN with yerrorbars lt 2 pt 2 title 'not passed', " : "");
+}
+
 FILE *figure_of_calibration(const struct figure *figure)
 {
 	struct history history = read_history(figure->path);
 	int rows = (history.n_series + COLUMNS - 1) / COLUMNS;
-	int height = TITLE_HEIGHT + rows * PANEL_HEIGHT;
+	int height = TITLE_HEIGHT + rows * PANEL_HEIGHT + KEY_HEIGHT;
 	FILE *script = plot_begin(figure->folder, figure->name, FIGURE_WIDTH, height);
 	double share = (double)PANEL_HEIGHT / height;
 
@@ -210,8 +240,7 @@ FILE *figure_of_calibration(const struct figure *figure)
 	plot_put_text(script, figure->path);
 	fprintf(script,
 		".': %s' noenhanced\n"
-		"set key outside top center horizontal\nset offsets 0, 0, graph 0.1, graph "
-		"0.1\nset size %g,%g\n",
+		"set key off\nset offsets 0, 0, graph 0.1, graph 0.1\nset size %g,%g\n",
 		cli_count(history.n, "calibration"), 1.0 / COLUMNS, share);
 	for (int i = 0; i < history.n_series; i++) {
 		char *name = cli_text("series-%d.dat", i);
@@ -222,6 +251,7 @@ FILE *figure_of_calibration(const struct figure *figure)
 		put_panel(script, &history.series[i], name);
 		free(name);
 	}
+	put_key(script, &history);
 	fputs("unset multiplot\n", script);
 	free(history.series), free(history.record);
 	return script;

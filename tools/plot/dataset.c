@@ -309,8 +309,10 @@ FILE *figure_of_dataset(const struct figure *figure)
 			    rows * HEIGHT + TITLE_HEIGHT);
 	put_title(script, &table, figure->path);
 	fprintf(script,
-		"set key top left\nset cblabel 'cut / 1'\nset cbrange [1:%d]\nset size %g,%g\n"
+		"set key outside bottom center horizontal width 2\nset cblabel 'cut'\n"
+		"set palette maxcolors %d\nset cbrange [0.5:%d.5]\nset size %g,%g\n"
 		"set origin 0,%g\n",
+		table.n_groups > 1 ? table.n_groups : 2,
 		table.n_groups > 1 ? table.n_groups : 2, velocity ? 0.5 : 1.0, height,
 		(rows - 1) * height);
 	put_upper(script, &table, DEPTH, figure);
@@ -321,7 +323,7 @@ FILE *figure_of_dataset(const struct figure *figure)
 	if (rows > 1) {
 		write_cuts(&table, figure->folder, "cuts.dat");
 		fprintf(script,
-			"set size 1,%g\nset origin 0,0\nset xlabel 'cut / 1'\nset xtics %d\n"
+			"set size 1,%g\nset origin 0,0\nset xlabel 'cut'\nset xtics %d\n"
 			"set xrange [0.5:%d.5]\nset yrange [0:*]\nset boxwidth 0.6\n"
 			"plot 'cuts.dat' using 1:2 with boxes fs solid 0.3 lt 1 title 'mean', "
 			"'' using 1:2:3 with yerrorbars lc rgb ink pt 0 title 'SD'\n",

@@ -210,10 +210,18 @@ static void put_band(struct model_grid *grid, const struct model_surface *surfac
 	place_model_plot(grid, input, columns, BAND_HEIGHT);
 	fprintf(grid->script,
 		"set key outside bottom center horizontal\nset xrange [%.9g:%.9g]\n"
-		"set yrange [*:*]\nset title '95 %% intervals%s'\nset xlabel ",
+		"set yrange [*:*]\nset title '95 %% intervals%s'",
 		surface->input[input].min, surface->input[input].max,
-		surface->n_inputs > 1 ? "; other inputs at the middle of their support"
+		surface->n_inputs > 2 ? "; other inputs at the middle of their support"
 				      : "");
+	if (surface->n_inputs == 2) {
+		const struct incise_variable *other = &surface->input[!input];
+
+		fputs(".' at '.", grid->script);
+		plot_put_label(grid->script, other->name);
+		fprintf(grid->script, ".' = %.3g'", (other->min + other->max) / 2);
+	}
+	fputs("\nset xlabel ", grid->script);
 	plot_put_label(grid->script, surface->input[input].name);
 	fputs("\nset ylabel ", grid->script);
 	plot_put_label(grid->script, surface->output.name);

@@ -609,12 +609,15 @@ static void put_panel(FILE *script, const struct recorded *r, int i, int top, in
 	const struct panel *panel = &panels[i];
 	const struct recording_range *range = &r->range[i];
 	bool first = i == PANEL_FORCE;
+	/* The numbers of the cuts are above the data. */
+	double high =
+		range->high + (first && cuts ? 0.12 * (range->high - range->low) : 0);
 
 	place_recording_plot(script, top, panel->height, 8);
 	fprintf(script, "set ylabel '%s'\nset yrange [%g:%g]\nplot ", panel->label,
-		range->low, range->high);
+		range->low, high);
 	if (cuts)
-		put_boxes(script, r, "cuts.dat", range->low, range->high, "sky", 0.25,
+		put_boxes(script, r, "cuts.dat", range->low, high, "sky", 0.25,
 			  first ? "cut" : "");
 	if (lost[panel->lost])
 		put_boxes(script, r, names[panel->lost], range->low, range->high,
@@ -626,7 +629,7 @@ static void put_panel(FILE *script, const struct recorded *r, int i, int top, in
 			range->low, range->high - range->low);
 	fputs(panel->plot, script);
 	if (i == PANEL_DEPTH && r->presence[CAMERA].rows)
-		fputs(", \\\n  'camera.dat' with points lc rgb vermillion pt 7 ps 0.25 title "
+		fputs(", \\\n  'camera.dat' using 1:($2>0?$2:NaN) with points lc rgb vermillion pt 7 ps 0.25 title "
 		      "'camera'",
 		      script);
 	if (first && r->clipped)
@@ -637,7 +640,7 @@ static void put_panel(FILE *script, const struct recorded *r, int i, int top, in
 		fprintf(script,
 			", \\\n  'cuts.dat' using (($1+$2)/2):($3>0?%g:NaN):3 with labels font "
 			"small",
-			range->high - 0.05 * (range->high - range->low));
+			high - 0.05 * (high - range->low));
 	fputc('\n', script);
 }
 

@@ -142,7 +142,8 @@ void session_figure_path(FILE *script, const struct session *s,
 		fputs(", $cuts with lines lw 6 lc rgb orange title 'cut'", script);
 	for (int tool = 0; tool <= INCISE_TOOL_TUBE; tool++)
 		if (there[tool])
-			fprintf(script, ", $%s with lines lw %s lc rgb %s title '%s'",
+			fprintf(script,
+				", $%s with linespoints pi 1000000 pt 6 lw %s lc rgb %s title '%s'",
 				loop_tool_names[tool], tool ? "2" : "0.7", colours[tool],
 				tool ? loop_tool_names[tool] : "in the air");
 	if (expert)
@@ -150,8 +151,7 @@ void session_figure_path(FILE *script, const struct session *s,
 		      "reference'",
 		      script);
 	if (s->has_membrane)
-		fputs(", $membrane with lines lw 2 lc rgb vermillion title 'membrane'",
-		      script);
+		fputs(", $membrane with lines lw 2 lc rgb sky title 'membrane'", script);
 	fputc('\n', script);
 }
 
@@ -193,15 +193,15 @@ static void put_over_time(FILE *script, const struct session *s,
 
 	fprintf(script,
 		"set xlabel 'time / s'\nset ylabel '%s'\nset yrange [0:%.4f]\n"
-		"set xrange [0:%.4f]\nset key outside right top\n",
+		"set xrange [0:%.4f]\n",
 		label, fmax(1.1 * most, 0.1), fmax(s->duration_s, 0.001));
 	put_phases(script, s);
 	put_samples(script, "session", s, member, 0);
 	if (!isnan(later_s))
 		put_samples(script, "expert", reference, member, later_s);
-	fputs("plot $session with lines lt 2 title 'session'", script);
+	fputs("plot $session with lines lc rgb ink title 'session'", script);
 	if (!isnan(later_s))
-		fputs(", $expert with lines lw 1 dt 2 lc rgb ink title 'reference'",
+		fputs(", $expert with lines lw 1 dt 2 lc rgb grey title 'reference'",
 		      script);
 	for (int tool = 1; tool <= INCISE_TOOL_TUBE; tool++)
 		if (has_phase(s, tool))
@@ -216,6 +216,7 @@ void session_figure_force(FILE *script, const struct session *s,
 	const struct incise_scene_criterion *asked = &s->criteria[INCISE_CRITERION_FORCE];
 	double most_N = fmax(s->force.largest_N, asked->asked ? asked->max : 0);
 
+	fputs("set key outside right top\n", script);
 	if (reference)
 		most_N = fmax(most_N, reference->force.largest_N);
 	put_over_time(script, s, reference, offsetof(struct session_sample, force_N),
@@ -239,6 +240,8 @@ static double deepest_mm(const struct session *s)
 void session_figure_depth(FILE *script, const struct session *s,
 			  const struct session *reference)
 {
+	/* The force below has the same. */
+	fputs("set key off\n", script);
 	put_over_time(script, s, reference, offsetof(struct session_sample, depth_mm),
 		      "depth / mm",
 		      fmax(deepest_mm(s), reference ? deepest_mm(reference) : 0));

@@ -65,6 +65,17 @@ static void reserve_files(const struct view_output *output)
 	free(frames);
 }
 
+/* Frames of a strip, in rows of four or fewer. */
+static int strip_rows(const struct view_output *output)
+{
+	return (output->n_strip + 3) / 4;
+}
+
+static int strip_columns(const struct view_output *output)
+{
+	return (output->n_strip + strip_rows(output) - 1) / strip_rows(output);
+}
+
 void view_output_begin(struct view_output *output)
 {
 	size_t size = (size_t)output->width * output->height * 3;
@@ -75,7 +86,8 @@ void view_output_begin(struct view_output *output)
 	reserve_files(output);
 	output->rgb = cli_alloc(1, size);
 	if (output->strip_path)
-		output->strip = cli_alloc(output->n_strip, size);
+		output->strip =
+			cli_alloc(strip_rows(output) * strip_columns(output), size);
 	if (output->folder && mkdir(output->folder, 0777) && errno != EEXIST)
 		cli_fail("%s: %s", output->folder, strerror(errno));
 	if (output->film_path)
@@ -85,14 +97,15 @@ void view_output_begin(struct view_output *output)
 				    &err);
 }
 
-/* Put the frame to the right of those before. */
+/* Put the frame to the right of those before, or below. */
 static void add_to_strip(struct view_output *output)
 {
-	size_t row = (size_t)output->width * 3;
+	size_t row = (size_t)output->width * 3, columns = (size_t)strip_columns(output);
+	size_t down = (size_t)output->stripped / columns * (size_t)output->height,
+	       right = (size_t)output->stripped % columns;
 
-	for (int y = 0; y < output->height; y++)
-		memcpy(output->strip +
-			       (y * (size_t)output->n_strip + output->stripped) * row,
+	for (size_t y = 0; y < (size_t)output->height; y++)
+		memcpy(output->strip + ((down + y) * columns + right) * row,
 		       output->rgb + y * row, row);
 	output->stripped++;
 }
@@ -139,7 +152,8 @@ void view_output_end(struct view_output *output)
 			 output->stripped + 1, output->strip_s[output->stripped]);
 	if (output->strip_path &&
 	    image_write_png(output->strip_path, output->strip,
-			    output->width * output->n_strip, output->height, &err))
+			    output->width * strip_columns(output),
+			    output->height * strip_rows(output), &err))
 		cli_fail_with(&err);
 	free(output->rgb);
 	free(output->strip);
@@ -153,8 +167,11 @@ void view_output_print(const struct view_output *output)
 		printf("wrote %s: %s, %.1f s\n", output->film_path, cli_count(n, "frame"),
 		       (double)n / output->fps);
 	if (output->strip_path)
-		printf("wrote %s: %s\n", output->strip_path,
+		printf("wrote %s: %s at", output->strip_path,
 		       cli_count(output->stripped, "frame"));
+	for (int i = 0; output->strip_path && i < output->stripped; i++)
+		printf(" %g%s", output->strip_s[i],
+		       i < output->stripped - 1 ? "," : " s\n");
 	if (output->folder && n)
 		printf("wrote %s/frame-000000.png to frame-%06llu.png\n", output->folder,
 		       n - 1);

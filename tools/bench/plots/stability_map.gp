@@ -16,7 +16,7 @@ set logscale xy
 set xrange [5e-4:20]
 set yrange [least:50]
 set format xy power
-set xlabel "device damping bT/m / 1"
+set xlabel "device damping bT/m"
 set key off
 block(wall, delay) = sprintf("%s %s", wall, word(delays, delay))
 # Nothing is stable: a triangle at the lower edge.
@@ -25,7 +25,7 @@ marker(d) = int(word('7 5 9 13 6 4', d))
 do for [i=1:n] {
 	w = word(walls, i)
 	set title sprintf("(%s) wall damping BT/m = %s", "abcdefgh"[i:i], w)
-	set ylabel i == 1 ? "wall stiffness KT²/m / 1" : ""
+	set ylabel i == 1 ? "wall stiffness KT²/m" : ""
 	plot for [d=1:words(delays)] more \
 			using (strcol("block") eq block(w, d) ? column("x") : NaN):"y" with lines lt d, \
 		for [d=1:words(delays)] data \
