@@ -74,7 +74,7 @@ deps_module := module vm
 deps_deb := deb debian
 deps_wheel := wheel
 deps_site := site
-deps_bare := debian
+deps_bare := debian container
 
 # Guests in real time, and the check on other Debians, run alone at the end.
 check-parts:

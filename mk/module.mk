@@ -105,7 +105,7 @@ check-debian13: ## CI's run on Debian 13, in a chroot
 	@tests/debian/check trixie
 
 check-container: ## Containerfile on empty Debians 12 and 13, with the demo in it, by podman or chroot
-	@mk/deps debian
+	@mk/deps debian container
 	@tests/debian/container bookworm
 	@tests/debian/container trixie
 

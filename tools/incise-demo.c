@@ -369,7 +369,7 @@ static double count_of_loop(const struct demo *demo, const char *key)
 		json_object_get(json_object_get(demo->summary, "haptic"), key));
 }
 
-/* Of its ticks, that can be late without a loop that feels nothing. */
+/* A share of the ticks that may be late while the loop gives force. */
 #define LATE_SHARE 0.1
 
 /* A loop that gave no force shows nothing: the demo fails, and says why. */
@@ -382,10 +382,11 @@ static void require_force(const struct demo *demo)
 	if (count_of_loop(demo, "force_max_N") > 0)
 		return;
 	if (late > LATE_SHARE * all)
-		cli_fail("the haptic loop gave no force: this machine is busy, and %.0f of "
-			 "%.0f ticks were skipped or had no new pose; run the demo again when "
-			 "less else runs",
-			 late, all);
+		cli_fail(
+			"the haptic loop gave no force: this machine is busy, and %.0f of "
+			"%.0f ticks were skipped or had no new pose; run the demo again when "
+			"less else runs",
+			late, all);
 	cli_fail("the haptic loop gave no force: it ended before the scalpel was in the "
 		 "tissue; run the demo again with --duration 6s or more");
 }

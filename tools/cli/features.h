@@ -22,7 +22,7 @@ struct feature {
 void features_each(void (*found)(void *context, const struct feature *feature),
 		   void *context);
 
-/* What this build leaves out, with the packages that it lacked: "PNG (libpng-dev), …". */
+/* The features that this build leaves out, with their packages: "PNG (libpng-dev), …". */
 extern const char features_left_out[];
 
 /*
