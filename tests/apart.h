@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
  * How far the forces of a plan in integers are from those of the same plan in double, on the same poses, and
- * whether they are so by a decision that incise_plan_bound() lists: another phase, tool, flag, side of the tissue, or
- * place of a cut or of a tear. That is no error of a force.
+ * whether they are so by a decision that incise_plan_bound() lists: another phase, tool, flag, side of the tissue, place
+ * of a cut or of a tear, or a front that follows a rise of its texture. That is no error of a force.
  */
 #ifndef INCISE_TEST_APART_H
 #define INCISE_TEST_APART_H
@@ -89,6 +89,15 @@ static inline bool apart_ramps_alike(struct incise_plan *const plan[2])
 		    plan[1]->integers->state.gain * 0x1p-30) < APART_GAIN;
 }
 
+/* Whether both fronts follow a rise of their texture, or neither does. */
+static inline bool apart_fronts_alike(struct incise_plan *const plan[2])
+{
+	const struct incise_double_front *a = &plan[0]->doubles.state.front;
+	const struct incise_fixed_front *b = &plan[1]->integers->state.front;
+
+	return a->rises == b->rises && a->climbs == b->climbs;
+}
+
 /* Both plans are in tissue, in the same phase. */
 static inline bool apart_places_alike(struct incise_plan *const plan[2],
 				      const struct incise_tick *a,
@@ -97,7 +106,8 @@ static inline bool apart_places_alike(struct incise_plan *const plan[2],
 	return v3_dot(a->normal, b->normal) > APART_SAME_SIDE &&
 	       apart_ramps_alike(plan) &&
 	       (a->phase == INCISE_PHASE_CUTTING
-			? apart_tears_alike(plan) && apart_cuts_alike(plan, a, b)
+			? apart_tears_alike(plan) && apart_cuts_alike(plan, a, b) &&
+				  apart_fronts_alike(plan)
 			: apart_openings_alike(plan));
 }
 

@@ -25,6 +25,7 @@ static const struct {
 	const char *name, *does, *group; /* NULL: of the command before */
 } commands[] = {
 	{"demo", "run the whole path on the simulated rig", "Start"},
+	{"init", "write a rig.conf for this machine, and lead through its calibrations"},
 	{"doctor", "check this machine and its rig, and print a remedy for each finding"},
 	{"calibrate", "measure the scale factors, delays and offsets of a rig", "Record"},
 	{"capture", "record the streams of a rig in sync"},

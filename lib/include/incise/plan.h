@@ -269,7 +269,8 @@ INCISE_API void incise_plan_rendered(const struct incise_plan *plan,
  *    or more in it, and a cut that does not turn, of a bottom no steeper than 45 degrees, whose
  *    advance is not short of work; for averaged normals within 60 degrees of their mean;
  *  - while both plans decide alike: the same phase, the same tool in the same place (of 0.5 mm)
- *    of the same cut, on the same side of an edge of a mesh, in the same place of a tear, and did
+ *    of the same cut, on the same side of an edge of a mesh, in the same place of a tear, with fronts that both or
+ *    neither follow a rise of the texture, and did
  *    so since the contact or the cut began. If one changes a tick earlier, that is no error of the force, nor is what it
  *    keeps from that;
  *  - while no force goes unpaid (INCISE_TICK_UNPAID): at the end of an account roundings decide;

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# incise init: rig.conf, the calibrations of a rig, and where it goes on.
+
+load cli
+
+setup() {
+	work_folder
+}
+
+# bats test_tags=check
+@test "the simulated rig: rig.conf, all calibrations, and the commands that it names run" {
+	run -0 --separate-stderr incise init lab --preset sim --yes
+	! grep -q 'warning\|incise' <<<"$stderr"
+	holds "$(grep -c '^pass: ' <<<"$output") == 5"
+	sed -n 's/^  \(incise .*\)/\1/p' <<<"$output" | grep -v "incise calibrate\|doctor" >next
+	[ "$(cut -d' ' -f2 next | tr '\n' ' ')" = "capture train haptic " ]
+	cd lab
+	run -0 incise info rig.conf
+	# each key has its meaning above it
+	[ "$(grep -c '^[[:space:]]*#' rig.conf)" -ge "$(grep -c ' = [^{]' rig.conf)" ]
+	bash -eu ../next >out
+	[ -s first.fis ]
+	# once more: nothing is left to do, and nothing changes
+	sha256sum rig.conf calibration.conf >../before
+	run -0 incise init --yes
+	holds "$(grep -c ': passed$' <<<"$output") == 5"
+	sha256sum -c --quiet ../before
+}
+
+# bats test_tags=check
+@test "it goes on where it stopped, and never changes a rig.conf" {
+	incise init lab --preset sim --yes --no-calibration >out
+	[ ! -e lab/calibration.conf ]
+	cp lab/rig.conf before
+	fails incise init lab --preset haply --yes -- "rig.conf is there" "--preset"
+	fails incise init lab --camera none --yes -- "rig.conf is there"
+	(cd lab && incise calibrate depth two-point --images 20 >../out)
+	run -0 incise init lab --yes
+	grep -qx "depth: passed" <<<"$output"
+	holds "$(grep -c '^pass: ' <<<"$output") == 4"
+	cmp before lab/rig.conf
+}
+
+# bats test_tags=check
+@test "a real rig: devices by options, calibrations only listed" {
+	run -0 incise init lab --preset paper --tracker tty:/dev/ttyS9 --force iio:iio:device0,0 --camera none \
+		--stepper kernel:/dev/incise-stepper0 --spring 2.5 --yes
+	grep -qx 'tracker = "tty:/dev/ttyS9";' lab/rig.conf
+	grep -qx '	spring_N_mm = 2.5;' lab/rig.conf
+	! grep -q camera lab/rig.conf
+	[ "$(grep -c '^  incise calibrate' <<<"$output")" = 4 ]
+	grep -q "4 calibrations left" <<<"$output"
+	[ ! -e lab/calibration.conf ]
+	run -0 incise init arm --preset haply --yes
+	grep -q "^  incise calibrate frame" <<<"$output"
+	! grep -q capture <<<"$output"
+}
+
+# bats test_tags=check
+@test "what it refuses leaves no file" {
+	fails incise init lab -- "no terminal" "--yes"
+	[ ! -e lab ]
+	fails incise init lab --preset paper --tracker 'tty:"; clock = "real' --yes -- tracker
+	fails incise init lab --preset paper --stepper kernel:/dev/null --spring soft --yes -- spring soft
+	[ -z "$(ls -A lab)" ]
+	bad_usage incise init a b
+}
+
+# bats test_tags=check
+@test "on a terminal it asks, and an empty answer is the default" {
+	cat >ask.py <<-'END'
+		import os, pty, sys
+		answers = iter(sys.argv[1].split(","))
+		seen = b""
+		def read(fd):
+		    global seen
+		    data = os.read(fd, 1024)
+		    seen += data
+		    while b"] " in seen:
+		        seen = seen[seen.index(b"] ") + 2:]
+		        os.write(fd, (next(answers) + "\n").encode())
+		    return data
+		sys.exit(os.waitstatus_to_exitcode(pty.spawn(sys.argv[2:], read)))
+	END
+	run -0 python3 ask.py "sim,yes,later,later,later,later" incise init lab
+	[[ "$output" == *"Rig: sim, paper or haply? ["* ]]
+	[[ "$output" == *"4 calibrations left"* ]]
+	run -0 incise calibrate check --only force -c lab/calibration.conf
+	run -2 python3 ask.py "elephant" incise init lab3 --no-calibration
+	[[ "$output" == *elephant* ]]
+	[ ! -e lab3/rig.conf ]
+}

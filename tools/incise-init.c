@@ -1,0 +1,491 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * incise init: a rig.conf for the devices of this machine, then the calibrations that its rig needs.
+ *
+ *   preset ─┬─▶ devices: options ▶ answers ▶ what is attached ─▶ rig.conf ─▶ calibrations ─▶ next
+ *           └── a rig.conf that is there is kept ──────────────────┘   (those that did not pass yet)
+ */
+#include <errno.h>
+#include <fcntl.h>
+#include <glob.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+#include <incise/calibration.h>
+#include <incise/rig.h>
+#include "cli/child.h"
+#include "cli/cli.h"
+
+#define RIG "rig.conf"
+#define CALIBRATION "calibration.conf"
+
+enum device { TRACKER, FORCE, CAMERA, STEPPER, HAPTIC, DEVICES };
+
+/* Devices of a rig: key of rig.conf, where one is attached, and its backend. */
+static const struct {
+	const char *key, *what, *pattern, *spec;
+} devices[DEVICES] = {
+	[TRACKER] = {"tracker", "Tracker of the scalpel", "/dev/ttyUSB*", "tty:%s"},
+	[FORCE] = {"force", "Force channel", "/sys/bus/iio/devices/iio:device*",
+		   "iio:%s"},
+	[CAMERA] = {"camera", "Camera", "/dev/video*", "v4l2:%s"},
+	[STEPPER] = {"stepper", "Actuator of the handle", "/dev/incise-stepper*",
+		     "kernel:%s"},
+	[HAPTIC] = {"haptic", "Haptic device", NULL, NULL},
+};
+
+/* Numbers of an actuator that have no default: its maker knows them. */
+static const struct {
+	const char *key, *what, *value;
+} mechanics[] = {
+	{"spring_N_mm", "Stiffness of the spring, N/mm", "2.0"},
+	{"travel_mm", "Travel of the nut, mm", "20.0"},
+	{"lead_mm", "Lead of the screw, mm per turn", "4.0"},
+};
+
+enum { MECHANICS = sizeof(mechanics) / sizeof(*mechanics) };
+
+struct init {
+	const char *folder, *device[DEVICES], *mechanic[MECHANICS];
+	enum preset { UNSET, SIM, PAPER, HAPLY } preset;
+	bool yes, no_calibration;
+};
+
+/* Devices that are not asked for: "" for none. NULL: asked for. */
+static const struct {
+	const char *clock, *device[DEVICES];
+} presets[] = {
+	[SIM] = {"simulated", {"sim:", "sim:", "sim:", "sim:", ""}},
+	[PAPER] = {"real", {NULL, NULL, NULL, NULL, ""}},
+	[HAPLY] = {"real", {"", "", "", "", "haply:"}},
+};
+
+/* Calibrations in their order. They need all of these devices, and none of those. */
+static const struct calibration {
+	const char *kind;
+	unsigned int needs, without;
+	const char *what, *posture, *real, *simulated;
+} calibrations[] = {
+	{"force", 1 << FORCE, 0, "volts to newtons",
+	 "put known weights on the sensor when it asks for them", "",
+	 "--weights 0,50g,100g,200g,300g"},
+	{"depth", 1 << CAMERA, 0, "pixels to millimetres",
+	 "hold the scalpel in the air, with its whole black handle in view",
+	 "two-point --images 50", "two-point --images 20"},
+	{"tip", 1 << TRACKER, 1 << HAPTIC, "where the blade's tip is on the sensor",
+	 "rest the tip in a dimple and rotate the tool by 60 degrees", "--duration 20s",
+	 "--rig sim:clock=simulated,motion=1 --duration 20s --given-u surface=0.1"},
+	{"delay", 1 << TRACKER | 1 << FORCE, 1 << HAPTIC, "how late each stream comes",
+	 "press the tip on foam and lift off, irregularly", "--duration 15s",
+	 "--rig sim:clock=simulated,motion=2 --duration 15s --given-u reference=0.01"},
+	{"stepper", 1 << STEPPER, 1 << HAPTIC,
+	 "what the actuator loses to friction and play",
+	 "put the handle on the force sensor, hands off", "--repeat 3",
+	 "--rig sim:clock=simulated,bench=1 --repeat 2"},
+	{"frame", 1 << HAPTIC, 0, "where the device is in the scene",
+	 "touch three to six points that the scene knows", NULL, NULL},
+};
+
+enum { CALIBRATIONS = sizeof(calibrations) / sizeof(*calibrations) };
+
+static const char *const preset_names[] = {"", "sim", "paper", "haply", NULL};
+
+static const struct cli_option options[] = {
+	{0, "preset", "NAME",
+	 "sim (all simulated), paper (tracker, force, camera and actuator of Song et al., "
+	 "2006) or haply (Haply Inverse3)",
+	 CLI_CHOICE(struct init, preset, preset_names)},
+	{0, "tracker", "DEVICE", "tracker, as in rig.conf(5); none for no tracker",
+	 CLI_TEXT(struct init, device[TRACKER])},
+	{0, "force", "DEVICE", "force channel, or none",
+	 CLI_TEXT(struct init, device[FORCE])},
+	{0, "camera", "DEVICE", "camera, or none", CLI_TEXT(struct init, device[CAMERA])},
+	{0, "stepper", "DEVICE", "actuator of the handle, or none",
+	 CLI_TEXT(struct init, device[STEPPER])},
+	{0, "haptic", "DEVICE", "haptic device in place of tracker and actuator",
+	 CLI_TEXT(struct init, device[HAPTIC])},
+	{0, "spring", "N/mm", "stiffness of the actuator's spring",
+	 CLI_TEXT(struct init, mechanic[0])},
+	{0, "travel", "mm", "travel of its nut", CLI_TEXT(struct init, mechanic[1])},
+	{0, "lead", "mm", "lead of its screw per turn",
+	 CLI_TEXT(struct init, mechanic[2])},
+	{0, "no-calibration", NULL, "only write rig.conf",
+	 CLI_FLAG(struct init, no_calibration)},
+	{'y', "yes", NULL, "take the default of each question; calibrate a simulated rig",
+	 CLI_FLAG(struct init, yes)},
+	{0}};
+
+static const struct cli_command command = {
+	.name = "init",
+	.synopsis = "[FOLDER] [OPTIONS]",
+	.summary =
+		"Write a rig.conf with comments for the devices of this machine, and lead "
+		"through the calibrations that its rig needs. Run it again to go on where it "
+		"stopped.",
+	.options = options,
+	.notes = "A rig.conf that is there is never changed.",
+	.examples = "incise init lab --preset sim --yes",
+	.success = "rig.conf is there, and no calibration failed",
+};
+
+/* --- questions --------------------------------------------------------------------------- */
+
+static bool on_terminal(void)
+{
+	return isatty(STDIN_FILENO) && isatty(STDERR_FILENO);
+}
+
+/* An answer, or the default for an empty one and with --yes. */
+static char *ask_for(const struct init *init, const char *question, const char *usual)
+{
+	char line[300] = "\n", *end;
+
+	if (!init->yes) {
+		fprintf(stderr, "%s [%s] ", question, usual);
+		if (!fgets(line, sizeof(line), stdin) || cli_stop)
+			cli_fail(
+				"stopped; nothing more was written, and 'incise init' goes "
+				"on here");
+	}
+	end = line + strcspn(line, "\n");
+	*end = '\0';
+	return cli_text("%s", *line ? line : usual);
+}
+
+/* The first device of a kind that is attached, as a spec; or "none". */
+static char *find_attached(enum device device)
+{
+	glob_t found;
+	char *spec = cli_text("none");
+
+	if (!devices[device].pattern || glob(devices[device].pattern, 0, NULL, &found))
+		return spec;
+	free(spec);
+	spec = cli_text(devices[device].spec,
+			device == FORCE ? strrchr(found.gl_pathv[0], '/') + 1
+					: found.gl_pathv[0]);
+	globfree(&found);
+	return spec;
+}
+
+static enum preset choose_preset(const struct init *init)
+{
+	enum preset usual = init->device[HAPTIC] ? HAPLY : SIM;
+	char *answer;
+
+	if (init->preset)
+		return init->preset;
+	for (int i = 0; usual == SIM && i < HAPTIC; i++) {
+		char *attached = find_attached(i);
+
+		if (strcmp(attached, "none") || init->device[i])
+			usual = PAPER;
+		free(attached);
+	}
+	answer = ask_for(init, "Rig: sim, paper or haply?", preset_names[usual]);
+	usual = (enum preset)cli_choice("preset", answer, preset_names);
+	free(answer);
+	return usual;
+}
+
+/* --- rig.conf ---------------------------------------------------------------------------- */
+
+/* Each key with what it means above it, as rig.conf's own table says. */
+static int add_key(void *context, const struct incise_key *key)
+{
+	struct commented {
+		FILE *out;
+		char group[80];
+	} *to = context;
+	const char *dot = strchr(key->name, '.');
+	int length = dot ? (int)(dot - key->name) : 0;
+
+	if (*to->group && (!dot || strncmp(to->group, key->name, (size_t)length + 1))) {
+		fputs("};\n", to->out);
+		*to->group = '\0';
+	}
+	if (!key->given)
+		return 0;
+	if (dot && !*to->group) {
+		snprintf(to->group, sizeof(to->group), "%.*s.", length, key->name);
+		fprintf(to->out, "\n%.*s = {\n", length, key->name);
+	}
+	fprintf(to->out, "%s# %s%s%s\n%s%s = %s;\n", dot ? "\t" : "\n", key->help,
+		*key->unit ? ", " : "", key->unit, dot ? "\t" : "",
+		dot ? dot + 1 : key->name, key->value);
+	return 0;
+}
+
+/* As libconfig wants it: text in quotes. A quote or a backslash would end it. */
+static void put_device(FILE *draft, const char *key, const char *spec)
+{
+	if (strpbrk(spec, "\"\\\n"))
+		cli_fail(
+			"%s: '%s' has a quote, a backslash or a line's end; name the device "
+			"without one",
+			key, spec);
+	fprintf(draft, "%s = \"%s\";\n", key, spec);
+}
+
+/* The draft of a rig: keys without comments. */
+static void put_draft(const struct init *init, FILE *draft)
+{
+	enum preset preset = choose_preset(init);
+	bool stepper = false;
+
+	fprintf(draft, "clock = \"%s\";\n", presets[preset].clock);
+	for (int i = 0; i < DEVICES; i++) {
+		char *usual = find_attached(i);
+		char *spec = init->device[i] ? cli_text("%s", init->device[i])
+			     : presets[preset].device[i]
+				     ? cli_text("%s", presets[preset].device[i])
+				     : ask_for(init, devices[i].what, usual);
+
+		if (*spec && strcmp(spec, "none")) {
+			put_device(draft, devices[i].key, spec);
+			stepper |= i == STEPPER && strncmp(spec, "sim:", 4);
+		}
+		free(usual), free(spec);
+	}
+	if (stepper)
+		fputs("actuator = {\n", draft);
+	for (int i = 0; i < MECHANICS && stepper; i++) {
+		char *value = init->mechanic[i] ? cli_text("%s", init->mechanic[i])
+						: ask_for(init, mechanics[i].what,
+							  mechanics[i].value);
+		char *end;
+		double number = strtod(value, &end);
+
+		if (end == value || *end || !isfinite(number))
+			cli_fail("%s: expected a number, found '%s'", mechanics[i].what,
+				 value);
+		fprintf(draft, "%s = %#.9g;\n", mechanics[i].key, number);
+		free(value);
+	}
+	if (stepper)
+		fputs("};\n", draft);
+	fputs("surface = { point_mm = [0.0, 0.0, 0.0]; normal = [0.0, 0.0, 1.0]; };\n",
+	      draft);
+}
+
+static void write_rig(const struct init *init)
+{
+	struct {
+		FILE *out;
+		char group[80];
+	} to = {0};
+	/* The draft is in memory: it is read as any rig.conf, and leaves no file. */
+	int fd = memfd_create(RIG, MFD_CLOEXEC), rc;
+	char *path = cli_text("/proc/self/fd/%d", fd);
+	struct incise_error err = {0};
+	FILE *draft = fd < 0 ? NULL : fdopen(fd, "w");
+	char *text = NULL;
+	size_t size;
+
+	if (!draft)
+		cli_fail("no memory");
+	put_draft(init, draft);
+	if (fflush(draft))
+		cli_fail("no memory");
+	to.out = open_memstream(&text, &size);
+	if (!to.out)
+		cli_fail("no memory");
+	fputs("# SPDX-License-Identifier: CC0-1.0\n# Made by incise init; rig.conf(5) has "
+	      "every key with its range.\n",
+	      to.out);
+	rc = incise_rig_keys(path, add_key, &to, &err);
+	fclose(draft);
+	free(path);
+	cli_check(rc, &err);
+	if (*to.group)
+		fputs("};\n", to.out);
+	if (fclose(to.out))
+		cli_fail("no memory");
+	fd = open(RIG, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+	if (fd < 0 || write(fd, text, size) != (ssize_t)size || fsync(fd) || close(fd))
+		cli_fail("%s: %s", RIG, strerror(errno));
+	free(text);
+	printf("wrote %s\n", RIG);
+}
+
+/* --- calibrations ------------------------------------------------------------------------ */
+
+/* The devices of rig.conf, as bits; SIMULATED: all of them. */
+#define SIMULATED (1U << DEVICES)
+#define RECORDS (1U << TRACKER | 1U << FORCE)
+
+static int add_device(void *context, const struct incise_key *key)
+{
+	unsigned int *has = context;
+
+	for (int i = 0; i < DEVICES; i++) {
+		if (strcmp(key->name, devices[i].key) || strlen(key->value) < 3)
+			continue;
+		*has |= 1U << i;
+		if (strncmp(key->value, "\"sim:", 5))
+			*has &= ~SIMULATED;
+	}
+	return 0;
+}
+
+/* Whether a calibration of this kind has passed, and none since has failed. */
+static bool has_passed(const char *kind)
+{
+	struct incise_calibration_record *record = NULL;
+	struct incise_error err = {0};
+	int n = access(CALIBRATION, F_OK)
+			? 0
+			: incise_calibration_history(CALIBRATION, &record, &err);
+	bool passed = false;
+
+	cli_check(n < 0, &err);
+	for (int i = 0; i < n; i++)
+		if (!strcmp(record[i].kind, kind))
+			passed = record[i].pass;
+	free(record);
+	return passed;
+}
+
+#define WORDS_MAX 16
+
+/* Run it in the foreground. Returns whether it passed. */
+static bool run_calibration(const struct calibration *c, const char *given)
+{
+	char *program = cli_text("%s/incise-calibrate-%s", cli_folder(), c->kind);
+	char *words = cli_text("%s", given), *argv[WORDS_MAX] = {program}, *rest = NULL;
+	int n = 1, status;
+
+	for (char *word = strtok_r(words, " ", &rest); word && n < WORDS_MAX - 3;
+	     word = strtok_r(NULL, " ", &rest))
+		argv[n++] = word;
+	argv[n++] = "-c";
+	argv[n++] = CALIBRATION;
+	fflush(stdout);
+	status = child_run(argv, STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO);
+	if (status < 0)
+		cli_fail("%s: %s", program, strerror(errno));
+	free(words), free(program);
+	return WIFEXITED(status) && !WEXITSTATUS(status);
+}
+
+/* Lead through one; returns false where it is left for later. */
+static bool calibrate(const struct init *init, const struct calibration *c,
+		      bool simulated)
+{
+	const char *given = simulated ? c->simulated : c->real;
+	char *line =
+		cli_text("incise calibrate %s%s%s", c->kind, given && *given ? " " : "",
+			 given ? given : " --point X,Y,Z …");
+	char *answer;
+	bool go, passed;
+
+	printf("\n%s: %s\n", c->kind, c->what);
+	if (!simulated)
+		printf("  %s\n", c->posture);
+	printf("  %s\n", line);
+	fflush(stdout);
+	free(line);
+	if (!given || (init->yes && !simulated))
+		return false;
+	answer = ask_for(init, "Run it now: yes, later?", "yes");
+	go = *answer == 'y';
+	free(answer);
+	if (!go)
+		return false;
+	passed = run_calibration(c, given);
+	if (cli_stop || !passed)
+		cli_fail("calibrate %s %s; 'incise init' goes on here", c->kind,
+			 cli_stop ? "was stopped" : "did not pass");
+	return true;
+}
+
+/* Returns the number of those that are left. */
+static int calibrate_all(const struct init *init, unsigned int has)
+{
+	int left = 0;
+
+	for (int i = 0; i < CALIBRATIONS; i++) {
+		const struct calibration *c = &calibrations[i];
+
+		if ((has & c->needs) != c->needs || has & c->without)
+			continue;
+		if (has_passed(c->kind))
+			printf("%s: passed\n", c->kind);
+		else
+			left += !calibrate(init, c, has & SIMULATED);
+	}
+	return left;
+}
+
+/* --- all of it --------------------------------------------------------------------------- */
+
+static void enter_folder(const struct init *init)
+{
+	if (!init->folder)
+		return;
+	if (mkdir(init->folder, 0777) && errno != EEXIST)
+		cli_fail("%s: %s", init->folder, strerror(errno));
+	if (chdir(init->folder))
+		cli_fail("%s: %s", init->folder, strerror(errno));
+}
+
+static void check_init(const struct init *init)
+{
+	bool there = !access(RIG, F_OK), given = init->preset != UNSET;
+
+	for (int i = 0; i < DEVICES; i++)
+		given |= init->device[i] != NULL;
+	for (int i = 0; i < MECHANICS; i++)
+		given |= init->mechanic[i] != NULL;
+	if (there && given)
+		cli_fail(
+			"%s is there and stays as it is; leave out --preset and devices to "
+			"go on with it, or move it away",
+			RIG);
+}
+
+int main(int argc, char **argv)
+{
+	static struct init init;
+	unsigned int has = SIMULATED;
+	struct incise_error err = {0};
+	int left = 0;
+
+	cli_parse(&command, argc, argv, &init);
+	if (argc - optind > 1)
+		cli_usage("%s: give one folder", argv[optind + 1]);
+	init.folder = argv[optind];
+	if (!init.yes && !on_terminal())
+		cli_fail(
+			"there is no terminal for its questions; give --yes, and --preset or "
+			"devices");
+	cli_catch_signals();
+	enter_folder(&init);
+	check_init(&init);
+	if (access(RIG, F_OK))
+		write_rig(&init);
+	else
+		printf("%s is there\n", RIG);
+	cli_check(incise_rig_keys(RIG, add_device, &has, &err), &err);
+	if (!init.no_calibration)
+		left = calibrate_all(&init, has);
+	puts("\nNext:");
+	if (init.folder)
+		printf("  cd %s\n", init.folder);
+	if (left)
+		printf("  incise init    # %s left\n", cli_count(left, "calibration"));
+	puts("  incise doctor    # what this machine still lacks");
+	if ((has & RECORDS) == RECORDS)
+		puts("  incise capture -o first.rec\n"
+		     "  incise train first.rec\n"
+		     "  incise haptic liver --model first.fis --duration 10s");
+	else
+		puts("  incise haptic liver");
+	cli_finish();
+	return 0;
+}
