@@ -5,6 +5,7 @@
 #   prefix, DESTDIR, bindir, libdir, includedir, mandir …   as usual
 #   CFLAGS, CXXFLAGS, LDFLAGS, CPPFLAGS   yours; the project's own flags are kept apart
 #   V=1            show whole commands
+#   CROSS_COMPILE=aarch64-linux-gnu-   builds for another machine, with its compilers, ar and pkg-config
 #   RUN=COMMAND    runs a program that a cross compiler made, as qemu-aarch64-static does
 #   DEPS=no        let `make demo` and `make check` install no packages
 
@@ -44,15 +45,23 @@ runpath = $(if $(filter-out no,$(rpath)),-Wl$(comma)-rpath$(comma)'$$ORIGIN$1')
 comma := ,
 
 CFLAGS ?= -O2 -g
-CXXFLAGS ?= $(CFLAGS)
+# Of C alone, and no flags of C++.
+CXXFLAGS ?= $(filter-out -std=% -Wmissing-prototypes -Wstrict-prototypes %implicit-function-declaration %implicit-int,$(CFLAGS))
 # Objects come from ccache where it is installed; CCACHE= turns it off.
 CCACHE ?= $(shell command -v ccache 2>/dev/null)
-PKG_CONFIG ?= pkg-config
 INSTALL ?= install
 
 # Where it is missing, nothing is found by it, without a line for each question; a make that this one
 # calls looks again.
 there = $(shell command -v $(firstword $1) 2>/dev/null)
+ifneq ($(CROSS_COMPILE),)
+CC = $(CROSS_COMPILE)gcc
+CXX = $(CROSS_COMPILE)g++
+AR = $(CROSS_COMPILE)ar
+PKG_CONFIG ?= $(if $(call there,$(CROSS_COMPILE)pkg-config),$(CROSS_COMPILE)pkg-config,\
+	env PKG_CONFIG_LIBDIR=/usr/lib/$(CROSS_COMPILE:%-=%)/pkgconfig:/usr/share/pkgconfig pkg-config)
+endif
+PKG_CONFIG ?= pkg-config
 missing :=
 ifeq ($(call there,$(PKG_CONFIG)),)
 missing := $(firstword $(PKG_CONFIG))
@@ -61,11 +70,11 @@ unexport PKG_CONFIG
 endif
 
 # Goals that need no compiler or install it first; a kernel's headers name its own one.
-unbuilt_goals := help clean deps check check-full check-debian12 check-debian13 check-module-newest demo texture bench \
+unbuilt_goals := help clean deps check check-full check-debian12 check-debian13 check-container check-module-newest demo texture bench \
 	deb check-deb doc check-doc release wheel check-wheel uninstall readme-figures \
 	module module_install module_uninstall dkms_install dkms_uninstall check-module
 ifneq ($(filter-out $(unbuilt_goals),$(or $(MAKECMDGOALS),all)),)
-missing := $(foreach tool,$(firstword $(CC)) $(firstword $(AR)),$(if $(call there,$(tool)),,$(tool))) $(missing)
+missing := $(foreach tool,$(firstword $(CC)) $(firstword $(CXX)) $(firstword $(AR)),$(if $(call there,$(tool)),,$(tool))) $(missing)
 ifeq ($(strip $(missing)),)
 needed := libconfig $(if $(filter-out core,$(or $(MAKECMDGOALS),all)),sqlite3 zlib libcrypto jansson)
 missing := $(if $(shell $(PKG_CONFIG) --exists $(needed) || echo some),$(foreach lib,$(needed),\
@@ -73,6 +82,14 @@ missing := $(if $(shell $(PKG_CONFIG) --exists $(needed) || echo some),$(foreach
 endif
 ifneq ($(strip $(missing)),)
 $(error not installed: $(strip $(missing)): run 'make deps', which installs with apt what is needed)
+endif
+# Clang and gcc give one machine two names, which begin alike.
+machine_of = $(firstword $(subst -, ,$(shell $1 -dumpmachine)))
+ifneq ($(call machine_of,$(CC)),$(call machine_of,$(CXX)))
+$(error CC ($(CC)) builds for $(call machine_of,$(CC)), CXX ($(CXX)) for $(call machine_of,$(CXX)): set both, or CROSS_COMPILE)
+endif
+ifneq ($(shell echo __SIZEOF_INT128__ | $(CC) $(CFLAGS) -E -P -),16)
+$(error $(CC) has no integers of 128 bits, with which models are learned: incise needs a system of 64 bits)
 endif
 endif
 
@@ -85,6 +102,8 @@ CCACHE := $(CCACHE)
 cxxflags := -std=c++14 -fPIC -fvisibility=hidden -ffp-contract=off -Wall -Wextra
 warnings := -Wall -Wextra -Wmissing-prototypes -Wstrict-prototypes -Wvla \
 	-Werror=implicit-function-declaration
+# Rows that end early, texts in two parts and empty formats are meant; gcc does not warn of these.
+warnings += $(if $(findstring clang,$(CC)),$(addprefix -Wno-,missing-field-initializers string-concatenation format-zero-length))
 cflags := -std=gnu11 -fPIC -fvisibility=hidden -fno-math-errno -ffp-contract=off $(warnings)
 
 # One shared object per group of layers; a process maps only the ones it uses.
@@ -116,6 +135,7 @@ Q := $(if $(V),,@)
 step = $(if $(V),,@printf '  %-4s %s\n' $1 '$(patsubst $(O)/%,%,$@)')
 
 all: libs tools pages
+	@$(if $(left_out_names),echo "left out: $(left_out_names); 'make deps' installs what is in brackets")
 
 core: $(O)/lib/libincise.so ## what a loop needs: libincise.so, of libc and libconfig alone
 .PHONY: core

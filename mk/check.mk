@@ -63,7 +63,7 @@ part_deb := check-deb
 part_module := check-module
 part_wheel := check-wheel
 part_site := check-site
-part_bare := check-debian12 check-debian13
+part_bare := check-debian12 check-debian13 check-container
 part_programs := all cli-needs peers unit-programs
 full_parts := check plain cli attack fuzz python tsan rtsan vm clocks module deb wheel site bare
 PARTS ?= $(full_parts)
@@ -74,7 +74,7 @@ deps_module := module vm
 deps_deb := deb debian
 deps_wheel := wheel
 deps_site := site
-deps_bare := debian
+deps_bare := debian container
 
 # Guests in real time, and the check on other Debians, run alone at the end.
 check-parts:

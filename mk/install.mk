@@ -109,6 +109,11 @@ install: all ## install below $(DESTDIR)$(prefix)
 	done
 	sed -f udev/incise-feed@.service.sed "$(DESTDIR)$(unitdir)/incise-haptic@.service" \
 		>"$(DESTDIR)$(unitdir)/incise-feed@.service"
+	@$(if $(filter /usr /usr/local,$(prefix)),,printf '%s\n' \
+		"systemd and udev do not look below $(prefix); for the services type:" \
+		"  sudo systemctl link $(unitdir)/*.service" \
+		"  sudo systemd-sysusers $(sysusersdir)/*.conf && sudo systemd-tmpfiles --create $(tmpfilesdir)/*.conf" \
+		"  sudo ln -s $(udevrulesdir)/*.rules /etc/udev/rules.d/ && sudo udevadm control --reload")
 
 uninstall: ## remove what install recorded as installed
 	@if [ ! -e "$(DESTDIR)$(record)" ]; then \

@@ -80,14 +80,15 @@ $(hidden): $(call objects,incise) $(crypto_objects)
 #   libs_MODULE := -ljpeg                their libraries
 #   commands_MODULE := serve             commands that need the same
 #
-# One that misses what it needs is left out, with a line that says so.
+# One that misses what it needs is left out; the last line of make names it with its packages in
+# lib/base/features.def.
 left_out := $(if $(has_view),,incise-view)
-lacks_incise-view := $(pc_incise-view)
 commands_incise-view := view bench-view
 
 lacks = $(strip $(if $(pc_$1),$(shell $(PKG_CONFIG) --exists '$(pc_$1)' || echo '$(pc_$1)')) \
 	$(if $(headers_$1),$(shell $(CXX) -E -x c++ $(flags_$1) $(headers_$1:%=-include %) /dev/null \
-	>/dev/null 2>&1 || echo '$(headers_$1)')))
+	>/dev/null 2>&1 || echo '$(headers_$1)') \
+	$(if $(libs_$1),$(shell $(CXX) -shared -o /dev/null -x c /dev/null $(libs_$1) >/dev/null 2>&1 || echo '$(libs_$1)'))))
 take_module = $(eval folder_$1 := $2)$(eval beside_$1 := $(filter-out $1,$(modules)))\
 	$(eval lacks_$1 := $(call lacks,$1))$(eval $(if $(lacks_$1),left_out,add_ons) += $1)
 take_modules = $(foreach name,$(modules),$(call take_module,$(name),$1))
@@ -112,10 +113,6 @@ $(O)/lib/incise/$1.so: $$(objects_$1) $(hidden) $(O)/lib/libincise.so
 libs: $(O)/lib/incise/$1.so
 endef
 $(foreach name,$(add_ons),$(eval $(call add_on,$(name))))
-
-libs: $(left_out:%=left-out-%)
-left-out-%:
-	@printf '  %-4s %s\n' OUT '$(strip $* $(commands_$*:%=and incise %)): not found: $(lacks_$*); make deps installs it'
 
 # For unit tests, which reach into what the shared objects hide.
 # q, not r: rig/vision.c and vision/vision.cc are both vision.o.

@@ -104,4 +104,9 @@ check-debian13: ## CI's run on Debian 13, in a chroot
 	@mk/deps debian
 	@tests/debian/check trixie
 
-.PHONY: check-module check-module-newest check-debian12 check-debian13
+check-container: ## Containerfile on empty Debians 12 and 13, with the demo in it, by podman or chroot
+	@mk/deps debian container
+	@tests/debian/container bookworm
+	@tests/debian/container trixie
+
+.PHONY: check-module check-module-newest check-debian12 check-debian13 check-container

@@ -29,19 +29,20 @@ has_png := $(shell $(CC) -E -x c -include png.h /dev/null >/dev/null 2>&1 && ech
 $(O)/obj/tools/cli/image.o: cppflags += $(if $(has_png),-DHAVE_PNG)
 
 left_out_of_tools := $(if $(has_jpeg),,JPEG) $(if $(has_png),,PNG)
-lacks_JPEG := jpeglib.h
-lacks_PNG := png.h
-tools: $(left_out_of_tools:%=left-out-%)
 
-# incise doctor prints what this build leaves out, and is built again when that changes.
-left_out_names := $(subst $() $(),$(comma) ,$(sort $(left_out) $(left_out_of_tools) $(left_out_commands:%=incise-%)))
+# make's last line, incise --version and doctor print what this build leaves out: "PNG (libpng-dev), …".
+left_out_all := $(sort $(left_out) $(left_out_of_tools) $(left_out_commands:%=incise-%))
+features := $(if $(left_out_all),$(shell awk -F'"' '/^FEATURE/ { gsub(" ", "|", $$4); n = split($$2, name, " "); \
+	while (n) print name[n--] "=" $$4 }' lib/base/features.def))
+left_out_names := $(subst |, ,$(subst $() $(),$(comma) ,$(strip $(foreach name,$(left_out_all),\
+	$(name)|($(patsubst $(name)=%,%,$(filter $(name)=%,$(features))))))))
 ifneq ($(left_out_names),$(file <$(O)/obj/left-out))
 $(O)/obj/left-out: every-time
 endif
 $(O)/obj/left-out:
 	@mkdir -p $(@D); echo '$(left_out_names)' >$@
-$(O)/obj/tools/incise-doctor.o: $(O)/obj/left-out
-$(O)/obj/tools/incise-doctor.o: cppflags += -DLEFT_OUT='"$(left_out_names)"'
+$(O)/obj/tools/cli/features.o: $(O)/obj/left-out
+$(O)/obj/tools/cli/features.o: cppflags += -DLEFT_OUT='"$(left_out_names)"'
 .PHONY: every-time
 
 # The parts of all programs. The linker takes of them, and of the libraries, what a program
@@ -71,7 +72,7 @@ peer := $(if $(shell $(CXX) -E -x c++ -include fl/Headers.h /dev/null >/dev/null
 $(O)/lib/incise/peer_%.so: tools/bench/references/%.cc $(O)/lib/libincise.so
 	@mkdir -p $(@D) $(O)/obj/tools/bench/references
 	$(call step,LD)
-	$(Q)$(CXX) -std=c++14 -fPIC -fvisibility=hidden -Wall -Wextra $(cppflags) $(CPPFLAGS) $(CFLAGS) \
+	$(Q)$(CXX) -std=c++14 -fPIC -fvisibility=hidden -Wall -Wextra $(cppflags) $(CPPFLAGS) $(CXXFLAGS) \
 		-MMD -MP -MF $(O)/obj/tools/bench/references/$*.d -shared $(LDFLAGS) -o $@ $< \
 		-L$(O)/lib -lincise -l$*
 
@@ -163,7 +164,7 @@ deps: ## install the packages that building, testing and the demo need
 
 # The second make sees the packages that the first step brought.
 demo: ## walk paper 1 on the virtual rig; pictures and summary in demo.out/
-	@mk/deps build demo
+	@mk/deps demo
 	+@$(MAKE) --no-print-directory all
 	$(O)/bin/incise demo -o $(DEMO) --overwrite
 

@@ -363,6 +363,22 @@ static void film_scene(const char *scene, const char *folder)
 	free(name), free(film), free(strip);
 }
 
+/* A loop that gave no force shows nothing: the demo fails, and says why. */
+static void require_force(const struct demo *demo)
+{
+	const json_t *loop = json_object_get(demo->summary, "haptic");
+	const double skipped = json_number_value(json_object_get(loop, "skipped")),
+		     stale = json_number_value(json_object_get(loop, "stale")),
+		     ticks = json_number_value(json_object_get(loop, "ticks"));
+
+	if (!(json_number_value(json_object_get(loop, "force_max_N")) > 0))
+		cli_fail(
+			"the haptic loop gave no force: of %.0f ticks %.0f were skipped and "
+			"%.0f had no new pose; run the demo again with --duration 6s or more, "
+			"when less else runs",
+			ticks + skipped, skipped, stale);
+}
+
 int main(int argc, char **argv)
 {
 	struct demo_options options = {.demo = {.folder = "demo.out", .seed = 1},
@@ -383,10 +399,7 @@ int main(int argc, char **argv)
 		film_scene(options.scene, demo->folder);
 		return 0;
 	}
-	if (!plot_possible())
-		cli_fail(
-			"gnuplot is not installed, it draws the pictures: apt-get install "
-			"gnuplot-nox, or run 'make demo'");
+	plot_require();
 	begin_ns = cli_now_ns();
 	begin_folder(demo->folder);
 	plot = demo_path(demo, "plot");
@@ -414,6 +427,7 @@ int main(int argc, char **argv)
 		       demo->folder);
 	}
 	cli_finish();
+	require_force(demo);
 	incise_model_free(model);
 	json_decref(demo->summary);
 	return 0;

@@ -216,9 +216,9 @@ static void check_modules(struct doctor *doctor)
 	    "make && sudo make install    # or the package libincise2",
 	    "%d modules of devices and file formats", n);
 	features_each(add_module, doctor);
-	if (*LEFT_OUT)
+	if (*features_left_out)
 		add(doctor, "modules", "left out", OK, NULL,
-		    "this incise was built without " LEFT_OUT);
+		    "this incise was built without %s", features_left_out);
 }
 
 #define GLANCE_S 1.0

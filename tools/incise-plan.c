@@ -80,6 +80,7 @@ static double model_ns(const struct incise_plan *plan, enum incise_cutting_phase
 			sum += incise_plan_model_force(plan, phase, x[k]);
 		ns[round] = (stopwatch_ns() - begin) / PLACES;
 	}
+	(void)sum;
 	stopwatch_sort(ns, ROUNDS);
 	return stopwatch_middle(ns, ROUNDS);
 }

@@ -131,6 +131,8 @@ static const char *const synonyms[][2] = {
 static int unknown_command(const char *word)
 {
 	const char *names[COMMANDS + 2] = {"help"}, *nearest;
+	const char *remedy;
+	char *program = cli_text("incise-%.64s", word);
 
 	if (!strcmp(word, "rig")) {
 		cli_error("'rig': is now 'incise info rig'");
@@ -142,9 +144,14 @@ static int unknown_command(const char *word)
 	for (size_t i = 0; i < sizeof(synonyms) / sizeof(*synonyms); i++)
 		if (!strcmp(word, synonyms[i][0]))
 			nearest = synonyms[i][1];
-	if (nearest && !strcmp(nearest, word))
-		cli_error("'%s': this incise was built without it; 'incise doctor' lists "
-			  "what is left out, and 'make' what it needs",
+	remedy = features_remedy(program);
+	free(program);
+	if (nearest && !strcmp(nearest, word) && remedy)
+		cli_error(
+			"'%s': this incise was built without it; %s, and build it again",
+			word, remedy);
+	else if (nearest && !strcmp(nearest, word))
+		cli_error("'%s': its program is not beside incise; install incise again",
 			  word);
 	else if (nearest)
 		cli_error("'%.64s': no such command; did you mean 'incise %s'?", word,

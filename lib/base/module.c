@@ -52,7 +52,7 @@ int incise_module_open(struct incise_module *module, const char *path, const cha
 }
 
 int incise_module_find(struct incise_module *module, const char *file, const char *symbol,
-		       const char *where, const char *packages, struct incise_error *err)
+		       const char *where, struct incise_error *err)
 {
 	char in[PATH_MAX], path[PATH_MAX + 80];
 
@@ -61,29 +61,47 @@ int incise_module_find(struct incise_module *module, const char *file, const cha
 		if (!access(path, R_OK))
 			return incise_module_open(module, path, symbol, where, err);
 	}
-	return incise_module_absent(file, where, packages, err);
+	return incise_module_absent(file, where, err);
 }
 
-int incise_module_absent(const char *file, const char *where, const char *packages,
-			 struct incise_error *err)
+const char *incise_module_packages(const char *module, bool whole)
 {
-	char in[PATH_MAX];
+	static const char *const features[][2] = {
+#define FEATURE(names, apt, pip) {names, apt},
+#include "features.def"
+	};
+	const size_t length = strlen(module);
 
-	return incise_error_set(err, ENOENT,
-				"%s: no module %s in %.300s; build and install incise "
-				"where %s, or set INCISE_MODULE_PATH",
-				where, file,
-				incise_module_folder(in, sizeof(in)) ? in : "any folder",
-				packages);
+	for (size_t i = 0; i < sizeof(features) / sizeof(*features); i++)
+		for (const char *at = features[i][0]; (at = strstr(at, module)); at++)
+			if ((at == features[i][0] || at[-1] == ' ' || !whole) &&
+			    (!at[length] || at[length] == ' '))
+				return features[i][1];
+	return NULL;
+}
+
+int incise_module_absent(const char *file, const char *where, struct incise_error *err)
+{
+	char in[PATH_MAX], module[40];
+	const char *packages;
+
+	snprintf(module, sizeof(module), "%.*s", (int)strcspn(file, "."), file);
+	packages = incise_module_packages(module, true);
+	return incise_error_set(
+		err, ENOENT,
+		"%s: no module %s in %.300s; %s%s%s build incise again, or "
+		"set INCISE_MODULE_PATH",
+		where, file, incise_module_folder(in, sizeof(in)) ? in : "any folder",
+		packages ? "apt-get install " : "", packages ? packages : "",
+		packages ? " and" : "");
 }
 
 const void *incise_module_load(const char *file, const char *symbol, unsigned int abi,
-			       const char *where, const char *packages,
-			       struct incise_error *err)
+			       const char *where, struct incise_error *err)
 {
 	struct incise_module module;
 
-	if (incise_module_find(&module, file, symbol, where, packages, err))
+	if (incise_module_find(&module, file, symbol, where, err))
 		return NULL;
 	if (*(const unsigned int *)module.symbol == abi)
 		return module.symbol;

@@ -29,18 +29,22 @@ int incise_module_open(struct incise_module *module, const char *path, const cha
 
 /* The same for a file of the folder; -ENOENT: see below. */
 int incise_module_find(struct incise_module *module, const char *file, const char *symbol,
-		       const char *where, const char *packages, struct incise_error *err);
+		       const char *where, struct incise_error *err);
 
-/* -ENOENT, with the packages that its build needs: "libx-dev is". */
-int incise_module_absent(const char *file, const char *where, const char *packages,
-			 struct incise_error *err);
+/* -ENOENT, with the packages that its build needs. */
+int incise_module_absent(const char *file, const char *where, struct incise_error *err);
+
+/*
+ * The packages by which a module "KIND_NAME" is built, "libx-dev liby-dev"; @whole false: of the first whose name
+ * ends so, "_NAME". NULL: it needs none, or there is no such module.
+ */
+const char *incise_module_packages(const char *module, bool whole);
 
 /*
  * Its symbol, a struct that begins with the version of its interface, for good. NULL with errno of
  * incise_module_find(), and ENOEXEC for another version.
  */
 const void *incise_module_load(const char *file, const char *symbol, unsigned int abi,
-			       const char *where, const char *packages,
-			       struct incise_error *err);
+			       const char *where, struct incise_error *err);
 
 #endif

@@ -14,7 +14,7 @@ int incise_ranks_open(const struct incise_ranks **ranks, struct incise_error *er
 	struct incise_module module;
 	joiner *join;
 	int rc = incise_module_find(&module, FILE_NAME, "incise_ranks_join",
-				    "--share mpi", "libopenmpi-dev is", err);
+				    "--share mpi", err);
 
 	if (rc)
 		return rc;

@@ -19,12 +19,12 @@ static const struct format {
 	const char *name, *extensions;
 	enum { CHOICE, ALWAYS } lineage;
 	const struct incise_table_format *built_in; /* NULL: of a module */
-	const char *id, *package;
+	const char *id;
 } formats[] = {
 #define FORMAT(id, name, extensions, magic, lineage) \
-	{name, extensions, lineage, &incise_table_##id, #id, NULL},
-#define MODULE(id, name, extensions, magic, lineage, package) \
-	{name, extensions, lineage, NULL, #id, package},
+	{name, extensions, lineage, &incise_table_##id, #id},
+#define MODULE(id, name, extensions, magic, lineage) \
+	{name, extensions, lineage, NULL, #id},
 	INCISE_FORMATS(FORMAT, MODULE)};
 
 /* Number of the formats that hold rows: the first ones. */
@@ -56,15 +56,13 @@ static const struct format *find_format(const char *path)
 static const struct incise_table_format *load_format(const struct format *format,
 						     struct incise_error *err)
 {
-	char file[40], symbol[40], package[40];
+	char file[40], symbol[40];
 
 	if (format->built_in)
 		return format->built_in;
 	snprintf(file, sizeof(file), "export_%s.so", format->id);
 	snprintf(symbol, sizeof(symbol), "incise_table_%s", format->id);
-	snprintf(package, sizeof(package), "%s is", format->package);
-	return incise_module_load(file, symbol, INCISE_TABLE_ABI, format->name, package,
-				  err);
+	return incise_module_load(file, symbol, INCISE_TABLE_ABI, format->name, err);
 }
 
 void incise_export_options_init(struct incise_export_options *options)

@@ -4,7 +4,7 @@
  * help, and the kinds of files are made of it. The first one is that of any other extension.
  *
  *   FORMAT(id, name, extensions, magic, lineage)   incise_table_ID is in a file of this folder
- *   MODULE(… the same …, package)                  it is in lib/incise/export_ID.so, built with this package
+ *   MODULE(… the same …)                           it is in the module export_ID.so
  *     magic    first bytes of a file; "": none
  *     lineage  its provenance is there ALWAYS, or by CHOICE
  */
@@ -14,7 +14,7 @@
 /* They hold rows of any recordings. */
 #define INCISE_FORMATS_OF_ROWS(FORMAT, MODULE) \
 	FORMAT(csv, "CSV", ".csv", "", CHOICE) \
-	MODULE(hdf5, "HDF5", ".h5 .hdf5", "\x89HDF\r\n\x1a\n", ALWAYS, "libhdf5-dev")
+	MODULE(hdf5, "HDF5", ".h5 .hdf5", "\x89HDF\r\n\x1a\n", ALWAYS)
 
 /* They hold messages: all rows of one recording. */
 #define INCISE_FORMATS_OF_MESSAGES(FORMAT, MODULE) \

@@ -12,8 +12,7 @@
 static const struct incise_frames_module *load_frames(struct incise_error *err)
 {
 	return incise_module_load("frames_mkv.so", INCISE_FRAMES_SYMBOL,
-				  INCISE_FRAMES_ABI, "camera",
-				  "libavformat-dev and libavcodec-dev are", err);
+				  INCISE_FRAMES_ABI, "camera", err);
 }
 
 struct incise_frames_writer *incise_frames_writer_new(

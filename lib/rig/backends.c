@@ -104,9 +104,23 @@ int incise_backend_find(struct incise_loaded *loaded, const char *kind, const ch
 			return load_backends(loaded, kind, name, path, where, err);
 	}
 	list_backends(kind, has_folder ? in : NULL, known, sizeof(known));
+	return incise_backend_absent(kind, name, where, known, err);
+}
+
+int incise_backend_absent(const char *kind, const char *name, const char *where,
+			  const char *known, struct incise_error *err)
+{
+	char module[80];
+	const char *packages;
+
+	snprintf(module, sizeof(module), "%.30s_%.40s", kind, name);
+	packages = incise_module_packages(module, *kind);
 	return incise_error_set(err, ENODEV,
-				"%s: no such backend \"%.40s\"; there are: %s", where,
-				name, known);
+				"%s: no %sbackend \"%.40s\"%s%s%s; there are: %.160s",
+				where, packages ? "" : "such ", name,
+				packages ? " in this build: apt-get install " : "",
+				packages ? packages : "",
+				packages ? ", and build incise again" : "", known);
 }
 
 void incise_backend_unload(struct incise_loaded *loaded)

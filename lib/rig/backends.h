@@ -39,6 +39,12 @@ struct incise_loaded {
 int incise_backend_find(struct incise_loaded *loaded, const char *kind, const char *name,
 			const char *where, struct incise_error *err);
 
+/*
+ * -ENODEV: the message lists the @known ones, and the packages by which this one is built. @kind "": of any.
+ */
+int incise_backend_absent(const char *kind, const char *name, const char *where,
+			  const char *known, struct incise_error *err);
+
 /* All backends of a kind, without "sim"; how many. */
 int incise_backend_names(const char *kind, char names[][32], int capacity);
 

@@ -10,17 +10,14 @@ typedef int loader(const char *where, const struct incise_outlets **outlets,
 int incise_outlets_open(const char *where, enum incise_outlet_protocol protocol,
 			const struct incise_outlets **outlets, struct incise_error *err)
 {
-	static const struct {
-		const char *file, *packages;
-	} modules[] = {
-		[INCISE_OUTLET_LSL] = {"outlet_lsl.so", "a C compiler is"},
-		[INCISE_OUTLET_ROS2] = {"outlet_ros2.so", "cyclonedds-dev is"},
+	static const char *const modules[] = {
+		[INCISE_OUTLET_LSL] = "outlet_lsl.so",
+		[INCISE_OUTLET_ROS2] = "outlet_ros2.so",
 	};
 	struct incise_module module;
 	loader *load;
-	int rc =
-		incise_module_find(&module, modules[protocol].file, "incise_outlets_load",
-				   where, modules[protocol].packages, err);
+	int rc = incise_module_find(&module, modules[protocol], "incise_outlets_load",
+				    where, err);
 
 	if (rc)
 		return rc;

@@ -72,11 +72,7 @@ static int find_any(struct incise_loaded *loaded, struct kind_found *of, const c
 			snprintf(known + used, sizeof(known) - used, ", %s", names[i]);
 		}
 	}
-	return rc == -ENODEV ? incise_error_set(err, ENODEV,
-						"%s: no such backend \"%.40s\"; there "
-						"are: %.160s",
-						where, name, known)
-			     : rc;
+	return rc == -ENODEV ? incise_backend_absent("", name, where, known, err) : rc;
 }
 
 #define PAGES "/dev/shm"

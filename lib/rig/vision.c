@@ -13,8 +13,7 @@
 #include "../base/module.h"
 
 /* Open the module @kind through its backend: NULL with errno. */
-static void *open_module(const char *kind, const char *packages,
-			 const struct incise_vision_setup *setup,
+static void *open_module(const char *kind, const struct incise_vision_setup *setup,
 			 struct incise_error *err)
 {
 	struct incise_backend_request request = {
@@ -30,7 +29,7 @@ static void *open_module(const char *kind, const char *packages,
 		return loaded.backend->open(&request, err);
 	snprintf(file, sizeof(file), "%s_opencv.so", kind);
 	if (rc == -ENODEV)
-		rc = incise_module_absent(file, kind, packages, err);
+		rc = incise_module_absent(file, kind, err);
 	errno = -rc;
 	return NULL;
 }
@@ -38,8 +37,7 @@ static void *open_module(const char *kind, const char *packages,
 struct incise_vision *incise_vision_new(const struct incise_vision_setup *setup,
 					struct incise_error *err)
 {
-	return open_module("vision", "libopencv-imgproc-dev and libjpeg-dev are", setup,
-			   err);
+	return open_module("vision", setup, err);
 }
 
 void incise_vision_free(struct incise_vision *vision)
@@ -74,8 +72,7 @@ int incise_vision_learn(const struct incise_camera_frame *frame,
 int incise_board_find(const struct incise_camera_frame *frame, int columns, int rows,
 		      double *corners, struct incise_error *err)
 {
-	struct incise_board *board =
-		open_module("board", "libopencv-calib3d-dev is", NULL, err);
+	struct incise_board *board = open_module("board", NULL, err);
 	int rc;
 
 	if (!board)

@@ -26,7 +26,7 @@ struct incise_film {
 static const struct incise_film_module *load_film(struct incise_error *err)
 {
 	return incise_module_load("film_mkv.so", INCISE_FILM_SYMBOL, INCISE_FILM_ABI,
-				  "film", "libavformat-dev and libavcodec-dev are", err);
+				  "film", err);
 }
 
 /* Keeps errno. */

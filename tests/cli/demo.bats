@@ -12,7 +12,7 @@ setup() {
 # Made once, from a folder of its own, into one whose name is awkward.
 need_demo() {
 	[ -e "$demo" ] || (cd "$BATS_FILE_TMPDIR" &&
-		incise demo -o "my demo's" --duration 6s --seed 3 >printed 2>warned)
+		incise demo -o "my demo's" --duration 6s --seed 3 >printed 2>warned || [ $? = 1 ])
 }
 
 pictures="fig2-force fig3a-membership fig3b-surface fig5-prediction tick-lateness camera"
@@ -110,6 +110,22 @@ pictures="fig2-force fig3a-membership fig3b-surface fig5-prediction tick-latenes
 	cd copy/plot
 	gnuplot -e "ext='png'" fig3b-surface.gp
 	[ "$(stat -c %s ../fig3b-surface.png)" -gt 5000 ]
+}
+
+@test "a demo whose loop gave no force says so, and fails with its results in place" {
+	mkdir bin
+	ln -s "$INCISE_BUILD"/bin/* bin
+	rm bin/incise-haptic bin/incise-demo
+	cp "$INCISE_BUILD/bin/incise-demo" bin # it runs the programs beside its own file
+	cat >bin/incise-haptic <<-X
+		#!/bin/sh
+		"$INCISE_BUILD/bin/incise-haptic" "\$@" | sed 's/"force_max_N": [^,]*/"force_max_N": 0/'
+	X
+	chmod +x bin/incise-haptic
+	LD_LIBRARY_PATH=$INCISE_BUILD/lib run -1 --separate-stderr bin/incise-demo -o short --duration 0.2s
+	[[ "${stderr##*$'\n'}" == "incise demo: the haptic loop gave no force: "*"run the demo again"* ]] || complain "$stderr"
+	[ -s short/summary.json ]
+	[ ! -e short/.unfinished ]
 }
 
 @test "demo does not write into a folder that exists" {

@@ -189,9 +189,11 @@ load cli
 	[ ! -s err ] || complain "$(cat err)"
 }
 
-@test "a command that was left out of the build is said" {
+@test "a command that was left out of the build names its packages" {
 	mkdir bin
 	cp "$INCISE_BUILD/bin/incise" bin
 	PATH=/usr/bin:/bin LD_LIBRARY_PATH=$INCISE_BUILD/lib run -2 --separate-stderr bin/incise serve
-	[ "$stderr" = "incise: 'serve': this incise was built without it; 'incise doctor' lists what is left out, and 'make' what it needs" ] || complain "$stderr"
+	[ "$stderr" = "incise: 'serve': this incise was built without it; apt-get install libopenigtlink-dev, and build it again" ] || complain "$stderr"
+	PATH=/usr/bin:/bin LD_LIBRARY_PATH=$INCISE_BUILD/lib run -2 --separate-stderr bin/incise train
+	[[ "$stderr" == "incise: 'train': its program is not beside incise;"* ]] || complain "$stderr"
 }

@@ -176,3 +176,25 @@ setup() {
 	[[ "$stderr" == *"mine is no build folder"* ]]
 	[ -e mine/data.rec ]
 }
+
+@test "make refuses compilers of two machines, and of 32 bits; CROSS_COMPILE sets all tools" {
+	for tool in gcc g++ ar pkg-config; do
+		cat >"x-$tool" <<-'X'
+			#!/bin/sh
+			case "$*" in -dumpmachine) echo "$MACHINE" ;; *-E*-P*) echo "$SIZE" ;; esac
+		X
+		chmod +x "x-$tool"
+	done
+	make_n() {
+		run make -n -C "$BATS_TEST_DIRNAME/../.." O="$PWD/new" CCACHE= "$@"
+	}
+	MACHINE=mips-linux-gnu SIZE=16 make_n CXX="$PWD/x-g++"
+	[ "$status" = 2 ]
+	[[ "$output" == *"CC (cc) builds for "*", CXX ($PWD/x-g++) for mips: set both, or CROSS_COMPILE"* ]] || complain "$output"
+	MACHINE=mips-linux-gnu SIZE=__SIZEOF_INT128__ make_n CROSS_COMPILE="$PWD/x-"
+	[ "$status" = 2 ]
+	[[ "$output" == *"$PWD/x-gcc has no integers of 128 bits"* ]] || complain "$output"
+	MACHINE=mips-linux-gnu SIZE=16 make_n CROSS_COMPILE="$PWD/x-" V=1
+	[ "$status" = 0 ] || complain "$output"
+	[[ "$output" == *"$PWD/x-gcc "*"$PWD/x-g++ "*"$PWD/x-ar "* ]]
+}

@@ -125,3 +125,25 @@ without_library() {
 	cp "$INCISE_BUILD/lib/libincise-view.so.2" lib
 	run -0 bin/incise view --help
 }
+
+@test "a backend that this build lacks is named with the package that brings it" {
+	mkdir -p modules && rm -f modules/*
+	fails incise info usb: -- 'usb:: no backend "usb" in this build: apt-get install libusb-1.0-0-dev, and build incise again; there are: sim'
+	fails incise info canopen:x -- 'no such backend "canopen"; there are: sim'
+}
+
+@test "features have packages of mk/packages, and each module that needs a package is a feature" {
+	cd "$BATS_TEST_DIRNAME/../.."
+	sed -n 's/^FEATURE("\([^"]*\)", "\([^"]*\)", .*/\1|\2/p' lib/base/features.def >"$BATS_TEST_TMPDIR/rows"
+	[ "$(wc -l <"$BATS_TEST_TMPDIR/rows")" = "$(grep -c '^FEATURE(' lib/base/features.def)" ]
+	for package in $(cut -d'|' -f2 "$BATS_TEST_TMPDIR/rows"); do
+		grep -q "^$package " mk/packages || complain "mk/packages has no $package"
+	done
+	cut -d'|' -f1 "$BATS_TEST_TMPDIR/rows" | tr ' ' '\n' | sort >"$BATS_TEST_TMPDIR/names"
+	[ -z "$(uniq -d "$BATS_TEST_TMPDIR/names")" ]
+	sed -n 's/^\(pc\|headers\)_\([a-z0-9_]*\) := .*/\2/p' lib/*/module.mk lib/*/*/module.mk | sort -u >"$BATS_TEST_TMPDIR/needy"
+	[ "$(wc -l <"$BATS_TEST_TMPDIR/needy")" -ge 12 ]
+	while read -r module; do
+		grep -qx "$module" "$BATS_TEST_TMPDIR/names" || complain "lib/base/features.def has no $module"
+	done <"$BATS_TEST_TMPDIR/needy"
+}

@@ -10,6 +10,7 @@
 #include <unistd.h>
 #include <incise/infile.h>
 #include "../cli/calibration.h"
+#include "../cli/features.h"
 #include "../cli/file.h"
 #include "../cli/folder.h"
 #include "../cli/json.h"
@@ -259,8 +260,8 @@ static void write_report(const struct calibrate_kind *kind, const struct calibra
 
 	folder_make_all(c->report);
 	if (!plot_possible()) {
-		cli_warn("gnuplot is not installed, so there are no plots; apt-get "
-			 "install gnuplot-nox");
+		cli_warn("gnuplot is not installed, so there are no plots; %s",
+			 features_remedy("gnuplot"));
 	} else {
 		plot_folder(c->report);
 		if (!c->refused && kind->draw)

@@ -74,6 +74,29 @@ void features_each(void (*found)(void *context, const struct feature *feature),
 	free(entries);
 }
 
+const char features_left_out[] = LEFT_OUT;
+
+const char *features_remedy(const char *name)
+{
+	static const char *const features[][3] = {
+#define FEATURE(names, apt, pip) {" " names " ", apt, pip},
+#include "../../lib/base/features.def"
+	};
+	static char remedy[200];
+	char word[80];
+
+	snprintf(word, sizeof(word), " %.70s ", name);
+	for (size_t i = 0; i < sizeof(features) / sizeof(*features); i++)
+		if (strstr(features[i][0], word)) {
+			snprintf(remedy, sizeof(remedy), "apt-get install %s%s%s",
+				 features[i][1],
+				 *features[i][2] ? ", or pip install " : "",
+				 features[i][2]);
+			return remedy;
+		}
+	return NULL;
+}
+
 /* --- a line for each kind --- */
 
 #define FORMAT_NAME(id, ...) ", " #id
@@ -144,6 +167,8 @@ void features_print(FILE *out)
 			*lines.text[i] ? lines.text[i] : "none");
 	print_library(out, "sqlite", RECORD_LIBRARY, "sqlite3_libversion");
 	print_library(out, "view", VIEW_LIBRARY, NULL);
+	if (*features_left_out)
+		fprintf(out, "  %-11s%s\n", "left out", features_left_out);
 	if (incise_module_folder(folder, sizeof(folder)))
 		fprintf(out, "  %-11s%s\n", "modules", folder);
 }

@@ -22,6 +22,15 @@ struct feature {
 void features_each(void (*found)(void *context, const struct feature *feature),
 		   void *context);
 
+/* The features that this build leaves out, with their packages: "PNG (libpng-dev), …". */
+extern const char features_left_out[];
+
+/*
+ * "apt-get install PACKAGES[, or pip install PACKAGE]" for a name of lib/base/features.def, until the next
+ * call. NULL: it has no row.
+ */
+const char *features_remedy(const char *name);
+
 /* Print a line for each kind of module, for SQLite and for the view. */
 void features_print(FILE *out);
 

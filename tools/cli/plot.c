@@ -14,6 +14,7 @@
 #include <incise/infile.h>
 #include "child.h"
 #include "cli.h"
+#include "features.h"
 #include "../../lib/base/control_character.h"
 #include "../origin/origins.h"
 #include "file.h"
@@ -90,8 +91,8 @@ bool plot_possible(void)
 void plot_require(void)
 {
 	if (!plot_possible())
-		cli_fail("gnuplot is not installed, which draws the plots; apt-get "
-			 "install gnuplot-nox");
+		cli_fail("gnuplot is not installed, which draws the plots; %s",
+			 features_remedy("gnuplot"));
 }
 
 static FILE *open_plot(const char *folder, const char *name, const char *suffix)

@@ -8,6 +8,7 @@
 #include <string.h>
 #include "child.h"
 #include "cli.h"
+#include "features.h"
 #include "file.h"
 #include "report_script.h"
 
@@ -49,9 +50,8 @@ int report_script(const char *what, const char *folder, const json_t *data, FILE
 	status = child_run(argv, fileno(in.file), out ? fileno(out) : -1,
 			   fileno(said.file));
 	if (status < 0)
-		rc = incise_error_set(err, errno,
-				      "report: %s: %s; install python3-jinja2",
-				      REPORT_PYTHON, strerror(errno));
+		rc = incise_error_set(err, errno, "report: %s: %s; %s", REPORT_PYTHON,
+				      strerror(errno), features_remedy("jinja2"));
 	else if (status)
 		rc = failed_report_script(said.file, err);
 	fclose(in.file);

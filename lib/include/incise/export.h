@@ -36,8 +36,11 @@
 #define INCISE_PRINTF(fmt, args)
 #endif
 
-/* Attribute of a function type; this form works in C and C++. */
-#if defined(__clang__) && defined(__has_attribute)
+/*
+ * Attribute of a function type; this form works in C and C++. Clang 19 knows it, and warns of each
+ * definition that does not repeat it.
+ */
+#if defined(__clang__) && __clang_major__ > 19
 #if __has_attribute(nonblocking)
 #define INCISE_REALTIME __attribute__((nonblocking))
 #endif
