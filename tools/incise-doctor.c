@@ -27,6 +27,7 @@
 #include "cli/features.h"
 #include "cli/file.h"
 #include "cli/json.h"
+#include "cli/report_script.h"
 #include "doctor/protocol.h"
 
 #define CHECKS_MAX 120
@@ -219,6 +220,28 @@ static void check_modules(struct doctor *doctor)
 	if (*features_left_out)
 		add(doctor, "modules", "left out", OK, NULL,
 		    "this incise was built without %s", features_left_out);
+}
+
+/* Programs that other commands call. */
+static void check_programs(struct doctor *doctor)
+{
+	char *const jinja2[] = {REPORT_PYTHON, "-B", "-c", "import jinja2", NULL};
+	const struct {
+		const char *name, *what;
+		bool there;
+	} programs[] = {
+		{"gnuplot", "plots", child_possible("gnuplot")},
+		{"jinja2", "HTML reports", !child_run(jinja2, -1, -1, -1)},
+	};
+
+	for (size_t i = 0; i < sizeof(programs) / sizeof(*programs); i++) {
+		char *fix = cli_text("sudo %s", features_remedy(programs[i].name));
+
+		add(doctor, "programs", programs[i].name,
+		    programs[i].there ? OK : WARNING, fix, "%s%s",
+		    programs[i].there ? "draws " : "is missing: no ", programs[i].what);
+		free(fix);
+	}
 }
 
 #define GLANCE_S 1.0
@@ -445,8 +468,7 @@ static void check_rig(struct doctor *doctor)
 
 	if (!rig) {
 		add(doctor, "devices", "rig", WARNING,
-		    "sudo cp /usr/share/incise/rig.conf.example /etc/incise/rig.conf    # "
-		    "then edit it",
+		    "incise init    # asks for its devices, and writes it",
 		    "there is neither ./rig.conf nor /etc/incise/rig.conf");
 		return;
 	}
@@ -608,12 +630,18 @@ static void check_calibration(struct doctor *doctor)
 	const char *path = doctor->calibration	   ? doctor->calibration
 			   : calibration_default() ? calibration_default()
 						   : "calibration.conf";
+	/* incise init goes on with the files of this folder. */
+	bool leads = doctor->rig && !strcmp(doctor->rig, "rig.conf") &&
+		     !strcmp(path, "calibration.conf");
+	unsigned int devices =
+		doctor->has_rig ? calibration_devices(doctor->rig, NULL) : 0;
 	json_t *report, *kind;
 	size_t i;
 
 	if (access(path, F_OK)) {
 		add(doctor, "calibration", "file",
-		    doctor->calibration ? PROBLEM : WARNING, "incise help calibrate",
+		    doctor->calibration ? PROBLEM : WARNING,
+		    leads ? "incise init" : "incise help calibrate",
 		    "%s: %s; nominal values apply", path, strerror(errno));
 		return;
 	}
@@ -630,11 +658,16 @@ static void check_calibration(struct doctor *doctor)
 		const char *why = json_string_value(json_object_get(kind, "why"));
 		double days = json_number_value(json_object_get(kind, "age_days"));
 		bool due = json_is_true(json_object_get(kind, "due"));
-		char *fix = cli_text("incise calibrate %s", name ? name : "");
+		bool old = json_is_string(json_object_get(kind, "date"));
+		char *fix = leads && !old
+				    ? cli_text("incise init")
+				    : cli_text("incise calibrate %s", name ? name : "");
 
 		/* The report, with the names, is released below. */
 		name = cli_text("%s", name ? name : "");
-		if (due)
+		if (devices && !calibration_needed(name, devices))
+			;
+		else if (due)
 			add(doctor, "calibration", name, WARNING, fix, "%s",
 			    why ? why : "due");
 		else
@@ -687,6 +720,31 @@ static int count_doctor(const struct doctor *doctor, enum state state)
 	return n;
 }
 
+/* The one command to type now. */
+static const char *choose_next(const struct doctor *doctor)
+{
+	static const struct {
+		const char *group, *name; /* NULL: any */
+		enum state state;
+	} order[] = {
+		{"devices", "rig", WARNING}, /* there is none */
+		{NULL, NULL, PROBLEM},
+		{"calibration", NULL, WARNING},
+	};
+
+	for (size_t i = 0; i < sizeof(order) / sizeof(*order); i++)
+		for (int j = 0; j < doctor->n; j++) {
+			const struct check *check = &doctor->check[j];
+
+			if (check->state == order[i].state && *check->fix &&
+			    (!order[i].group || !strcmp(order[i].group, check->group)) &&
+			    (!order[i].name || !strcmp(order[i].name, check->name)))
+				return check->fix;
+		}
+	return doctor->has_tracker && doctor->has_force ? "incise capture -o first.rec"
+							: "incise haptic liver";
+}
+
 static void print(const struct doctor *doctor)
 {
 	const char *group = "";
@@ -707,6 +765,7 @@ static void print(const struct doctor *doctor)
 	printf("\n%s, %s\n", cli_count(count_doctor(doctor, PROBLEM), "problem"),
 	       cli_count(count_doctor(doctor, WARNING), "warning"));
 	cli_written();
+	printf("next: %s\n", choose_next(doctor));
 }
 
 static json_t *make_doctor_json(const struct doctor *doctor)
@@ -726,9 +785,10 @@ static json_t *make_doctor_json(const struct doctor *doctor)
 							: json_text(check->fix)));
 	}
 	return json_pack(
-		"{s:o, s:i, s:i, s:o, s:o}", "checks", checks, "problems",
+		"{s:o, s:i, s:i, s:o, s:o, s:o}", "checks", checks, "problems",
 		count_doctor(doctor, PROBLEM), "warnings", count_doctor(doctor, WARNING),
-		"recording_min", json_number(doctor->recording_min), "haptic",
+		"next", json_text(choose_next(doctor)), "recording_min",
+		json_number(doctor->recording_min), "haptic",
 		doctor->haptic_measured ? protocol_json(&doctor->protocol) : json_null());
 }
 
@@ -829,6 +889,7 @@ int main(int argc, char **argv)
 	check_realtime(&doctor);
 	check_module(&doctor);
 	check_modules(&doctor);
+	check_programs(&doctor);
 	check_rig(&doctor);
 	check_attached(&doctor);
 	check_display(&doctor);

@@ -18,6 +18,8 @@
 #include <unistd.h>
 #include <incise/calibration.h>
 #include <incise/rig.h>
+#include <incise/scan.h>
+#include "cli/calibration.h"
 #include "cli/child.h"
 #include "cli/cli.h"
 
@@ -65,29 +67,27 @@ static const struct {
 	[HAPLY] = {"real", {"", "", "", "", "haply:"}},
 };
 
-/* Calibrations in their order. They need all of these devices, and none of those. */
+/* Calibrations in their order. */
 static const struct calibration {
 	const char *kind;
-	unsigned int needs, without;
 	const char *what, *posture, *real, *simulated;
 } calibrations[] = {
-	{"force", 1 << FORCE, 0, "volts to newtons",
+	{"force", "volts to newtons",
 	 "put known weights on the sensor when it asks for them", "",
 	 "--weights 0,50g,100g,200g,300g"},
-	{"depth", 1 << CAMERA, 0, "pixels to millimetres",
+	{"depth", "pixels to millimetres",
 	 "hold the scalpel in the air, with its whole black handle in view",
 	 "two-point --images 50", "two-point --images 20"},
-	{"tip", 1 << TRACKER, 1 << HAPTIC, "where the blade's tip is on the sensor",
+	{"tip", "where the blade's tip is on the sensor",
 	 "rest the tip in a dimple and rotate the tool by 60 degrees", "--duration 20s",
 	 "--rig sim:clock=simulated,motion=1 --duration 20s --given-u surface=0.1"},
-	{"delay", 1 << TRACKER | 1 << FORCE, 1 << HAPTIC, "how late each stream comes",
+	{"delay", "how late each stream comes",
 	 "press the tip on foam and lift off, irregularly", "--duration 15s",
 	 "--rig sim:clock=simulated,motion=2 --duration 15s --given-u reference=0.01"},
-	{"stepper", 1 << STEPPER, 1 << HAPTIC,
-	 "what the actuator loses to friction and play",
+	{"stepper", "what the actuator loses to friction and play",
 	 "put the handle on the force sensor, hands off", "--repeat 3",
 	 "--rig sim:clock=simulated,bench=1 --repeat 2"},
-	{"frame", 1 << HAPTIC, 0, "where the device is in the scene",
+	{"frame", "where the device is in the scene",
 	 "touch three to six points that the scene knows", NULL, NULL},
 };
 
@@ -221,14 +221,21 @@ static int add_key(void *context, const struct incise_key *key)
 	return 0;
 }
 
-/* As libconfig wants it: text in quotes. A quote or a backslash would end it. */
+/*
+ * As libconfig wants it: text in quotes. A quote or a backslash would end it. The backend has to be
+ * there, but not the device: it may be attached later.
+ */
 static void put_device(FILE *draft, const char *key, const char *spec)
 {
+	struct incise_error err = {0};
+
 	if (strpbrk(spec, "\"\\\n"))
 		cli_fail(
 			"%s: '%s' has a quote, a backslash or a line's end; name the device "
 			"without one",
 			key, spec);
+	if (incise_scan(key, spec, NULL, NULL, &err))
+		cli_fail("%s: %s", key, err.text);
 	fprintf(draft, "%s = \"%s\";\n", key, spec);
 }
 
@@ -315,24 +322,6 @@ static void write_rig(const struct init *init)
 
 /* --- calibrations ------------------------------------------------------------------------ */
 
-/* The devices of rig.conf, as bits; SIMULATED: all of them. */
-#define SIMULATED (1U << DEVICES)
-#define RECORDS (1U << TRACKER | 1U << FORCE)
-
-static int add_device(void *context, const struct incise_key *key)
-{
-	unsigned int *has = context;
-
-	for (int i = 0; i < DEVICES; i++) {
-		if (strcmp(key->name, devices[i].key) || strlen(key->value) < 3)
-			continue;
-		*has |= 1U << i;
-		if (strncmp(key->value, "\"sim:", 5))
-			*has &= ~SIMULATED;
-	}
-	return 0;
-}
-
 /* Whether a calibration of this kind has passed, and none since has failed. */
 static bool has_passed(const char *kind)
 {
@@ -412,12 +401,12 @@ static int calibrate_all(const struct init *init, unsigned int has)
 	for (int i = 0; i < CALIBRATIONS; i++) {
 		const struct calibration *c = &calibrations[i];
 
-		if ((has & c->needs) != c->needs || has & c->without)
+		if (!calibration_needed(c->kind, has))
 			continue;
 		if (has_passed(c->kind))
 			printf("%s: passed\n", c->kind);
 		else
-			left += !calibrate(init, c, has & SIMULATED);
+			left += !calibrate(init, c, has & CALIBRATION_SIMULATED);
 	}
 	return left;
 }
@@ -452,7 +441,7 @@ static void check_init(const struct init *init)
 int main(int argc, char **argv)
 {
 	static struct init init;
-	unsigned int has = SIMULATED;
+	unsigned int has;
 	struct incise_error err = {0};
 	int left = 0;
 
@@ -471,7 +460,8 @@ int main(int argc, char **argv)
 		write_rig(&init);
 	else
 		printf("%s is there\n", RIG);
-	cli_check(incise_rig_keys(RIG, add_device, &has, &err), &err);
+	has = calibration_devices(RIG, &err);
+	cli_check(!has, &err);
 	if (!init.no_calibration)
 		left = calibrate_all(&init, has);
 	puts("\nNext:");
@@ -480,7 +470,7 @@ int main(int argc, char **argv)
 	if (left)
 		printf("  incise init    # %s left\n", cli_count(left, "calibration"));
 	puts("  incise doctor    # what this machine still lacks");
-	if ((has & RECORDS) == RECORDS)
+	if (has & INCISE_RIG_TRACKER && has & INCISE_RIG_FORCE)
 		puts("  incise capture -o first.rec\n"
 		     "  incise train first.rec\n"
 		     "  incise haptic liver --model first.fis --duration 10s");

@@ -164,7 +164,9 @@ int incise_scan(const char *kind, const char *spec, incise_scan_found *found,
 			  : find_any(&loaded, &of, name, where, err);
 	if (rc)
 		return rc;
-	if (loaded.backend && loaded.backend->scan)
+	if (!found)
+		rc = 0;
+	else if (loaded.backend && loaded.backend->scan)
 		rc = loaded.backend->scan(spec + length + 1, pass_on, &of, err);
 	else
 		rc = incise_error_set(err, EOPNOTSUPP,

@@ -30,10 +30,10 @@ finding() { # GROUP NAME
 	# expects them; the space may change by a minute's worth meanwhile
 	[[ "$(finding disk free)" =~ ok\ +free\ +([0-9.]+)\ GiB\ here:\ ([0-9]+)\ min ]]
 	holds "${BASH_REMATCH[1]} < 2 || (${BASH_REMATCH[2]} / (${BASH_REMATCH[1]} * 1073741824 / (10000 * 2 + 120 * 84 + 2 * 3000) / 60) - 1) ^ 2 < 0.03 ^ 2"
-	[[ "${lines[-1]}" =~ ^[0-9]+\ problems?,\ [0-9]+\ warnings?$ ]]
+	[[ "${lines[-2]}" =~ ^[0-9]+\ problems?,\ [0-9]+\ warnings?$ ]]
 	# scheduling and memory are of this machine
 	problems=$(grep -c "^  problem " <<<"$output" || :)
-	[[ "${lines[-1]}" == "$problems problem"* ]]
+	[[ "${lines[-2]}" == "$problems problem"* ]]
 	[ "$status" -eq $((problems > 0)) ]
 	[ "$problems" -eq "$(awk '/^[a-z]/ { group = $0 } /^  problem / && group == "real time"' <<<"$output" | wc -l)" ]
 }
@@ -52,13 +52,54 @@ finding() { # GROUP NAME
 	rm rig.conf
 	[ -e /etc/incise/rig.conf ] || {
 		run --separate-stderr incise doctor
-		[[ "$(finding devices rig)" == "  warning "*"neither ./rig.conf nor /etc/incise/rig.conf"*"→ "*rig.conf.example* ]]
+		[[ "$(finding devices rig)" == "  warning "*"neither ./rig.conf nor /etc/incise/rig.conf"*"→ incise init"* ]]
+		[[ "${lines[-1]}" == "next: incise init "* ]]
 	}
 }
 
 # The lines of a group.
 group() {
 	awk -v group="$1" '/^[a-z]/ { inside = $0 == group; next } inside && NF' <<<"$output" | tr -s ' '
+}
+
+# bats test_tags=check
+@test "doctor ends with the next command: the first problem's, the calibrations that are left, then a capture" {
+	next() { # COMMAND CALIBRATIONS
+		incise doctor --json >r.json || :
+		python3 - "$@" <<-'END'
+			import json, sys
+			report = json.load(open("r.json"))
+			problems = [c["fix"] for c in report["checks"] if c["state"] == "problem" and c["fix"]]
+			expected = problems[0] if problems else sys.argv[1]
+			assert report["next"] == expected, (report["next"], expected)
+			asked = {c["name"] for c in report["checks"] if c["group"] == "calibration"}
+			assert asked == set(sys.argv[2].split()), asked
+		END
+	}
+	incise init --preset sim --stepper none --camera none --yes --no-calibration >out
+	next "incise init" file
+	incise calibrate force --weights 0,50g,100g,200g >out
+	# a rig without camera and stepper needs no calibration of them
+	next "incise init" "force tip delay"
+	incise init --yes >out
+	next "incise capture -o first.rec" "force tip delay"
+	echo 'tracker = "tty:/dev/none:115200";' >rig.conf
+	next "incise init" "tip"
+	[ "$(python3 -c 'import json; print(json.load(open("r.json"))["problems"])')" -ge 1 ]
+}
+
+# bats test_tags=check
+@test "doctor names what brings an absent program, by apt and by pip" {
+	mkdir bin
+	for program in sh env dirname; do
+		ln -s "$(command -v $program)" bin
+	done
+	PATH=$PWD/bin run --separate-stderr "$INCISE_BUILD/bin/incise-doctor" --rig sim:
+	[[ "$(finding programs gnuplot)" == "  warning "*"no plots"*"→ sudo apt-get install gnuplot-nox" ]]
+	mkdir python
+	echo 'raise ImportError' >python/jinja2.py
+	PYTHONPATH=$PWD/python run --separate-stderr incise doctor --rig sim:
+	[[ "$(finding programs jinja2)" == "  warning "*"no HTML reports"*"→ sudo apt-get install python3-jinja2, or pip install jinja2" ]]
 }
 
 @test "doctor lists CAN interfaces and USB devices by name" {

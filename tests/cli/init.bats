@@ -62,6 +62,9 @@ setup() {
 	[ ! -e lab ]
 	fails incise init lab --preset paper --tracker 'tty:"; clock = "real' --yes -- tracker
 	fails incise init lab --preset paper --stepper kernel:/dev/null --spring soft --yes -- spring soft
+	fails incise init lab --preset paper --tracker ttyy:/dev/ttyS9 --yes -- "tracker: " '"ttyy"' "there are: sim"
+	INCISE_MODULE_PATH=$PWD fails incise init lab --preset haply --yes -- "haptic: " libwebsockets-dev
+	fails incise init lab --preset paper --camera v4l2 --yes -- "camera: " BACKEND:ARGUMENTS
 	[ -z "$(ls -A lab)" ]
 	bad_usage incise init a b
 }

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
+#include <incise/rig.h>
 #include "calibration.h"
 #include "file_kind.h"
 #include "json.h"
@@ -19,6 +20,57 @@ const char *calibration_default(void)
 	while (*place && access(*place, F_OK))
 		place++;
 	return *place;
+}
+
+static int add_device(void *context, const struct incise_key *key)
+{
+	static const struct {
+		const char *key;
+		unsigned int device;
+	} devices[] = {
+		{"tracker", INCISE_RIG_TRACKER}, {"force", INCISE_RIG_FORCE},
+		{"camera", INCISE_RIG_CAMERA},	 {"stepper", INCISE_RIG_STEPPER},
+		{"haptic", INCISE_RIG_HAPTIC},
+	};
+	unsigned int *has = context;
+
+	for (size_t i = 0; i < sizeof(devices) / sizeof(*devices); i++) {
+		if (strcmp(key->name, devices[i].key) || strlen(key->value) < 3)
+			continue;
+		*has |= devices[i].device;
+		if (strncmp(key->value, "\"sim:", 5))
+			*has &= ~CALIBRATION_SIMULATED;
+	}
+	return 0;
+}
+
+unsigned int calibration_devices(const char *rig, struct incise_error *err)
+{
+	unsigned int has = CALIBRATION_SIMULATED;
+
+	return incise_rig_keys(rig, add_device, &has, err) ? 0 : has;
+}
+
+bool calibration_needed(const char *kind, unsigned int devices)
+{
+	/* It needs all of these devices, and none of the others. */
+	static const struct {
+		const char *kind;
+		unsigned int needs, without;
+	} kinds[] = {
+		{"force", INCISE_RIG_FORCE, 0},
+		{"depth", INCISE_RIG_CAMERA, 0},
+		{"tip", INCISE_RIG_TRACKER, INCISE_RIG_HAPTIC},
+		{"delay", INCISE_RIG_TRACKER | INCISE_RIG_FORCE, INCISE_RIG_HAPTIC},
+		{"stepper", INCISE_RIG_STEPPER, INCISE_RIG_HAPTIC},
+		{"frame", INCISE_RIG_HAPTIC, 0},
+	};
+
+	for (size_t i = 0; i < sizeof(kinds) / sizeof(*kinds); i++)
+		if (!strcmp(kind, kinds[i].kind))
+			return (devices & kinds[i].needs) == kinds[i].needs &&
+			       !(devices & kinds[i].without);
+	return false;
 }
 
 void calibration_use(struct calibration_used *used, const char *given, const char *rig)

@@ -18,6 +18,15 @@
 			CLI_INPUT(type, member)                                         \
 	}
 
+/* In the devices of a rig, with INCISE_RIG_TRACKER …: all of them are simulated. */
+#define CALIBRATION_SIMULATED (1U << 31)
+
+/* The devices that a rig names; 0 with a message: it cannot be read. */
+unsigned int calibration_devices(const char *rig, struct incise_error *err);
+
+/* Whether a rig with these devices needs a calibration of this kind, "force", "depth" … */
+bool calibration_needed(const char *kind, unsigned int devices);
+
 struct calibration_used {
 	struct incise_calibration values;
 	const char *path; /* NULL: nominal values */

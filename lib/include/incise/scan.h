@@ -44,6 +44,7 @@ typedef int incise_scan_found(void *context, const struct incise_scan_device *de
  * @param spec "BACKEND:ARGUMENTS", for example "can:can0"; NULL: search all backends that need
  *             no arguments; a failing backend is reported as an unusable device with the
  *             reason in its line
+ * @param found NULL, with a @spec: search for nothing, and only check that the backend is there
  * @return 0, also if there is none; the value of @found; -EINVAL (@spec), -ENODEV (no such
  *         backend or bus), -EOPNOTSUPP (the backend cannot search), -EACCES, -EBUSY,
  *         -ENETDOWN, -EIO.
