@@ -66,7 +66,7 @@ setup() {
 	INCISE_MODULE_PATH=$PWD fails incise init lab --preset haply --yes -- "haptic: " libwebsockets-dev
 	fails incise init lab --preset paper --camera v4l2 --yes -- "camera: " BACKEND:ARGUMENTS
 	[ -z "$(ls -A lab)" ]
-	bad_usage incise init a b
+	misused incise init a b -- "one folder"
 }
 
 # bats test_tags=check
