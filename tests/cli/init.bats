@@ -63,7 +63,7 @@ setup() {
 	fails incise init lab --preset paper --tracker 'tty:"; clock = "real' --yes -- tracker
 	fails incise init lab --preset paper --stepper kernel:/dev/null --spring soft --yes -- spring soft
 	[ -z "$(ls -A lab)" ]
-	bad_usage incise init a b
+	misused incise init a b --
 }
 
 # bats test_tags=check
