@@ -496,6 +496,7 @@ static void write_texture(const char *unit, bool of_model, double variation)
 					 .info = {.most = 0.5,
 						  .variation = variation,
 						  .up_to_cycles = 1,
+						  .recorded.rate = 1,
 						  .n_cuts = 5,
 						  .length = 100},
 					 .step = 0.25,
