@@ -8,7 +8,6 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <glob.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -43,17 +42,21 @@ static const struct {
 
 /* Numbers of an actuator that have no default: its maker knows them. */
 static const struct {
-	const char *key, *what, *value;
+	const char *option, *key, *what, *value;
 } mechanics[] = {
-	{"spring_N_mm", "Stiffness of the spring, N/mm", "2.0"},
-	{"travel_mm", "Travel of the nut, mm", "20.0"},
-	{"lead_mm", "Lead of the screw, mm per turn", "4.0"},
+	{"spring", "spring_N_mm", "Stiffness of the spring, N/mm", "2.0"},
+	{"travel", "travel_mm", "Travel of the nut, mm", "20.0"},
+	{"lead", "lead_mm", "Lead of the screw, mm per turn", "4.0"},
 };
 
 enum { MECHANICS = sizeof(mechanics) / sizeof(*mechanics) };
 
+#define MECHANIC_MIN 1e-3
+#define MECHANIC_MAX 1e3
+
 struct init {
-	const char *folder, *device[DEVICES], *mechanic[MECHANICS];
+	const char *folder, *device[DEVICES];
+	double mechanic[MECHANICS]; /* 0: asked for */
 	enum preset { UNSET, SIM, PAPER, HAPLY } preset;
 	bool yes, no_calibration;
 };
@@ -109,11 +112,12 @@ static const struct cli_option options[] = {
 	 CLI_TEXT(struct init, device[STEPPER])},
 	{0, "haptic", "DEVICE", "haptic device in place of tracker and actuator",
 	 CLI_TEXT(struct init, device[HAPTIC])},
-	{0, "spring", "N/mm", "stiffness of the actuator's spring",
-	 CLI_TEXT(struct init, mechanic[0])},
-	{0, "travel", "mm", "travel of its nut", CLI_TEXT(struct init, mechanic[1])},
-	{0, "lead", "mm", "lead of its screw per turn",
-	 CLI_TEXT(struct init, mechanic[2])},
+	{0, "spring", "STIFFNESS", "stiffness of the actuator's spring, in N/mm",
+	 CLI_NUMBER(struct init, mechanic[0], MECHANIC_MIN, MECHANIC_MAX)},
+	{0, "travel", "MM", "travel of its nut",
+	 CLI_NUMBER(struct init, mechanic[1], MECHANIC_MIN, MECHANIC_MAX)},
+	{0, "lead", "MM", "lead of its screw per turn",
+	 CLI_NUMBER(struct init, mechanic[2], MECHANIC_MIN, MECHANIC_MAX)},
 	{0, "no-calibration", NULL, "only write rig.conf",
 	 CLI_FLAG(struct init, no_calibration)},
 	{'y', "yes", NULL, "take the default of each question; calibrate a simulated rig",
@@ -262,17 +266,16 @@ static void put_draft(const struct init *init, FILE *draft)
 	if (stepper)
 		fputs("actuator = {\n", draft);
 	for (int i = 0; i < MECHANICS && stepper; i++) {
-		char *value = init->mechanic[i] ? cli_text("%s", init->mechanic[i])
-						: ask_for(init, mechanics[i].what,
-							  mechanics[i].value);
-		char *end;
-		double number = strtod(value, &end);
+		double number = init->mechanic[i];
+		char *answer;
 
-		if (end == value || *end || !isfinite(number))
-			cli_fail("%s: expected a number, found '%s'", mechanics[i].what,
-				 value);
+		if (!(number > 0)) {
+			answer = ask_for(init, mechanics[i].what, mechanics[i].value);
+			number = cli_number(mechanics[i].option, answer, MECHANIC_MIN,
+					    MECHANIC_MAX);
+			free(answer);
+		}
 		fprintf(draft, "%s = %#.9g;\n", mechanics[i].key, number);
-		free(value);
 	}
 	if (stepper)
 		fputs("};\n", draft);
@@ -430,7 +433,7 @@ static void check_init(const struct init *init)
 	for (int i = 0; i < DEVICES; i++)
 		given |= init->device[i] != NULL;
 	for (int i = 0; i < MECHANICS; i++)
-		given |= init->mechanic[i] != NULL;
+		given |= init->mechanic[i] > 0;
 	if (there && given)
 		cli_fail(
 			"%s is there and stays as it is; leave out --preset and devices to "

@@ -43,6 +43,9 @@ setup() {
 
 # bats test_tags=check
 @test "a real rig: devices by options, calibrations only listed" {
+	for module in force_iio haptic_haply; do
+		[ -e "$INCISE_BUILD/lib/incise/$module.so" ] || skip "$module is not built"
+	done
 	run -0 incise init lab --preset paper --tracker tty:/dev/ttyS9 --force iio:iio:device0,0 --camera none \
 		--stepper kernel:/dev/incise-stepper0 --spring 2.5 --yes
 	grep -qx 'tracker = "tty:/dev/ttyS9";' lab/rig.conf
@@ -61,7 +64,7 @@ setup() {
 	fails incise init lab -- "no terminal" "--yes"
 	[ ! -e lab ]
 	fails incise init lab --preset paper --tracker 'tty:"; clock = "real' --yes -- tracker
-	fails incise init lab --preset paper --stepper kernel:/dev/null --spring soft --yes -- spring soft
+	misused incise init lab --preset paper --stepper kernel:/dev/null --spring soft --yes -- --spring soft
 	fails incise init lab --preset paper --tracker ttyy:/dev/ttyS9 --yes -- "tracker: " '"ttyy"' "there are: sim"
 	INCISE_MODULE_PATH=$PWD fails incise init lab --preset haply --yes -- "haptic: " libwebsockets-dev
 	fails incise init lab --preset paper --camera v4l2 --yes -- "camera: " BACKEND:ARGUMENTS

@@ -45,6 +45,7 @@ VALUES = """
 --calibration export | |
 --camera | off auto frames | on pictures frmaes {}
 --camera calibrate delay | auto frames | on pictures {}
+--camera init | none v4l2:/dev/video0 |
 --check | 0.01 0.99 | 0 1 half 0x1p-2 nan {}
 --clock-source | auto none kernel ptp ptp:/x,3 chrony:323 sim:1000,0,20 | sundial kernel: ptp: ptp:/x,128 ptp:,1 chrony:0 chrony:x sim:x
 --code | P07 a-b_c ABCDEFGHIJKLMNOP | A,B ABCDEFGHIJKLMNOPQ é {}
@@ -59,17 +60,20 @@ VALUES = """
 --duration demo | 1s 2min | 1ms long {}
 --epochs | 1 100000 | 0 1.5 many {}
 --every | 10ms 1h | 0 never {}
+--force | none sim: |
 --from | any |
 --gravity | 9.81 latitude=-90 latitude=48,altitude=10000 | 0 -9.81 strong altitude=5 latitude=91 latitude=0,altitude=high {}
 --grid | 2x2 20x15 | 20 3x 1x5 x 3x3x3 99999x2 -2x3 {}
 --group | cut |
 --handle | |
+--haptic | none haply: |
 --idle | 1s 10min | 0 never {}
 --igtl | 0 18944 127.0.0.1:0 [::1]:0 18944/2 127.0.0.1:0/1 | ::1:0 127.0.0.1:x 127.0.0.1 foo 65536 -1 :0 0/3 0/new
 --images | 1 20 | 0 1.5 all {}
 --input-range | 0,5000 -5,5 | 5,1 5 a,b {}
 --inputs | a a,b | ,
 --key | key |
+--lead | 0.5 4 | 0 -1 1e4 nan soft {}
 --length | 47.5mm 4.75cm 100 | 47.5kg 0 long {}
 --load | idle cpu memory disk view | disc {}
 --log device | |
@@ -92,6 +96,7 @@ VALUES = """
 --policy | fifo deadline fifo:1 fifo:84 | rr fifo:0 fifo:85 fifo:x {}
 --poses | arrival acquisition | dawn {}
 --premises | any.fis |
+--preset | sim paper haply | nosuch
 --profile export | plain ros2 | ros {}
 --range | 2s..2500ms 5s.. ..1s | 5s 5s..4s {}
 --range calibrate stepper | 0mm..1.5mm | 5mm 5mm..1mm {}
@@ -120,15 +125,19 @@ VALUES = """
 --size | 160x120 1280x720 | 10x10 big 640x480x3 {}
 --span | 1 1000 | 0.5 1001 nan long {}
 --speed | 0.01 100 | 0 -1 fast {}
+--spring | 2 2.5 | 0 -1 1e4 nan soft {}
 --start-at | 2037-01-15T08:00:10Z 2037-01-15T08:00:10.5TAI | 2020-02-30T00:00:00Z 2027-01-15T08:00:10 2027-01-15T08:00:10.Z now 2027-01-15T08:00:10+01:00 2027-01-15
 --state | none a.state |
 --step-mm | 0.001 | 0 -1 x {}
+--stepper | none sim: |
 --target | column |
 --timeout | 2s 1h | 0 never {}
 --timestamp | http://a/tsr a.tsq a.tsr | reply.der
 --tolerance | 0.1 5 | -1 x {}
 --tolerance join | 1ms 0.5s | 0 soon {}
 --tool | auto blade handle tube | spoon blad {}
+--tracker | none sim: |
+--travel | 15 20.5 | 0 -1 1e4 nan soft {}
 --trigger | button 0.2N 500mN sync sync:/dev/x | 0N knob -1N {}
 --given-u calibrate delay | reference=1 | reference=-1 reference=1001 surface=1 {}
 --given-u calibrate depth | length=0.01mm,pixels=0 gauge=100,zero=0 square=1,plane=0.1mm | length=1kg pixels=fine gauge=101 zero=-1 nosuch=1 length {}
