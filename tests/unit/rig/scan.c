@@ -36,6 +36,6 @@ TEST(what_cannot_be_scanned_is_said)
 TEST(without_a_function_only_the_backend_is_looked_for)
 {
 	assert_int_equal(incise_scan("stepper", "sim:", NULL, NULL, &err), 0);
-	assert_error(incise_scan("stepper", "nosuch:can0", NULL, NULL, &err), ENODEV, &err,
-		     "\"nosuch\"");
+	assert_error(incise_scan("stepper", "nosuch:can0", NULL, NULL, &err), ENODEV,
+		     &err, "\"nosuch\"");
 }
