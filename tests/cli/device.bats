@@ -215,7 +215,8 @@ judge_log() {
 	[[ "$stderr" == "incise device: sim:: this rig has no haptic device; "* ]]
 	run -2 --separate-stderr incise device sim:haptic --rig sim:haptic
 	[[ "$stderr" == "incise device: --rig and DEVICE name two devices; give one of them"* ]]
-	# a second owner
+	# a second owner, once the user's own one has left
+	await no_page
 	incise device "spring:$id" --no-rt >/dev/null 2>&1 3>&- &
 	device=$!
 	await has_page
