@@ -250,7 +250,7 @@ static void print_texture(const struct incise_plan *plan)
 		return;
 	printf("texture     up to ±%.3g %% of the force, %.3g %% rms, %.3g events/mm; ",
 	       100 * t.most, 100 * t.rms, t.events_per_mm);
-	if (t.factor_least < t.factor_most)
+	if (t.factor_most > 1.005 * t.factor_least)
 		printf("a cut has %.3g to %.3g times the force\n", t.factor_least,
 		       t.factor_most);
 	else

@@ -1078,7 +1078,10 @@ static void save_model(const struct train_options *options,
 	hold_signals(SIG_UNBLOCK);
 	if (tex && !texture && !access(tex, F_OK) &&
 	    !(old = incise_texture_load(tex, trained->model, &err)))
-		cli_warn("%s", err.text);
+		cli_warn(
+			"%s is not of this model, and is refused with it; learn it again "
+			"with --texture, or remove it",
+			tex);
 	incise_texture_free(old);
 	free(sd);
 	free(tex);

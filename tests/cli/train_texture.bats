@@ -95,10 +95,15 @@ refuses() {
 		run --separate-stderr incise train raw.csv --texture $wrong
 		bad_usage --texture || return
 	done
+	for wrong in "--mf 3,2" "--inputs depth_mm"; do
+		# shellcheck disable=SC2086
+		run --separate-stderr incise train raw.csv -o u.fis.tex $wrong
+		bad_usage u.fis.tex "${wrong%% *}" || return
+	done
 }
 
 @test "a texture belongs to its model" {
-	incise train tooth.rec --check 0.5 -o t.fis --overwrite >/dev/null 2>&1
+	incise train tooth.rec --check 0.5 -o t.fis --overwrite 2>&1 >/dev/null | grep -q "t.fis.tex .*--texture"
 	run -0 --separate-stderr incise info t.fis
 	[[ "$stderr" == *t.fis.tex:2:*stale* ]] || complain "$stderr"
 	run --separate-stderr incise provenance t.fis.tex

@@ -154,6 +154,8 @@ static const struct {
 	{"variation 0.1", "variation 1.5", ":9"},
 	{"variation 0.1", "variation nan", ":9"},
 	{"cycles 2", "cycles 1e999", ":10"},
+	{"cycles 2", "cycles 0", ":10"},
+	{"recorded-rate 1", "recorded-rate 0", ":13"},
 	{"length 100", "length -1", ":11"},
 	{"error 9 3", "error 9", ":12"},
 	{"recorded-drops 1", "recorded-drops", ":15"},

@@ -568,6 +568,8 @@ TEST(test_no_texture)
 		{"model = { texture = \"m.fis.tex\"; };", "mm", true, 0.1, EINVAL, "cut"},
 		{"model = { cut = \"m.fis\"; texture = 1; };", "mm", true, 0.1, EINVAL,
 		 "model.texture"},
+		{"model = { cut = \"m.fis\"; texture = \"\"; };", "mm", true, 0.1, EINVAL,
+		 "model.texture"},
 		{"model = { cut = \"m.fis\"; texture = \"m.fis\"; };", "mm", true, 0.1,
 		 EINVAL, "m.fis"},
 		{"model = { cut = \"m.fis\"; texture = \"n.tex\"; };", "mm", true, 0.1,
