@@ -118,7 +118,10 @@ def data_cross(text, lines):
     (left, top), _, (right, bottom), _ = text.corners()
     ink = 0.1 * text.size
     low, high = (left + ink, top + ink), (right - ink, min(bottom, text.y) - ink)
-    return any(crosses(a, b, low, high) for line in lines for a, b in zip(line, line[1:] or line))
+    return any(
+        crosses(a, b, low, high) for least, most, line in lines
+        if all(least[k] <= high[k] and most[k] >= low[k] for k in (0, 1))
+        for a, b in zip(line, line[1:] or line))
 
 
 class Figure:
@@ -128,7 +131,7 @@ class Figure:
         self.texts = []
         self.segments = []  # of each plot: texts before its first series, and after
         self.shapes = []  # place, colour
-        self.lines = []  # of series: lists of points
+        self.lines = []  # of series: least and largest place, points
         self.entries = []  # of legends: title, text, colours of its sample
         self.walk(self.root.find("./%sg[@id='gnuplot_canvas']" % SVG), "black", None)
         # gnuplot 6 writes the labels of axes behind the series, where 5 has the next plot's title only:
@@ -158,7 +161,9 @@ class Figure:
             if series and element.tag != SVG + "image":
                 data = element.get("d") or element.get("points") or element.get("transform") or ""
                 flat = map(numbers, re.sub(r"scale\(.*", "", data).split("M"))
-                self.lines += [list(zip(at[::2], at[1::2])) for at in flat]
+                for line in (list(zip(at[::2], at[1::2])) for at in flat if len(at) > 1):
+                    xs, ys = zip(*line)
+                    self.lines.append(((min(xs), min(ys)), (max(xs), max(ys)), line))
             # Where each line of a path begins, and where a marker is.
             for part in places_of(element):
                 self.shapes.append((*part, colour, series))
