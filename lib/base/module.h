@@ -34,7 +34,10 @@ int incise_module_find(struct incise_module *module, const char *file, const cha
 /* -ENOENT, with the packages that its build needs. */
 int incise_module_absent(const char *file, const char *where, struct incise_error *err);
 
-/* The packages by which a module "KIND_NAME" is built, "libx-dev liby-dev". NULL: it needs none, or there is no such module. */
+/*
+ * The packages by which a module "KIND_NAME" is built, "libx-dev liby-dev". NULL: it needs none, or there is no
+ * such module.
+ */
 const char *incise_module_packages(const char *module);
 
 /*
