@@ -25,7 +25,7 @@ struct incise_film_coder {
 	AVFrame *frame;
 	AVPacket *packet;
 	int64_t frames;
-	bool begun; /* the header is written */
+	bool begun;	    /* the header is written */
 	char url[5 + 4096]; /* "file:" and the path: a colon in it begins no protocol */
 	const char *path;
 };
