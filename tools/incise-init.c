@@ -317,8 +317,16 @@ static void write_rig(const struct init *init)
 	if (fclose(to.out))
 		cli_fail("no memory");
 	fd = open(RIG, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-	if (fd < 0 || write(fd, text, size) != (ssize_t)size || fsync(fd) || close(fd))
+	if (fd < 0)
 		cli_fail("%s: %s", RIG, strerror(errno));
+	errno = ENOSPC; /* of a short write */
+	if (write(fd, text, size) != (ssize_t)size || fsync(fd) || close(fd)) {
+		int code = errno;
+
+		/* The next run would take a part of it for a rig. */
+		unlink(RIG);
+		cli_fail("%s: %s", RIG, strerror(code));
+	}
 	free(text);
 	printf("wrote %s\n", RIG);
 }

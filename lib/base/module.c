@@ -64,7 +64,7 @@ int incise_module_find(struct incise_module *module, const char *file, const cha
 	return incise_module_absent(file, where, err);
 }
 
-const char *incise_module_packages(const char *module, bool whole)
+const char *incise_module_packages(const char *module)
 {
 	static const char *const features[][2] = {
 #define FEATURE(names, apt, pip) {names, apt},
@@ -74,7 +74,7 @@ const char *incise_module_packages(const char *module, bool whole)
 
 	for (size_t i = 0; i < sizeof(features) / sizeof(*features); i++)
 		for (const char *at = features[i][0]; (at = strstr(at, module)); at++)
-			if ((at == features[i][0] || at[-1] == ' ' || !whole) &&
+			if ((at == features[i][0] || at[-1] == ' ') &&
 			    (!at[length] || at[length] == ' '))
 				return features[i][1];
 	return NULL;
@@ -86,14 +86,14 @@ int incise_module_absent(const char *file, const char *where, struct incise_erro
 	const char *packages;
 
 	snprintf(module, sizeof(module), "%.*s", (int)strcspn(file, "."), file);
-	packages = incise_module_packages(module, true);
+	packages = incise_module_packages(module);
 	return incise_error_set(
 		err, ENOENT,
-		"%s: no module %s in %.300s; %s%s%s build incise again, or "
+		"%s: no module %s in %.300s; %s%s%sbuild incise again, or "
 		"set INCISE_MODULE_PATH",
 		where, file, incise_module_folder(in, sizeof(in)) ? in : "any folder",
 		packages ? "apt-get install " : "", packages ? packages : "",
-		packages ? " and" : "");
+		packages ? " and " : "");
 }
 
 const void *incise_module_load(const char *file, const char *symbol, unsigned int abi,

@@ -35,10 +35,10 @@ int incise_module_find(struct incise_module *module, const char *file, const cha
 int incise_module_absent(const char *file, const char *where, struct incise_error *err);
 
 /*
- * The packages by which a module "KIND_NAME" is built, "libx-dev liby-dev"; @whole false: of the first whose name
- * ends so, "_NAME". NULL: it needs none, or there is no such module.
+ * The packages by which a module "KIND_NAME" is built, "libx-dev liby-dev". NULL: it needs none, or there is no
+ * such module.
  */
-const char *incise_module_packages(const char *module, bool whole);
+const char *incise_module_packages(const char *module);
 
 /*
  * Its symbol, a struct that begins with the version of its interface, for good. NULL with errno of

@@ -114,7 +114,7 @@ int incise_backend_absent(const char *kind, const char *name, const char *where,
 	const char *packages;
 
 	snprintf(module, sizeof(module), "%.30s_%.40s", kind, name);
-	packages = incise_module_packages(module, *kind);
+	packages = incise_module_packages(module);
 	return incise_error_set(err, ENODEV,
 				"%s: no %sbackend \"%.40s\"%s%s%s; there are: %.160s",
 				where, packages ? "" : "such ", name,

@@ -39,9 +39,7 @@ struct incise_loaded {
 int incise_backend_find(struct incise_loaded *loaded, const char *kind, const char *name,
 			const char *where, struct incise_error *err);
 
-/*
- * -ENODEV: the message lists the @known ones, and the packages by which this one is built. @kind "": of any.
- */
+/* -ENODEV: the message lists the @known ones, and the packages by which this one of its @kind is built. */
 int incise_backend_absent(const char *kind, const char *name, const char *where,
 			  const char *known, struct incise_error *err);
 

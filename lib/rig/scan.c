@@ -11,6 +11,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 #include <incise/scan.h>
+#include "../base/module.h"
 #include "../base/monotonic.h"
 #include "backends.h"
 #include "haptic_page.h"
@@ -58,12 +59,16 @@ static const char *const kinds[] = {"tracker", "force", "camera", "haptic", "ste
 static int find_any(struct incise_loaded *loaded, struct kind_found *of, const char *name,
 		    const char *where, struct incise_error *err)
 {
-	char names[NAMES][32], known[KINDS * NAMES * 34] = "sim";
+	char names[NAMES][32], known[KINDS * NAMES * 34] = "sim", module[80];
+	const char *kind = kinds[0]; /* one that a build may have by that name */
 	int rc = -ENODEV;
 
 	for (size_t k = 0; k < KINDS && rc == -ENODEV; k++) {
 		int n = incise_backend_names(kinds[k], names, NAMES);
 
+		snprintf(module, sizeof(module), "%s_%.40s", kinds[k], name);
+		if (incise_module_packages(module))
+			kind = kinds[k];
 		of->kind = kinds[k];
 		rc = incise_backend_find(loaded, kinds[k], name, where, err);
 		for (int i = 0; i < n; i++) {
@@ -72,7 +77,7 @@ static int find_any(struct incise_loaded *loaded, struct kind_found *of, const c
 			snprintf(known + used, sizeof(known) - used, ", %s", names[i]);
 		}
 	}
-	return rc == -ENODEV ? incise_backend_absent("", name, where, known, err) : rc;
+	return rc == -ENODEV ? incise_backend_absent(kind, name, where, known, err) : rc;
 }
 
 #define PAGES "/dev/shm"

@@ -222,10 +222,11 @@ static void put_key(FILE *script, const struct history *history)
 	}
 	fprintf(script,
 		"set size 1,1\nset origin 0,0\neval key_panel\nplot %s%s%s%sNaN notitle\n",
-		before ? "NaN with lines lc rgb grey dt 2 title 'before', " : "",
-		active ? "NaN with lines lt 3 title 'active', " : "",
-		passed ? "NaN with yerrorbars lt 1 title 'value and U (k = 2)', " : "",
-		failed ? "NaN with yerrorbars lt 2 pt 2 title 'not passed', " : "");
+		before ? "keyentry with lines lc rgb grey dt 2 title 'before', " : "",
+		active ? "keyentry with lines lt 3 title 'active', " : "",
+		passed ? "keyentry with yerrorbars lt 1 title 'value and U (k = 2)', "
+		       : "",
+		failed ? "keyentry with yerrorbars lt 2 pt 2 title 'not passed', " : "");
 }
 
 FILE *figure_of_calibration(const struct figure *figure)

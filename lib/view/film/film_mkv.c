@@ -7,6 +7,7 @@
  */
 #include <errno.h>
 #include <stdbool.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <libavcodec/avcodec.h>
@@ -24,8 +25,9 @@ struct incise_film_coder {
 	AVFrame *frame;
 	AVPacket *packet;
 	int64_t frames;
-	bool begun; /* the header is written */
-	char path[4096];
+	bool begun;	    /* the header is written */
+	char url[5 + 4096]; /* "file:" and the path: a colon in it begins no protocol */
+	const char *path;
 };
 
 /* Weights of red, green and blue by a standard, in 2^-16. */
@@ -167,7 +169,7 @@ static int open_film_file(struct incise_film_coder *coder)
 	stream->avg_frame_rate = coder->codec->framerate;
 	rc = avcodec_parameters_from_context(stream->codecpar, coder->codec);
 	if (rc >= 0)
-		rc = avio_open(&coder->format->pb, coder->path, AVIO_FLAG_WRITE);
+		rc = avio_open(&coder->format->pb, coder->url, AVIO_FLAG_WRITE);
 	/* The index of an MP4 comes first, so that a page plays it while it loads; in a pipe, by
 	 * fragments. */
 	if (rc >= 0)
@@ -193,11 +195,11 @@ static struct incise_film_coder *film_open(const char *path, bool mp4, int width
 		return INCISE_ERROR_NULL(err, ENOMEM, "no memory for a film");
 	/* Warnings about the input are not for users. */
 	av_log_set_level(AV_LOG_ERROR);
-	if (strlen(path) < sizeof(coder->path)) {
-		strcpy(coder->path, path);
+	coder->path = coder->url + strlen("file:");
+	if (snprintf(coder->url, sizeof(coder->url), "file:%s", path) <
+	    (int)sizeof(coder->url))
 		rc = avformat_alloc_output_context2(&coder->format, NULL,
-						    mp4 ? "mp4" : "matroska", path);
-	}
+						    mp4 ? "mp4" : "matroska", coder->url);
 	if (rc >= 0)
 		rc = open_codec(coder, mp4, width, height, rate_hz);
 	if (rc >= 0)

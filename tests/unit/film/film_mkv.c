@@ -159,6 +159,19 @@ TEST(test_an_mp4_in_a_pipe_is_whole)
 	check_film("mp4", AV_CODEC_ID_H264);
 }
 
+TEST(test_a_colon_is_no_protocol)
+{
+	char folder[] = "/tmp/incise-film-XXXXXX";
+
+	assert_non_null(mkdtemp(folder));
+	assert_int_equal(chdir(folder), 0);
+	write_film("a:b.mkv", false);
+	assert_int_equal(access("a:b.mkv", F_OK), 0);
+	assert_int_equal(unlink("a:b.mkv"), 0);
+	assert_int_equal(chdir("/"), 0);
+	assert_int_equal(rmdir(folder), 0);
+}
+
 TEST(test_without_h264_matroska_only)
 {
 	without_h264 = true;

@@ -61,6 +61,14 @@ TEST(test_a_bar_shows_the_time_left)
 			    "job [##############################] 100 %");
 }
 
+TEST(test_a_bar_that_begins_late_tells_no_time)
+{
+	struct cli_bar bar = {0};
+
+	on_terminal = true;
+	assert_null(strstr(draw_bar(&bar, 0, 0.5), "left"));
+}
+
 TEST(test_long_times_are_minutes)
 {
 	struct cli_bar bar = {0};
