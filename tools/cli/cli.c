@@ -996,7 +996,7 @@ void cli_progress_bar(const char *name, double share, struct cli_bar *bar)
 	bar->percent = percent;
 	bar->drawn_ns = now_ns;
 	left_s = 1e-9 * (double)(now_ns - bar->begin_ns) * (1 - share) / share;
-	/* Of the first share nothing is known yet. */
+	/* The first share tells no time yet. */
 	if (share > 0 && share < 1 && now_ns > bar->begin_ns)
 		snprintf(left, sizeof(left),
 			 left_s < 100 ? ", %.0f s left" : ", %.0f min left",
