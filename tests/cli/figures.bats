@@ -52,6 +52,10 @@ finds() {
 	finds "data cross 'in the way'"
 	figure 'set yrange [0:1]' 'plot 0.9 + 0.1 * sin(200 * x) title "over the key"'
 	finds "data cross 'over the key'"
+	figure 'set pointintervalbox 1' 'plot "+" every 50 using 1:1:(0.1) with yerrorbars'
+	finds "* white discs hide data"
+	figure 'plot "+" every 50 using 1:1:(0.1) with yerrorbars'
+	measured made.svg
 	figure 'set xlabel "time, s"' 'plot x'
 	finds "the label 'time, s' is no 'quantity / unit'"
 	figure 'set ylabel "force / lbf"' 'plot x'

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """figures.py FILE.svg...: measures figures that gnuplot wrote, and prints a line for each text that
 leaves the canvas, two texts that overlap, a text that data cross, an axis that is not labelled
-"quantity / unit", a number or unit in the form of a program, and a legend entry without data. Exit 1 if there is any.
+"quantity / unit", a number or unit in the form of a program, a legend entry without data, and discs of the paper's
+colour, which hide error bars. Exit 1 if there is any.
 
 Text is measured with the advance widths of DejaVu Sans, the font of the figures, so that no font
 has to be installed. A box reaches from the top of ascenders to the baseline, or to the bottom of
@@ -213,6 +214,11 @@ def check(path):
             yield "'%s' leaves the canvas by %.1f px" % (text.text, out)
         if PROGRAM.search(text.text):
             yield "'%s' is in the form of a program" % text.text
+    discs = sum(element.get(HREF) == "#gpPt6" and element.get("color") == "#FFFFFF" and
+                numbers(re.search(r"scale\(([^)]*)\)", element.get("transform"))[1])[0] > 1
+                for element in figure.root.iter(SVG + "use"))
+    if discs:
+        yield "%d white discs hide data" % discs
     for text in figure.texts:
         if not text.degrees and data_cross(text, figure.lines):
             yield "data cross '%s'" % text.text

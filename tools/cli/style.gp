@@ -63,8 +63,9 @@ set ylabel noenhanced
 set y2label noenhanced
 set zlabel noenhanced
 set cblabel noenhanced
-set key noautotitle noenhanced Left reverse samplen 2 spacing 1.15 height 0.3
-set pointintervalbox 0 # no white disc on error bars
+# Off until a script places it: an empty key hides the grid, too.
+set key off noautotitle noenhanced Left reverse samplen 2 spacing 1.15 height 0.3
+set pointintervalbox 0.001 # no white disc on error bars; gnuplot takes 0 for 1
 # Panels with margins in px: above(n) for a title of n lines and a title of each panel, below(rows)
 # for tics, label and a key of so many rows, between for the tics, label and title of two panels.
 above(n) = (n + 2.6) * line_px
