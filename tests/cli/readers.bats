@@ -81,7 +81,7 @@ state() {
 	incise verify new.rec >after || [ $? = 1 ]
 	cmp <(sed 's/killed/new/' before) after
 	incise verify --json new.rec >report || [ $? = 1 ]
-	[ "$(key report intact)" = true ]
+	[ "$(key report intact)" = 1 ]
 	# the same rows, but for the name
 	for of in killed new; do
 		incise export $of.rec --resample | grep -v '^#' | cut -d, -f2- >out/$of.csv
