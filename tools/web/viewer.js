@@ -3,156 +3,119 @@
 // one, incise serve answers by WebSocket: parts of a recording, or a rig or loop live.
 //
 //	document or part ──► series ──┐
-//	live message ──► ring ────────┴─► reduce: min and max a pixel ──► drawData (canvas "data")
-//	pointer, keys, buttons ──► view, cursor, span ──────────────────► drawOver (canvas "over")
+//	live message ──► ring ────────┼─► draw: min and max a pixel, one canvas, when something changed
+//	pointer, key, button ─► view ─┘
 //
 // A series is x, low, high and, where known, u (standard uncertainty) in typed arrays of which
 // `count` from `start` on hold something; NaN is a gap. A ring is a series that wraps around.
-// x is in the head's unit: seconds, or UTC seconds when live.
+// x is in the head's unit: seconds, or UTC seconds when live. Sizes are CSS pixels.
 "use strict";
 
-const $ = id => document.getElementById(id);
 const RING_SLOTS = 1 << 17;
 const WINDOWS_S = [5, 10, 30, 60];
 const NEAR_S = 60 / (0.9 * RING_SLOTS); // samples closer than this share a slot: no rate overflows
 const RETRY_MS = [500, 1000, 2000, 4000];
-const TRAIL = 512; // places of the live pose from above
+const TRAIL = 512; // places of the live tool from above
 const EVENTS_KEPT = 1000;
-const LISTED = 200; // cuts and events in the list
-const LEFT = 62, RIGHT = 12; // of the plots, CSS pixels
+const LEFT = 62, RIGHT = 12; // of the plots
 const STEPS = 200; // of the cursor across the view
 
-let head = null;
-let live = false;
-let series = []; // one a track: the newest part, or rings
+let head = null, live = false, status = {};
+let series = []; // one a track: of the newest part, or rings
 let part = null, whole = null; // parts: the newest, and one of the whole axis
 let frames = []; // of a document: [t, image]
-const view = {from: 0, to: 1};
-let cursor = null, hover = null, span = null;
-let playing = false; // the cursor runs, or the live window rolls
-let selecting = false;
-let windowS = 10;
-let trail = null;
-let status = {};
-let rows = [], height = 0, colours = {}, pixels = 1;
-let dirty = {data: true, over: true}, asleep = true, playedAt = 0;
-const reducedMotion = matchMedia("(prefers-reduced-motion: reduce)");
+let trail = null; // where the live tool was
+let cursor = null, hoverPx = null, span = null, playing = false, selecting = false;
+let rows = [], plotWidth = 0, pixels = 1, windowS = 10, asleep = true, playedAt = 0;
+const view = {from: 0, to: 1}, colours = {};
+const $ = id => document.getElementById(id);
+const keyButton = key => document.querySelector(`[data-key="${key}"]`);
+const canvasIn = id => $(id).querySelector("canvas");
 const clamp = (v, low, high) => Math.max(low, Math.min(high, v));
 
 // ---- series -------------------------------------------------------------------------------
-
 const numbers = list => Float64Array.from(list, v => v ?? NaN);
+const slot = (s, i) => s.start + i & s.mask;
+const newestX = s => s.count ? s.x[slot(s, s.count - 1)] : -Infinity;
+const newest = () => series.reduce((x, s) => Math.max(x, newestX(s)), -Infinity);
 
-function readPart(message) {
+function readPart({from, to, tracks}) {
 	const centres = new Map(); // of columns, shared by the tracks that have as many
-	const {from, to} = message;
-	return {from, to, series: message.tracks.map(track => {
-		const low = numbers(track.low ?? track.y);
-		const count = low.length;
+	return {from, to, series: tracks.map(track => {
+		const low = numbers(track.low ?? track.y), count = low.length;
 		if (!track.x && !centres.has(count))
 			centres.set(count, low.map((_, i) => from + (to - from) * (i + 0.5) / count));
 		return {x: track.x ? numbers(track.x) : centres.get(count), low, start: 0, count, mask: -1,
-			high: track.high ? numbers(track.high) : low, u: track.u ? numbers(track.u) : null,
-			columns: !track.x};
+			high: track.high ? numbers(track.high) : low, u: track.u && numbers(track.u)};
 	})};
 }
 
 function newRing(slots) {
 	return {x: new Float64Array(slots), low: new Float32Array(slots), high: new Float32Array(slots),
-		u: null, start: 0, count: 0, mask: slots - 1};
+		start: 0, count: 0, mask: slots - 1};
 }
 
 function push(ring, x, v) {
-	const last = ring.start + ring.count - 1 & ring.mask;
-	if (ring.count) {
-		const since = x - ring.x[last];
-		if (since < -1) // the clock was set back
-			ring.start = ring.count = 0;
-		else if (since < 0)
-			return;
-		else if (since < NEAR_S && v === v && ring.low[last] === ring.low[last]) {
-			ring.low[last] = Math.min(ring.low[last], v);
-			ring.high[last] = Math.max(ring.high[last], v);
-			return;
-		}
+	let k = slot(ring, ring.count - 1);
+	const since = x - newestX(ring);
+	if (since < -1) ring.start = ring.count = 0; // the clock was set back
+	else if (since < 0) return;
+	else if (since < NEAR_S && v === v && ring.low[k] === ring.low[k]) {
+		ring.low[k] = Math.min(ring.low[k], v);
+		ring.high[k] = Math.max(ring.high[k], v);
+		return;
 	}
-	if (ring.count === ring.mask + 1)
-		ring.start = ring.start + 1 & ring.mask;
-	else
-		ring.count++;
-	const k = ring.start + ring.count - 1 & ring.mask;
+	if (ring.count > ring.mask) ring.start = slot(ring, 1);
+	else ring.count++;
+	k = slot(ring, ring.count - 1);
 	ring.x[k] = x;
 	ring.low[k] = ring.high[k] = v;
 }
 
-// The number of samples before x.
 function countBefore(s, x) {
 	let a = 0, b = s.count;
 	while (a < b) {
 		const i = a + b >> 1;
-		if (s.x[s.start + i & s.mask] < x)
-			a = i + 1;
-		else
-			b = i;
+		if (s.x[slot(s, i)] < x) a = i + 1;
+		else b = i;
 	}
 	return a;
 }
 
-function newestX(s) {
-	return s.count ? s.x[s.start + s.count - 1 & s.mask] : -Infinity;
-}
-
 // The place of the sample nearest to x, or -1 outside the series.
 function nearest(s, x) {
-	if (!s.count)
-		return -1;
-	const first = s.x[s.start & s.mask], last = newestX(s);
-	const spacing = s.count > 1 ? (last - first) / (s.count - 1) : 0;
-	if (!(x >= first - spacing && x <= last + spacing))
-		return -1;
-	const i = clamp(countBefore(s, x), 1, s.count - 1 || 1);
-	const a = s.start + i - 1 & s.mask, b = s.start + Math.min(i, s.count - 1) & s.mask;
+	const first = s.x[slot(s, 0)], last = newestX(s), spacing = (last - first) / (s.count - 1) || 0;
+	if (!s.count || !(x >= first - spacing && x <= last + spacing)) return -1;
+	const i = countBefore(s, x), a = slot(s, Math.max(0, i - 1)), b = slot(s, Math.min(i, s.count - 1));
 	return x - s.x[a] <= s.x[b] - x ? a : b;
 }
 
 // The visible samples as at most one entry a device pixel, in s.seen; one more on either side
-// leads the line out of the picture.
-function reduce(s, columns) {
-	if (!s.seen || s.seen.px.length < columns + 4) {
-		const entries = () => new Float64Array(columns + 4);
-		s.seen = {px: entries(), low: entries(), high: entries(), u: entries(), n: 0, samples: 0};
-	}
-	const {px, low, high, u} = s.seen;
-	const scale = columns / (view.to - view.from);
-	let n = 0, column = -2, i = Math.max(0, countBefore(s, view.from) - 1);
-	const first = i;
-	for (; i < s.count; i++) {
-		const k = s.start + i & s.mask;
-		const at = (s.x[k] - view.from) * scale;
-		const here = at < 0 ? -1 : Math.min(columns, Math.floor(at));
+// leads the line out of the picture. `least` and `most` are the range with the band.
+function reduce(s) {
+	if (!s.seen || s.seen.px.length < pixels + 4)
+		s.seen = Object.fromEntries(["px", "low", "high", "u"].map(k => [k, new Float64Array(pixels + 4)]));
+	const {px, low, high, u} = s.seen, scale = pixels / (view.to - view.from);
+	const first = Math.max(0, countBefore(s, view.from) - 1);
+	let e = -1, column = -2, i = first, least = Infinity, most = -Infinity;
+	for (; i < s.count && column < pixels; i++) {
+		const k = slot(s, i), at = (s.x[k] - view.from) * scale, band = s.u ? 2 * s.u[k] || 0 : 0;
+		const here = at < 0 ? -1 : Math.min(pixels, Math.floor(at));
 		if (here !== column) {
 			column = here;
-			px[n] = at;
-			low[n] = high[n] = u[n] = NaN;
-			n++;
+			px[++e] = LEFT + at / pixels * plotWidth;
+			low[e] = high[e] = u[e] = NaN;
 		}
-		const e = n - 1;
-		if (s.low[k] < low[e] || low[e] !== low[e])
-			low[e] = s.low[k];
-		if (s.high[k] > high[e] || high[e] !== high[e])
-			high[e] = s.high[k];
-		if (s.u && (s.u[k] > u[e] || u[e] !== u[e]))
-			u[e] = s.u[k];
-		if (here === columns)
-			break;
+		if (s.low[k] < low[e] || low[e] !== low[e]) low[e] = s.low[k];
+		if (s.high[k] > high[e] || high[e] !== high[e]) high[e] = s.high[k];
+		if (s.u && (s.u[k] > u[e] || u[e] !== u[e])) u[e] = s.u[k];
+		if (s.low[k] - band < least) least = s.low[k] - band;
+		if (s.high[k] + band > most) most = s.high[k] + band;
 	}
-	s.seen.n = n;
-	s.seen.samples = i - first;
-	return s.seen;
+	return Object.assign(s.seen, {n: e + 1, samples: i - first, least, most});
 }
 
 // ---- numbers as text ----------------------------------------------------------------------
-
 // A step of 1, 2 or 5 times a power of ten that is not below `least`.
 function niceStep(least) {
 	const power = 10 ** Math.floor(Math.log10(least));
@@ -160,517 +123,368 @@ function niceStep(least) {
 }
 
 const decimalsOf = step => Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
+const twoDigits = v => String(Math.floor(v)).padStart(2, "0");
 
 function fixed(v, decimals) {
-	if (v !== v || v === null || v === undefined)
-		return "–";
+	if (!Number.isFinite(v)) return "–";
 	const text = Math.abs(v) >= 1e6 || decimals > 6 ? v.toExponential(3) : v.toFixed(decimals);
-	return text.replace(/^-(?=0\.?0*$)/, "").replace("-", "−");
+	return text.replace(/^-(?=[0.]*$)/, "").replace("-", "−");
 }
 
-const clock = x => new Date(1000 * x).toTimeString().slice(0, 8) +
-	"." + String(Math.floor(1000 * x) % 1000).padStart(3, "0");
+function clock(x, decimals) {
+	const text = new Date(1000 * x).toTimeString().slice(0, 8);
+	return decimals ? `${text}.${String(Math.floor(1000 * x) % 1000).padStart(3, "0")}` : text;
+}
 
 // A place on the x axis for people: to a pixel, and as hours where seconds are many.
 function place(x) {
-	if (live)
-		return clock(x);
+	if (live) return clock(x, 3);
 	const decimals = clamp(decimalsOf(niceStep((view.to - view.from) / 1500)), 0, 6);
-	const pad = v => String(Math.floor(v)).padStart(2, "0");
-	const text = `${fixed(x, decimals)} ${head.axis.unit ?? ""}`.trim();
-	return head.axis.unit === "s" && head.to > 600 ?
-		`${text} (${Math.floor(x / 3600)}:${pad(x / 60 % 60)}:${pad(x % 60)})` : text;
+	const unit = head.axis.unit ?? "", text = `${fixed(x, decimals)} ${unit}`.trim();
+	const hours = `${Math.floor(x / 3600)}:${twoDigits(x / 60 % 60)}:${twoDigits(x % 60)}`;
+	return unit === "s" && head.to > 600 ? `${text} (${hours})` : text;
 }
 
 function valueText(s, x, decimals) {
-	const k = nearest(s, x);
-	if (k < 0 || s.low[k] !== s.low[k])
-		return "–";
+	const k = s ? nearest(s, x) : -1;
+	if (k < 0 || s.low[k] !== s.low[k]) return "–";
 	const low = fixed(s.low[k], decimals), high = fixed(s.high[k], decimals);
-	const u = s.u && s.u[k] === s.u[k] ? ` ± ${fixed(2 * s.u[k], decimals)}` : "";
-	return (low === high ? low : `${low} … ${high}`) + u;
+	const band = s.u && s.u[k] === s.u[k] ? ` ± ${fixed(2 * s.u[k], decimals)}` : "";
+	return (low === high ? low : `${low} … ${high}`) + band;
 }
 
 // ---- the picture --------------------------------------------------------------------------
+const toPx = x => LEFT + (x - view.from) / (view.to - view.from) * plotWidth;
+const toX = px => view.from + (px - LEFT) / plotWidth * (view.to - view.from);
+const isSeen = (from, to = from) => to >= view.from && from <= view.to;
+const seenCuts = () => head.cuts.filter(([from, to]) => isSeen(from, to));
+const trackColour = i => colours.tracks[i % colours.tracks.length];
+const isFollowing = () => live && playing;
+const shownX = () => hoverPx !== null ? toX(hoverPx) : isFollowing() ? newest() : cursor;
 
 function readColours() {
 	const style = getComputedStyle(document.documentElement);
-	for (const name of ["ink", "soft", "page", "line", "band", "mark", "cut", "good", "bad"])
+	for (const name of ["ink", "soft", "page", "line", "band", "mark", "cut", "bad", "tracks"])
 		colours[name] = style.getPropertyValue("--" + name).trim();
-	colours.tracks = style.getPropertyValue("--tracks").trim().split(/\s+/);
-	colours.font = style.getPropertyValue("font-family") || "sans-serif";
+	colours.tracks = colours.tracks.split(/\s+/);
+	colours.font = `13px ${getComputedStyle(document.body).fontFamily}`;
 }
 
-function fitCanvas(canvas, cssWidth, cssHeight) {
-	const scale = Math.min(devicePixelRatio || 1, 16000 / Math.max(cssWidth, cssHeight, 1));
-	const w = Math.round(cssWidth * scale), h = Math.round(cssHeight * scale);
-	if (canvas.width !== w || canvas.height !== h) {
-		canvas.width = w;
-		canvas.height = h;
-		canvas.style.height = cssHeight + "px";
-	}
-	const g = canvas.getContext("2d");
-	g.setTransform(scale, 0, 0, scale, 0, 0);
-	g.clearRect(0, 0, cssWidth, cssHeight);
-	g.font = `13px ${colours.font}`;
-	g.textBaseline = "middle";
-	g.lineJoin = g.lineCap = "round";
-	return g;
+function box(g, colour, x, y, w, h) {
+	g.fillStyle = colour;
+	g.fillRect(x, y, w, h);
 }
 
-// Rows from the top: axis, cuts, events, a lane a member, frames, panels. A panel's legend has a cell
-// a track as wide as its longest value, so that nothing moves while values change.
-function arrange() {
-	const width = $("stage").clientWidth;
-	const g = $("over").getContext("2d");
-	g.font = `13px ${colours.font}`;
-	rows = [];
-	height = 0;
-	const add = row => {
-		rows.push({top: height, ...row});
-		height += row.height;
-	};
-	add({kind: "axis", height: 30});
-	if (head.cuts.length)
-		add({kind: "cuts", height: 24});
-	if (head.events.length || live)
-		add({kind: "events", height: 24});
-	for (const member of head.members ?? [])
-		add({kind: "member", height: 40, member});
-	if (frames.length > 1)
-		add({kind: "frames", height: 64});
-	const panels = head.panels.map(panel => {
-		let x = LEFT, lines = 1;
-		const title = panel.tracks.length > 1 || !panel.label ? panel.label ?? "" : "";
-		const name = title && panel.unit ? `${title} (${panel.unit})` : title;
-		if (name)
-			x += g.measureText(name).width + 18;
-		const cells = panel.tracks.map(track => {
-			const label = head.tracks[track].label || panel.label || "";
-			const own = name || !panel.unit ? label : `${label} (${panel.unit})`;
-			const cell = 22 + g.measureText(own + "  −000.000").width +
-				(panel.u || series[track]?.u ? g.measureText(" ± 00.000").width : 0);
-			if (x + cell > width - RIGHT && x > LEFT) {
-				x = LEFT;
-				lines++;
-			}
-			x += cell;
-			return {track, text: own, x: x - cell, line: lines - 1};
-		});
-		return {kind: "panel", panel, name, cells, legend: 6 + 20 * lines};
-	});
-	const used = height + panels.reduce((sum, p) => sum + p.legend, 0) + 40;
-	const most = live || panels.length < 3 ? 260 : 190;
-	const plot = clamp((innerHeight - $("stage").offsetTop - used) / (panels.length || 1) - 14, 110, most);
-	for (const panel of panels)
-		add({...panel, height: panel.legend + plot + 14, plot});
-	height += 4;
-	$("stage").style.height = height + "px";
-	const w = Math.max(50, width - LEFT - RIGHT);
-	pixels = Math.round(w * Math.min(devicePixelRatio || 1, 16000 / height));
-	rows.width = w;
-	document.body.dataset.columns = pixels;
-	dirty.data = dirty.over = true;
+function write(g, colour, text, x, y, align = "left", widest = 9999) {
+	g.fillStyle = colour;
+	g.textAlign = align;
+	g.fillText(text, x, y, widest);
 }
 
-const toPx = x => LEFT + (x - view.from) / (view.to - view.from) * rows.width;
-const toX = px => view.from + (px - LEFT) / rows.width * (view.to - view.from);
+function stroke(g, colour, width, trace) {
+	Object.assign(g, {strokeStyle: colour, lineWidth: width});
+	g.beginPath();
+	trace();
+	g.stroke();
+}
 
-function clipPlots(g) {
+function within(g, x, y, w, h, draws) {
 	g.save();
 	g.beginPath();
-	g.rect(LEFT, 0, rows.width, height);
+	g.rect(x, y, w, h);
 	g.clip();
+	draws();
+	g.restore();
+}
+
+function cleared(canvas, w, h) {
+	const scale = Math.min(devicePixelRatio || 1, 16000 / Math.max(w, h, 1)), g = canvas.getContext("2d");
+	const size = {width: Math.round(w * scale), height: Math.round(h * scale)};
+	if (canvas.width !== size.width || canvas.height !== size.height) Object.assign(canvas, size);
+	canvas.style.height = h + "px";
+	g.setTransform(scale, 0, 0, scale, 0, 0);
+	g.clearRect(0, 0, w, h);
+	return Object.assign(g, {font: colours.font, textBaseline: "middle", lineJoin: "round",
+		lineCap: "round"});
+}
+
+// A panel's legend has a cell a track, as wide as its longest value, so that nothing moves while
+// values change.
+function arrangeLegend(g, width, panel) {
+	const own = panel.tracks.length === 1 && panel.label, unit = panel.unit ? ` (${panel.unit})` : "";
+	const name = own ? "" : (panel.label ?? "") + unit;
+	let x = LEFT + (name && g.measureText(name).width + 22), line = 0;
+	const cells = panel.tracks.map((track, i) => {
+		const label = head.tracks[track]?.label || panel.label || "", text = own ? label + unit : label;
+		const room = series[track]?.u ? "  −000.000 ± 00.000" : "  −000.000";
+		const cell = 24 + g.measureText(text + room).width;
+		if (x + cell > width - RIGHT && x > LEFT) [x, line] = [LEFT, line + 1];
+		x += cell;
+		return {track, text, label, colour: i, x: x - cell, line};
+	});
+	return {kind: "panel", panel, name, cells, legend: 26 + 20 * line};
+}
+
+// Rows from the top: axis, cuts, events, a lane a member, frames, and panels, which share what the
+// window has left.
+function arrange() {
+	const width = $("stage").clientWidth, g = canvasIn("stage").getContext("2d");
+	g.font = colours.font;
+	const panels = head.panels.map(panel => arrangeLegend(g, width, panel));
+	rows = [{kind: "axis", height: 30}];
+	if (head.cuts.length) rows.push({kind: "cuts", height: 24});
+	if (head.events.length || live) rows.push({kind: "events", height: 24});
+	rows.push(...(head.members ?? []).map(member => ({kind: "member", height: 40, member})));
+	if (frames.length > 1) rows.push({kind: "frames", height: 64});
+	const used = [...rows, ...panels].reduce((sum, row) => sum + (row.height ?? row.legend + 16), 60);
+	const plot = clamp((innerHeight - $("stage").offsetTop - used) / (panels.length || 1), 110,
+		live || panels.length < 3 ? 260 : 190);
+	rows.push(...panels.map(row => ({...row, plot, height: row.legend + plot + 16})));
+	rows.height = rows.reduce((top, row) => (row.top = top) + row.height, 0);
+	plotWidth = Math.max(50, width - LEFT - RIGHT);
+	pixels = Math.round(plotWidth * Math.min(devicePixelRatio || 1, 16000 / rows.height));
+	document.body.dataset.columns = pixels;
+	wake();
+}
+
+// Draws what does not touch the one before; the rest is left out.
+function spread(list, middle, half, draws) {
+	let free = -Infinity;
+	for (const one of list) {
+		const px = middle(one), room = half(one);
+		if (px - room < free) continue;
+		draws(one, px);
+		free = px + room;
+	}
 }
 
 function drawAxis(g, row) {
-	const step = niceStep((view.to - view.from) * 95 / rows.width);
-	const decimals = decimalsOf(step);
-	const zero = live ? newest() : 0;
-	const ticks = [];
-	for (let i = Math.ceil((view.from - zero) / step); i * step + zero <= view.to; i++)
-		ticks.push([toPx(i * step + zero), fixed(i * step, decimals)]);
-	g.fillStyle = colours.band;
-	g.fillRect(LEFT, row.top, rows.width, row.height - 6);
-	const {from, to} = limits();
-	if (to - from > view.to - view.from) { // the place of the view in the whole
-		const scale = rows.width / (to - from);
-		g.fillStyle = colours.line;
-		g.fillRect(LEFT, row.top + 24, rows.width, 4);
-		g.fillStyle = colours.mark;
-		g.fillRect(LEFT + (view.from - from) * scale, row.top + 24,
-			Math.max(4, (view.to - view.from) * scale), 4);
+	const step = niceStep((view.to - view.from) * 95 / plotWidth), decimals = decimalsOf(step);
+	const all = limits(), scale = plotWidth / (all.to - all.from), ticks = [];
+	box(g, colours.band, LEFT, 0, plotWidth, row.height - 6);
+	if (all.to - all.from > (view.to - view.from) * 1.0001) { // the place of the view in the whole
+		box(g, colours.line, LEFT, 24, plotWidth, 4);
+		within(g, LEFT, 24, plotWidth, 4, () => box(g, colours.mark,
+			LEFT + (view.from - all.from) * scale, 24, Math.max(4, (view.to - view.from) * scale), 4));
 	}
-	g.fillStyle = colours.soft;
-	g.textAlign = "right";
-	g.fillText(live ? "s ago" : head.axis.unit || head.axis.label, LEFT - 8, row.top + 12);
-	for (const [px, text] of ticks) {
-		const half = g.measureText(text).width / 2;
-		g.textAlign = "center";
-		g.fillText(text, clamp(px, LEFT + half + 2, LEFT + rows.width - half - 2), row.top + 12);
-		g.fillRect(px - 0.5, row.top, 1, 4);
+	write(g, colours.soft, head.axis.unit || head.axis.label, LEFT - 8, 12, "right", LEFT - 10);
+	for (let i = Math.ceil(view.from / step); i * step <= view.to; i++) {
+		const text = live ? clock(i * step + 1e-6, decimals) : fixed(i * step, decimals);
+		const half = g.measureText(text).width / 2 + 2, px = toPx(i * step);
+		write(g, colours.soft, text, clamp(px, LEFT + half, LEFT + plotWidth - half), 12, "center");
+		g.fillRect(px - 0.5, 0, 1, 4);
+		ticks.push(px);
 	}
 	return ticks;
 }
 
-// Cuts and events that would stand closer than a label leave their labels out.
-function drawMarks(g, row) {
-	let free = -Infinity;
-	g.textAlign = "center";
-	if (row.kind === "cuts")
-		for (const [from, to, label] of head.cuts) {
-			if (to < view.from || from > view.to)
-				continue;
-			const a = Math.max(LEFT, toPx(from)), b = Math.min(LEFT + rows.width, toPx(to));
-			g.fillStyle = colours.mark;
-			g.fillRect(a, row.top + 18, Math.max(1, b - a), 3);
-			const half = g.measureText(label).width / 2 + 3, middle = (a + b) / 2;
-			if (middle - half > free) {
-				g.fillText(label, middle, row.top + 9);
-				free = middle + half;
-			}
-		}
-	else
-		for (const [x] of head.events)
-			if (x >= view.from && x <= view.to && toPx(x) > free + 1) {
-				g.fillStyle = colours.bad;
-				g.beginPath();
-				g.moveTo(toPx(x) - 6, row.top + 4);
-				g.lineTo(toPx(x) + 6, row.top + 4);
-				g.lineTo(toPx(x), row.top + 17);
-				g.fill();
-				free = toPx(x);
-			}
-}
+const drawers = {
+	cuts(g, {top}) {
+		const ends = cut => [Math.max(LEFT, toPx(cut[0])), Math.min(LEFT + plotWidth, toPx(cut[1]))];
+		for (const [a, b] of seenCuts().map(ends))
+			box(g, colours.mark, a, top + 18, Math.max(1, b - a), 3);
+		spread(seenCuts(), cut => (ends(cut)[0] + ends(cut)[1]) / 2, ([, , label]) =>
+			g.measureText(label).width / 2 + 3, ([, , label], px) =>
+			write(g, colours.mark, label, px, top + 9, "center"));
+	},
+	events(g, {top}) {
+		spread(head.events.filter(([x]) => isSeen(x)), ([x]) => toPx(x), () => 1, (_, px) =>
+			write(g, colours.bad, "▼", px, top + 12, "center"));
+	},
+	member(g, {top, member: {label, from, to, text}}) {
+		within(g, LEFT, top, plotWidth, 40, () =>
+			box(g, colours.line, toPx(from), top + 24, toPx(to) - toPx(from), 8));
+		const line = text ? `${label}: ${text}` : label;
+		write(g, colours.ink, line, LEFT + 4, top + 11, "left", plotWidth - 8);
+	},
+	frames(g, {top, height}) {
+		const half = image => (height - 8) * image.naturalWidth / image.naturalHeight / 2;
+		spread(frames.filter(([t, image]) => isSeen(t) && image.naturalWidth),
+			([t, image]) => clamp(toPx(t), LEFT + half(image), LEFT + plotWidth - half(image)),
+			([, image]) => half(image) + 1, ([, image], px) =>
+				g.drawImage(image, px - half(image), top + 4, 2 * half(image), height - 8));
+	},
+	panel: drawPanel,
+};
 
-function drawMember(g, row) {
-	const {label, from, to, text} = row.member;
-	const a = Math.max(LEFT, toPx(from)), b = Math.min(LEFT + rows.width, toPx(to));
-	g.fillStyle = colours.line;
-	if (b > a)
-		g.fillRect(a, row.top + 24, b - a, 8);
-	g.fillStyle = colours.ink;
-	g.textAlign = "left";
-	g.fillText(text ? `${label}: ${text}` : label, LEFT + 4, row.top + 11, rows.width - 8);
-}
-
-function drawFrames(g, row) {
-	let right = LEFT - 1;
-	for (const [t, image] of frames) {
-		if (!image.complete || !image.naturalWidth || t < view.from || t > view.to)
-			continue;
-		const h = row.height - 8, w = h * image.naturalWidth / image.naturalHeight;
-		const x = clamp(toPx(t) - w / 2, LEFT, LEFT + rows.width - w);
-		if (x <= right)
-			continue;
-		g.drawImage(image, x, row.top + 4, w, h);
-		right = x + w + 2;
-	}
-}
-
-// The panel's range: what is seen with its band, out to whole steps.
+// The panel's range goes out to half steps of its axis.
 function scalePanel(row, seen) {
-	let low = Infinity, high = -Infinity;
-	for (const e of seen)
-		for (let i = 0; i < e.n; i++) {
-			const band = e.u[i] === e.u[i] ? 2 * e.u[i] : 0;
-			if (e.low[i] - band < low)
-				low = e.low[i] - band;
-			if (e.high[i] + band > high)
-				high = e.high[i] + band;
-		}
-	row.empty = low > high;
-	if (row.empty)
-		[low, high] = [0, 1];
+	let low = Math.min(...seen.map(e => e.least)), high = Math.max(...seen.map(e => e.most));
+	row.empty = !(low <= high);
+	if (row.empty) [low, high] = [0, 1];
 	if (!(high - low > 1e-9 * Math.max(Math.abs(low), Math.abs(high))))
 		[low, high] = [low - (Math.abs(low) / 10 || 1), high + (Math.abs(high) / 10 || 1)];
-	const step = niceStep((high - low) / Math.max(2, row.plot / 45));
-	const y0 = Math.floor(low / step * 2 + 1e-6) / 2 * step;
-	const y1 = Math.ceil(high / step * 2 - 1e-6) / 2 * step;
+	const step = niceStep((high - low) / Math.max(2, row.plot / 45)), half = step / 2;
+	const y0 = Math.floor(low / half + 1e-6) * half, y1 = Math.ceil(high / half - 1e-6) * half;
 	const base = row.top + row.legend, scale = row.plot / (y1 - y0);
-	Object.assign(row, {step, y0, y1, decimals: decimalsOf(step) + 2,
-		toY: v => base + (y1 - v) * scale});
+	const toY = v => base + (y1 - v) * scale;
+	Object.assign(row, {step, y0, y1, decimals: decimalsOf(step) + 2, toY});
 }
 
-function drawBand(g, e, left, scale, toY) {
-	for (let i = 0; i < e.n;) {
-		const from = i;
-		while (i < e.n && e.u[i] === e.u[i] && e.low[i] === e.low[i])
-			i++;
-		if (i > from) {
-			g.beginPath();
-			for (let k = from; k < i; k++)
-				g.lineTo(left + e.px[k] * scale, toY(e.high[k] + 2 * e.u[k]));
-			for (let k = i - 1; k >= from; k--)
-				g.lineTo(left + e.px[k] * scale, toY(e.low[k] - 2 * e.u[k]));
-			g.fill();
-		}
-		i++;
-	}
-}
-
-function drawTrace(g, e, left, scale, toY, dots) {
-	let down = false;
-	g.beginPath();
+function drawBand(g, e, toY) {
 	for (let i = 0; i < e.n; i++) {
-		if (e.low[i] !== e.low[i]) {
-			down = false;
-			continue;
-		}
-		const x = left + e.px[i] * scale, y = toY(e.low[i]);
-		if (!down)
-			g.moveTo(x, y);
-		g.lineTo(x, y);
-		g.lineTo(x, toY(e.high[i]));
-		down = true;
+		const from = i;
+		while (i < e.n && e.u[i] === e.u[i] && e.low[i] === e.low[i]) i++;
+		g.beginPath();
+		for (let k = from; k < i; k++) g.lineTo(e.px[k], toY(e.high[k] + 2 * e.u[k]));
+		for (let k = i - 1; k >= from; k--) g.lineTo(e.px[k], toY(e.low[k] - 2 * e.u[k]));
+		g.fill();
 	}
-	g.stroke();
-	if (dots)
-		for (let i = 0; i < e.n; i++)
-			if (e.low[i] === e.low[i]) {
-				g.beginPath();
-				g.arc(left + e.px[i] * scale, toY(e.low[i]), 2.5, 0, 7);
-				g.fill();
-			}
+}
+
+function drawTrace(g, e, toY, joined) {
+	for (let i = 0, down = false; i < e.n; i++) {
+		const good = e.low[i] === e.low[i];
+		if (good && !(down && joined)) g.moveTo(e.px[i], toY(e.low[i]));
+		if (good) g.lineTo(e.px[i], toY(e.low[i]));
+		if (good) g.lineTo(e.px[i], toY(e.high[i]));
+		down = good;
+	}
 }
 
 function drawPanel(g, row) {
-	const shown = row.cells.map(cell => series[cell.track]).filter(Boolean);
-	const seen = shown.map(s => reduce(s, pixels));
-	scalePanel(row, seen);
-	g.strokeStyle = colours.line;
-	g.lineWidth = 1;
-	g.fillStyle = colours.soft;
-	g.textAlign = "right";
-	const labels = row.decimals - 2;
-	for (let i = Math.ceil(row.y0 / row.step); i * row.step <= row.y1 * (1 + 1e-9) + 1e-12; i++) {
-		const y = row.toY(i * row.step);
-		g.beginPath();
-		g.moveTo(LEFT, Math.round(y) + 0.5);
-		g.lineTo(LEFT + rows.width, Math.round(y) + 0.5);
-		g.stroke();
-		g.fillText(fixed(i * row.step, labels), LEFT - 8, y);
+	const cells = row.cells.filter(cell => series[cell.track]), {top, legend, plot, cells: all} = row;
+	scalePanel(row, cells.map(cell => reduce(series[cell.track])));
+	const {step, toY} = row, base = top + legend;
+	for (let i = Math.ceil(row.y0 / step - 1e-6); i * step <= row.y1 + 1e-6 * step; i++) {
+		box(g, colours.line, LEFT, Math.round(toY(i * step)), plotWidth, 1);
+		write(g, colours.soft, fixed(i * step, row.decimals - 2), LEFT - 8, toY(i * step), "right");
 	}
-	g.save();
-	g.beginPath();
-	g.rect(LEFT, row.top + row.legend - 3, rows.width, row.plot + 6);
-	g.clip();
-	const scale = rows.width / pixels;
-	seen.forEach((e, i) => {
-		g.strokeStyle = g.fillStyle = colours.tracks[i % colours.tracks.length];
-		if (shown[i].u) {
-			g.globalAlpha = 0.22;
-			drawBand(g, e, LEFT, scale, row.toY);
-			g.globalAlpha = 1;
-		}
-		g.lineWidth = 1.6;
-		drawTrace(g, e, LEFT, scale, row.toY, e.samples < rows.width / 12);
-	});
-	g.restore();
-	if (row.empty) {
-		g.fillStyle = colours.soft;
-		g.textAlign = "center";
-		g.fillText("no data here", LEFT + rows.width / 2, row.top + row.legend + row.plot / 2);
+	within(g, LEFT, base - 3, plotWidth, plot + 6, () => cells.forEach(({track, colour}) => {
+		const {seen, u} = series[track];
+		Object.assign(g, {fillStyle: trackColour(colour), globalAlpha: 0.22});
+		if (u) drawBand(g, seen, toY);
+		g.globalAlpha = 1;
+		stroke(g, trackColour(colour), 1.6, () => drawTrace(g, seen, toY, true));
+		if (seen.samples < plotWidth / 12) // few: each is a dot
+			stroke(g, trackColour(colour), 5, () => drawTrace(g, seen, toY, false));
+	}));
+	if (row.empty) write(g, colours.soft, "no data here", LEFT + plotWidth / 2, base + plot / 2, "center");
+	g.font = "600 " + colours.font;
+	write(g, colours.ink, row.name, LEFT, top + 12);
+	g.font = colours.font;
+	for (const {track, text, colour, x, line} of all) {
+		const at = shownX(), value = at === null ? "" : valueText(series[track], at, row.decimals);
+		box(g, trackColour(colour), x, top + 10 + 20 * line, 14, 4);
+		write(g, colours.ink, `${text}  ${value}`, x + 19, top + 12 + 20 * line);
 	}
 }
 
-function drawData() {
-	const g = fitCanvas($("data"), LEFT + rows.width + RIGHT, height);
-	const ticks = drawAxis(g, rows[0]);
-	const body = rows.find(row => row.kind === "panel");
-	if (body) {
-		clipPlots(g);
-		g.fillStyle = colours.line;
-		for (const [px] of ticks)
-			g.fillRect(Math.round(px), body.top + body.legend, 1, height - body.top - body.legend - 16);
-		g.fillStyle = colours.cut;
-		for (const [from, to] of head.cuts)
-			if (to >= view.from && from <= view.to)
-				g.fillRect(toPx(from), body.top, Math.max(1, toPx(to) - toPx(from)), height - body.top - 4);
-		g.restore();
-	}
-	for (const row of rows)
-		if (row.kind === "panel")
-			drawPanel(g, row);
-		else if (row.kind === "member")
-			drawMember(g, row);
-		else if (row.kind === "frames")
-			drawFrames(g, row);
-		else if (row.kind !== "axis")
-			drawMarks(g, row);
+function eventNear(x) {
+	const far = event => Math.abs(event[0] - x), reach = 10 * (view.to - view.from) / plotWidth;
+	return head.events.filter(event => far(event) <= reach).sort((a, b) => far(a) - far(b))[0];
 }
 
-const isFollowing = () => live && playing;
-const shownX = () => hover ?? (isFollowing() ? newest() : cursor);
-
-function eventNear(x, px) {
-	const reach = px * (view.to - view.from) / rows.width;
-	let best = null;
-	for (const event of head.events)
-		if (Math.abs(event[0] - x) <= reach && (!best || Math.abs(event[0] - x) < Math.abs(best[0] - x)))
-			best = event;
-	return best;
+function drawLabel(g, text, middle, y) {
+	const w = Math.min(g.measureText(text).width + 12, plotWidth);
+	const x = clamp(middle - w / 2, LEFT, LEFT + plotWidth - w);
+	box(g, colours.ink, x, y - 11, w, 22);
+	write(g, colours.page, text, x + w / 2, y + 0.5, "center", w - 8);
 }
 
-function drawOver() {
-	const g = fitCanvas($("over"), LEFT + rows.width + RIGHT, height);
-	const x = shownX();
-	clipPlots(g);
-	if (span) {
-		const a = toPx(span[0]), b = toPx(span[1]);
-		g.fillStyle = colours.mark;
+function drawCursor(g) {
+	const [a, b] = span ? span.map(toPx) : [0, 0], x = shownX(), event = x !== null && eventNear(x);
+	within(g, LEFT, 0, plotWidth, rows.height, () => {
 		g.globalAlpha = 0.16;
-		g.fillRect(a, 0, b - a, height);
+		box(g, colours.mark, a, 0, b - a, rows.height);
 		g.globalAlpha = 1;
-		g.fillRect(a - 1, 0, 2, height);
-		g.fillRect(b - 1, 0, 2, height);
-	}
-	g.fillStyle = colours.ink;
-	if (cursor !== null && !isFollowing())
-		g.fillRect(toPx(cursor) - 0.75, 0, 1.5, height);
-	if (hover !== null) {
-		g.globalAlpha = 0.45;
-		g.fillRect(toPx(hover) - 0.5, 0, 1, height);
-		g.globalAlpha = 1;
-	}
-	g.restore();
-	for (const row of rows)
-		if (row.kind === "panel")
-			drawLegend(g, row, x);
-	if (x === null)
-		return;
-	const event = eventNear(x, 8), at = rows.find(row => row.kind === "events");
-	if (!isFollowing() || hover !== null)
-		drawLabel(g, place(x), toPx(x), 12);
-	if (event && at && (!isFollowing() || hover !== null))
-		drawLabel(g, event[2] ? `${event[1]}: ${event[2]}` : event[1], toPx(event[0]), at.top + 12);
-}
-
-function drawLegend(g, row, x) {
-	g.textAlign = "left";
-	g.fillStyle = colours.ink;
-	g.font = `600 13px ${colours.font}`;
-	g.fillText(row.name, LEFT, row.top + 12);
-	g.font = `13px ${colours.font}`;
-	row.cells.forEach((cell, i) => {
-		const y = row.top + 12 + 20 * cell.line;
-		g.fillStyle = colours.tracks[i % colours.tracks.length];
-		g.fillRect(cell.x, y - 2, 14, 4);
-		g.fillStyle = colours.ink;
-		const s = series[cell.track];
-		const value = s && x !== null && row.decimals ? valueText(s, x, row.decimals) : "";
-		g.fillText(`${cell.text}  ${value}`, cell.x + 19, y);
+		for (const px of span ? [a, b] : []) box(g, colours.mark, px - 1, 0, 2, rows.height);
+		if (cursor !== null) box(g, colours.ink, toPx(cursor) - 0.75, 0, 1.5, rows.height);
+		if (hoverPx !== null) box(g, colours.soft, hoverPx - 0.5, 0, 1, rows.height);
 	});
+	if (cursor === null && hoverPx === null) return;
+	drawLabel(g, place(x), toPx(x), 12);
+	if (event) drawLabel(g, event.slice(1).filter(Boolean).join(": "), toPx(event[0]),
+		rows.find(row => row.kind === "events").top + 12);
 }
 
-function drawLabel(g, text, px, y) {
-	const w = Math.min(g.measureText(text).width + 12, rows.width);
-	const x = clamp(px - w / 2, LEFT, LEFT + rows.width - w);
-	g.fillStyle = colours.ink;
-	g.fillRect(x, y - 11, w, 22);
-	g.fillStyle = colours.page;
-	g.textAlign = "center";
-	g.fillText(text, x + w / 2, y + 0.5, w - 8);
+function drawPlots() {
+	const g = cleared(canvasIn("stage"), LEFT + plotWidth + RIGHT, rows.height);
+	const ticks = drawAxis(g, rows[0]), top = rows.find(row => row.kind === "panel")?.top ?? rows.height;
+	within(g, LEFT, top, plotWidth, rows.height - top - 4, () => {
+		for (const px of ticks) box(g, colours.line, Math.round(px), top + 26, 1, rows.height);
+		for (const [from, to] of seenCuts())
+			box(g, colours.cut, toPx(from), top, Math.max(1, toPx(to) - toPx(from)), rows.height);
+	});
+	for (const row of rows) drawers[row.kind]?.(g, row);
+	drawCursor(g);
 }
 
 // ---- beside the plots ---------------------------------------------------------------------
-
 // The path from above, x to the right and y up, both to one scale, which a bar shows.
 function drawAbove() {
-	const p = trail ?? head.path;
-	if (!p || !p.count)
-		return;
-	const canvas = $("above").querySelector("canvas");
-	$("above").hidden = false;
-	const size = canvas.clientWidth, high = Math.round(size * 0.7);
-	const g = fitCanvas(canvas, size, high);
-	let [x0, x1, y0, y1] = [Infinity, -Infinity, Infinity, -Infinity];
-	for (let i = 0; i < p.count; i++) {
-		const k = p.start + i & p.mask;
-		[x0, x1] = [Math.min(x0, p.low[k]), Math.max(x1, p.low[k])];
-		[y0, y1] = [Math.min(y0, p.high[k]), Math.max(y1, p.high[k])];
-	}
-	const scale = Math.min((size - 40) / (x1 - x0 || 1e-6), (high - 56) / (y1 - y0 || 1e-6), size / 2);
+	const p = trail ?? head.path, canvas = canvasIn("above");
+	$("above").hidden = !p?.count;
+	if (!p?.count) return;
+	const size = canvas.clientWidth, tall = Math.round(size * 0.7), g = cleared(canvas, size, tall);
+	const range = list => list.subarray(0, p.count).reduce(([a, b], v) =>
+		[v < a ? v : a, v > b ? v : b], [Infinity, -Infinity]);
+	const [x0, x1] = range(p.low), [y0, y1] = range(p.high), middle = (tall - 24) / 2;
+	const scale = Math.min((size - 40) / (x1 - x0 || 1e-6), (tall - 56) / (y1 - y0 || 1e-6), size / 2);
 	const at = k => [size / 2 + (p.low[k] - (x0 + x1) / 2) * scale,
-		(high - 24) / 2 - (p.high[k] - (y0 + y1) / 2) * scale];
-	const line = (from, to, colour, width) => {
-		g.strokeStyle = colour;
-		g.lineWidth = width;
-		g.beginPath();
-		for (let i = from; i < to; i++)
-			g.lineTo(...at(p.start + i & p.mask));
-		g.stroke();
-	};
-	line(0, p.count, trail ? colours.tracks[0] : colours.soft, 1.2);
-	if (!trail)
-		line(countBefore(p, view.from), countBefore(p, view.to), colours.tracks[0], 2);
-	const x = trail ? newestX(p) : cursor, k = x === null ? -1 : nearest(p, x);
-	g.fillStyle = colours.tracks[1];
-	if (k >= 0 && p.low[k] === p.low[k]) {
-		g.beginPath();
-		g.arc(...at(k), 6, 0, 7);
-		g.fill();
-	}
-	const bar = niceStep(60 / scale);
-	g.fillStyle = colours.ink;
-	g.fillRect(12, high - 12, bar * scale, 2);
-	g.fillText(`${fixed(bar, decimalsOf(bar))} ${head.path?.unit ?? "mm"}`, 18 + bar * scale, high - 12);
-	if (!trail)
-		$("above").querySelector("figcaption").textContent = "path from above; the dot is at the cursor";
+		middle - (p.high[k] - (y0 + y1) / 2) * scale];
+	const line = (colour, width, from, to) => stroke(g, colour, width, () => {
+		for (let i = from; i < to; i++) g.lineTo(...at(slot(p, i)));
+	});
+	line(colours.soft, 1.2, 0, p.count);
+	if (!trail) line(trackColour(0), 2, countBefore(p, view.from), countBefore(p, view.to));
+	const x = trail ? newestX(p) : shownX(), k = x === null ? -1 : nearest(p, x);
+	if (k >= 0) stroke(g, trackColour(1), 12, () => [g.moveTo(...at(k)), g.lineTo(...at(k))]);
+	const bar = niceStep(60 / scale), text = `${fixed(bar, decimalsOf(bar))} ${head.path?.unit ?? "mm"}`;
+	box(g, colours.ink, 12, tall - 12, bar * scale, 2);
+	write(g, colours.ink, text, 18 + bar * scale, tall - 12);
 }
 
 // Lateness on a logarithmic axis from 1 µs on, counts logarithmic; the line is the period.
 function drawLate({edges_us: edges, counts}) {
-	const canvas = $("late").querySelector("canvas");
 	$("late").hidden = false;
-	const w = canvas.clientWidth, h = 130, deadline = 1e6 / (status.rate_hz || 1000);
-	const g = fitCanvas(canvas, w, h);
-	const last = Math.max(deadline * 2, edges[edges.length - 1] || 1);
+	const canvas = canvasIn("late"), w = canvas.clientWidth, h = 130, g = cleared(canvas, w, h);
+	const deadline = 1e6 / (status.rate_hz || 1000), last = Math.max(deadline * 2, edges.at(-1) || 1);
 	const px = us => 8 + (w - 16) * Math.log(Math.max(1, us)) / Math.log(last);
-	const most = Math.log(1 + Math.max(1, ...counts));
-	g.fillStyle = colours.tracks[0];
+	const most = Math.log(1 + Math.max(1, ...counts)), colour = trackColour(0);
 	counts.forEach((count, i) => {
-		const a = px(edges[i] ?? last), b = px(edges[i + 1] ?? last), bar = (h - 46) * Math.log(1 + count) / most;
-		if (count)
-			g.fillRect(a, h - 24 - bar, Math.max(2, b - a - 1), bar);
+		const a = px(edges[i] ?? last), b = px(edges[i + 1] ?? last);
+		const bar = (h - 46) * Math.log(1 + count) / most;
+		box(g, colour, a, h - 24 - bar, count ? Math.max(2, b - a - 1) : 0, bar);
 	});
-	g.fillStyle = colours.soft;
-	g.fillRect(8, h - 24, w - 16, 1);
-	g.textAlign = "center";
-	for (let us = 1; us <= last; us *= 10)
-		g.fillText(us < 1000 ? us + " µs" : us / 1000 + " ms", clamp(px(us), 18, w - 22), h - 11);
-	g.fillStyle = colours.bad;
-	g.fillRect(px(deadline) - 1, 20, 2, h - 44);
-	g.textAlign = "right";
-	g.fillText("deadline", px(deadline) - 5, 12);
-	const total = counts.reduce((sum, count) => sum + count, 0);
-	const over = counts.reduce((sum, count, i) => sum + (edges[i] >= deadline ? count : 0), 0);
-	canvas.ariaLabel = $("late").querySelector("figcaption").textContent =
-		`lateness of ${total} ticks, ${over} at or over the period; both axes logarithmic`;
+	box(g, colours.soft, 8, h - 24, w - 16, 1);
+	for (let us = 1; us <= last; us *= 10) {
+		const text = us < 1000 ? us + " µs" : us / 1000 + " ms";
+		write(g, colours.soft, text, clamp(px(us), 18, w - 22), h - 11, "center");
+	}
+	box(g, colours.bad, px(deadline) - 1, 20, 2, h - 44);
+	write(g, colours.bad, "deadline", px(deadline) - 5, 12, "right");
+	const sum = from => counts.reduce((n, count, i) => n + (edges[i] >= from ? count : 0), 0);
+	canvas.ariaLabel = `lateness of ${sum(0)} ticks, ${sum(deadline)} over the period; logarithmic`;
+	setText($("late").querySelector("figcaption"), canvas.ariaLabel);
 }
 
-function showFacts(facts) {
-	const dl = $("facts");
-	while (dl.children.length > 2 * facts.length)
-		dl.lastChild.remove();
-	facts.forEach(([name, value], i) => { // texts in place: live, nothing is made anew
-		if (!dl.children[2 * i])
-			dl.append(document.createElement("dt"), document.createElement("dd"));
-		setText(dl.children[2 * i], name);
-		setText(dl.children[2 * i + 1], value);
-	});
+function make(tag, text, more) {
+	return Object.assign(document.createElement(tag), {textContent: text ?? "", ...more});
 }
 
 function setText(element, text) {
-	if (element.textContent !== String(text))
-		element.textContent = text;
+	if (element.textContent !== String(text)) element.textContent = text;
 }
 
+// Cells that are there get their new texts in place, so that a selection of them stays.
+function fillTable(table, names, lines) {
+	const all = names ? [names, ...lines] : lines, cells = table.querySelectorAll("th, td");
+	table.hidden = !all.length;
+	if (cells.length === all.flat().length && table.rows.length === all.length)
+		return all.flat().forEach((text, i) => setText(cells[i], text));
+	table.replaceChildren(...all.map((line, i) => {
+		const tr = make("tr");
+		tr.append(...line.map(text => make(names && !i ? "th" : "td", text)));
+		return tr;
+	}));
+}
+
+// A state is a word with a symbol and a colour.
 function showState(word, well, text) {
-	$("state").hidden = false;
+	$("state").hidden = !word;
 	$("state").className = well ? "well" : "ill";
-	setText($("symbol"), well ? "●" : "▲");
-	setText($("word"), word);
+	setText($("state"), `${well ? "●" : "▲"} ${word}`);
 	setText($("text"), text ?? "");
 }
 
@@ -681,200 +495,107 @@ function say(text, ill) {
 
 function takeStatus(s) {
 	Object.assign(status, s);
+	const {pose: {position_mm: p, quaternion: q} = {}, warnings = [], rate_hz: rate, late} = status;
+	const {behind} = document.body.dataset, join = (list, n) => list.map(v => fixed(v, n)).join("  ");
 	showState(status.word ?? "running", status.well ?? true, status.text);
-	const facts = [...head.facts ?? []];
-	if (status.tool)
-		facts.push(["tool", status.tool]);
-	if (status.rate_hz)
-		facts.push(["rate", `${fixed(status.rate_hz, 0)} Hz`]);
-	if (status.lost !== undefined)
-		facts.push(["lost", String(status.lost)]);
-	if (status.capture)
-		facts.push(["capture", status.capture]);
-	if (document.body.dataset.behind)
-		facts.push(["behind", `${document.body.dataset.behind} ms`]);
-	const {position_mm: p, quaternion: q} = status.pose ?? {};
-	if (p) {
-		facts.push(["position", `${p.map(v => fixed(v, 2)).join("  ")} mm`]);
-		if (s.pose) {
-			trail ??= newRing(TRAIL);
-			push(trail, newest(), p[0]);
-			trail.high[trail.start + trail.count - 1 & trail.mask] = p[1];
-			setText($("above").querySelector("figcaption"), `tip from above; height ${fixed(p[2], 2)} mm`);
-			drawAbove();
-		}
+	fillTable($("facts"), null, [...head.facts ?? [], ["tool", status.tool],
+		["rate", rate && `${fixed(rate, 0)} Hz`], ["lost", status.lost], ["capture", status.capture],
+		["behind", behind && behind + " ms"], ["position", p && join(p, 2) + " mm"],
+		["quaternion", q && join(q, 3)]].filter(([, value]) => value ?? false));
+	if (s.pose && p) {
+		trail ??= newRing(TRAIL);
+		push(trail, performance.now() / 1000, p[0]);
+		trail.high[slot(trail, trail.count - 1)] = p[1];
+		drawAbove();
 	}
-	if (q)
-		facts.push(["quaternion", q.map(v => fixed(v, 3)).join("  ")]);
-	showFacts(facts);
-	const warnings = status.warnings ?? [];
-	$("warnings").hidden = !warnings.length;
-	if ($("warnings").dataset.shown !== warnings.join("\n")) {
-		$("warnings").dataset.shown = warnings.join("\n");
-		$("warnings").replaceChildren(...warnings.map(text => make("li", text)));
-	}
-	if (status.tool && document.activeElement !== $("tool"))
-		$("tool").value = status.tool;
-	if (s.late)
-		drawLate(s.late);
-	widen();
-}
-
-function make(tag, text, more) {
-	return Object.assign(document.createElement(tag), {textContent: text ?? "", ...more});
-}
-
-function fillTable(table, names, lines) {
-	const row = (tag, cells) => {
-		const tr = make("tr");
-		tr.append(...cells.map(text => make(tag, text)));
-		return tr;
-	};
-	table.replaceChildren(...names ? [row("th", names)] : [], ...lines.map(cells => row("td", cells)));
-}
-
-function widen() {
-	const beside = ["facts", "camera", "above", "late", "table", "list", "control"];
-	const two = beside.some(id => !$(id).hidden && $(id).childElementCount);
-	if ($("facts").parentElement.parentElement.classList.toggle("two", two) !== widen.two) {
-		widen.two = two;
-		arrange();
-	}
-}
-
-function listPlaces() {
-	const lines = [...head.cuts.map(([from, to, label]) => [from, `cut ${label}`, to]),
-		...head.events.map(([x, kind, text]) => [x, text ? `${kind}: ${text}` : kind])]
-		.sort((a, b) => a[0] - b[0]);
-	$("list").hidden = !lines.length;
-	$("list").querySelector("summary").textContent = `cuts and events (${lines.length})`;
-	$("list").querySelector("ol").replaceChildren(...lines.slice(0, LISTED).map(([x, text, to]) => {
-		const li = make("li"), button = make("button", `${place(x)}  ${text}`, {type: "button"});
-		button.addEventListener("click", () => to === undefined ? moveCursor(x) : showCut([x, to]));
-		li.append(button);
-		return li;
-	}), ...lines.length > LISTED ? [make("li", `and ${lines.length - LISTED} more`)] : []);
+	fillTable($("warnings"), null, warnings.map(text => ["▲ " + text]));
+	if (status.tool && document.activeElement !== $("tool")) $("tool").value = status.tool;
+	if (s.late) drawLate(late);
 }
 
 // ---- the view -----------------------------------------------------------------------------
-
-const newest = () => series.reduce((x, s) => Math.max(x, newestX(s)), -Infinity);
-
 function limits() {
-	if (!live)
-		return {from: head.from, to: head.to};
-	const to = newest();
-	return {from: to - WINDOWS_S[WINDOWS_S.length - 1], to};
+	const to = live ? newest() : head.to;
+	return {from: live ? to - WINDOWS_S.at(-1) : head.from, to};
 }
 
-// The served parts are asked for a view and half of one on either side, so that a pan has data.
+// A view is asked for with half of one on either side, so that a pan has data.
 function setView(from, to) {
-	const all = limits();
-	const least = Math.max(1e-6, (all.to - all.from) * 1e-7);
-	const width = clamp(to - from, least, all.to - all.from || 1);
-	const start = clamp(from + (to - from - width) / 2, all.from, all.to - width);
-	view.from = start;
-	view.to = start + width;
-	dirty.data = dirty.over = true;
-	if (!live && link.socket)
-		askPart();
+	const all = limits(), most = all.to - all.from || 1;
+	const width = clamp(to - from, Math.max(1e-6, most * 1e-7), most);
+	view.from = clamp((from + to - width) / 2, all.from, all.to - width);
+	view.to = view.from + width;
+	const a = Math.max(all.from, view.from - width / 2), b = Math.min(all.to, view.to + width / 2);
+	const columns = clamp(Math.ceil(pixels * (b - a) / width), 1, 4000);
+	if (!live) ask("get", {from: a, to: b, columns});
 	pickPart();
-	showExport();
 	wake();
 }
 
-function zoom(factor, at) {
-	if (isFollowing()) {
-		const i = WINDOWS_S.indexOf(windowS) + (factor < 1 ? -1 : 1);
-		windowS = WINDOWS_S[clamp(i, 0, WINDOWS_S.length - 1)];
-		$("window").value = windowS;
-		return;
-	}
-	const centre = at ?? (cursor >= view.from && cursor <= view.to && cursor !== null ?
-		cursor : (view.from + view.to) / 2);
-	setView(centre - (centre - view.from) * factor, centre + (view.to - centre) * factor);
+function zoom(factor, at = cursor !== null && isSeen(cursor) ? cursor : (view.from + view.to) / 2) {
+	setView(at - (at - view.from) * factor, at + (view.to - at) * factor);
 }
 
 function moveCursor(x) {
-	const all = limits();
 	freeze();
-	hover = null;
-	cursor = clamp(x, all.from, all.to);
-	const width = view.to - view.from;
-	if (cursor < view.from || cursor > view.to)
-		setView(cursor - width * (cursor > view.to ? 0.1 : 0.9), cursor + width * (cursor > view.to ? 0.9 : 0.1));
-	cursorMoved();
-}
-
-function cursorMoved() {
-	dirty.over = true;
-	speak();
-	if (frames.length || head.frames)
-		showFrame();
+	cursor = clamp(x, limits().from, limits().to);
+	const width = view.to - view.from, lead = cursor > view.to ? 0.1 : 0.9;
+	if (!isSeen(cursor)) setView(cursor - width * lead, cursor + width * (1 - lead));
+	if (head.frames && !frames.length) ask("frame", cursor);
 	wake();
 }
 
 function freeze() {
-	if (live && playing)
-		setPlaying(false);
+	hoverPx = null;
+	if (isFollowing()) setPlaying(false);
 }
 
 function setPlaying(on) {
 	playing = on;
 	playedAt = performance.now();
-	if (live && on)
-		cursor = span = null;
-	else if (live)
-		cursor ??= newest();
-	document.querySelector('[data-key=" "]').ariaPressed = String(live ? !on : on);
-	dirty.data = dirty.over = true;
-	showExport();
+	if (live) cursor = on ? null : newest();
+	if (live && on) span = null;
 	wake();
 }
 
 function setSpan(a, b) {
 	span = a === null ? null : [Math.min(a, b), Math.max(a, b)];
-	dirty.over = true;
-	showExport();
 	wake();
 }
 
 function showCut([from, to]) {
 	freeze();
-	hover = null;
 	setView(from - (to - from) * 0.1, to + (to - from) * 0.1);
 	setSpan(from, to);
-	cursor = from;
-	cursorMoved();
+	moveCursor(from);
 }
 
-function stepCut(way) {
-	const at = cursor ?? view.from, {cuts} = head;
-	const cut = way > 0 ? cuts.find(c => c[0] > at + 1e-9) : cuts.findLast(c => c[0] < at - 1e-9);
-	if (cut)
-		showCut(cut);
+// The next or previous one of a list whose members begin with a place.
+function stepTo(list, way, goes) {
+	const after = list.filter(([x]) => way * (x - (cursor ?? view.from)) > 1e-9);
+	if (after.length) goes(after.at(way > 0 ? 0 : -1));
 }
 
-function stepEvent(way) {
-	const at = cursor ?? view.from, {events} = head;
-	const event = way > 0 ? events.find(e => e[0] > at + 1e-9) : events.findLast(e => e[0] < at - 1e-9);
-	if (event)
-		moveCursor(event[0]);
+function stepBy(way, {shiftKey}) {
+	const from = cursor ?? (isFollowing() ? newest() : (view.from + view.to) / 2);
+	moveCursor(from + way * (view.to - view.from) / STEPS * (shiftKey ? 10 : 1));
 }
 
-function showExport() {
-	if (!head?.export)
-		return;
-	const [from, to] = span ?? [view.from, view.to];
-	$("export").hidden = false;
+// Buttons, command and the state for tests.
+function showView() {
+	const [from, to] = span ?? [view.from, view.to], filled = (head.export ?? "")
+		.replaceAll("{from}", from.toFixed(4)).replaceAll("{to}", to.toFixed(4));
+	$("export").hidden = !filled;
 	setText($("span"), `${span ? "selected" : "visible"}: ${place(from)} to ${place(to)}`);
-	setText($("command"), head.export.replaceAll("{from}", from.toFixed(4)).replaceAll("{to}", to.toFixed(4)));
+	setText($("command"), filled);
+	keyButton(" ").ariaPressed = String(live ? !playing : playing);
+	keyButton("s").ariaPressed = String(selecting);
+	Object.assign(document.body.dataset, {view: `${view.from} ${view.to}`, cursor: cursor ?? ""});
+	if (part || live && newest() > -Infinity) document.body.dataset.ready = "1";
 }
 
-// A page that is not on https or this machine has no clipboard but the selection's.
+// A page that is neither from https nor from this machine has no clipboard but the selection's.
 async function copyCommand() {
-	if (!head?.export)
-		return;
 	try {
 		await navigator.clipboard.writeText($("command").textContent);
 	} catch {
@@ -886,543 +607,371 @@ async function copyCommand() {
 
 // A screen reader gets the values at most once a second.
 function speak() {
-	if (speak.timer)
-		return;
-	speak.timer = setTimeout(() => {
-		speak.timer = 0;
-		const x = shownX();
-		if (x === null || !head)
-			return;
-		const values = rows.filter(row => row.kind === "panel").flatMap(row => row.cells.map(cell =>
-			`${head.tracks[cell.track].label || row.panel.label} ` +
-			(series[cell.track] ? valueText(series[cell.track], x, row.decimals ?? 3) : "–") +
-			` ${row.panel.unit ?? ""}`));
-		const event = eventNear(x, 8);
-		$("over").ariaLabel = `${head.title}, ${head.axis.label} ${place(view.from)} to ${place(view.to)}; ` +
-			`at ${place(x)}: ${values.join(", ")}${event ? "; " + event[1] + " " + event[2] : ""}`;
-		if (!isFollowing())
-			setText($("spoken"), `${place(x)}: ${values.join(", ")}`);
-	}, speak.said ? 1000 : 0);
-	speak.said = true;
+	speak.timer ??= setTimeout(() => {
+		speak.timer = undefined;
+		const x = shownX(), cells = rows.flatMap(row => (row.cells ?? []).map(cell => [row, cell]));
+		if (x === null || x === -Infinity) return;
+		const values = cells.map(([{decimals, panel}, {label, track}]) =>
+			`${label} ${valueText(series[track], x, decimals ?? 3)} ${panel.unit ?? ""}`).join(", ");
+		const range = `${head.axis.label} ${place(view.from)} to ${place(view.to)}`;
+		canvasIn("stage").ariaLabel = [head.title, range, `at ${place(x)}: ${values}`,
+			...eventNear(x)?.slice(1) ?? []].join("; ");
+		if (!isFollowing()) setText($("spoken"), `${place(x)}: ${values}`);
+	}, 1000);
 }
 
 // ---- frames -------------------------------------------------------------------------------
-
-function showFrame() {
-	if (!frames.length) {
-		link.frameWanted = cursor;
-		askFrame();
-		return;
-	}
-	const best = frames.reduce((a, b) => Math.abs(b[0] - cursor) < Math.abs(a[0] - cursor) ? b : a);
-	const img = $("camera").querySelector("img");
-	$("camera").hidden = img.hidden = false;
-	$("camera").querySelector("canvas").hidden = true;
-	if (img.src !== best[1].src)
-		img.src = best[1].src;
-	setText($("camera").querySelector("figcaption"), `frame at ${place(best[0])}`);
+function drawFrame(t, width, height, draws) {
+	const canvas = canvasIn("camera"), caption = $("camera").querySelector("figcaption");
+	if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, {width, height});
+	$("camera").hidden = false;
+	setText(caption, `frame at ${place(t)}`);
+	draws(canvas.getContext("2d"));
 }
 
-function drawFrame({width, height: lines, channels, t, bytes}) {
-	const canvas = $("camera").querySelector("canvas");
-	$("camera").hidden = canvas.hidden = false;
-	if (canvas.width !== width || canvas.height !== lines || !drawFrame.image) {
-		canvas.width = width;
-		canvas.height = lines;
-		drawFrame.image = new ImageData(width, lines);
-		drawFrame.image.data.fill(255);
-	}
-	const out = drawFrame.image.data, green = channels === 3 ? 1 : 0, blue = 2 * green;
+function drawNearest() {
+	const far = ([t]) => Math.abs(t - cursor), loaded = frames.filter(([, image]) => image.naturalWidth);
+	if (!loaded.length) return;
+	const [t, image] = loaded.reduce((a, b) => far(b) < far(a) ? b : a);
+	drawFrame(t, image.naturalWidth, image.naturalHeight, g => g.drawImage(image, 0, 0));
+}
+
+function drawPicture({width, height, channels, t, bytes}) {
+	const green = channels === 3 ? 1 : 0;
+	if (drawPicture.image?.width !== width || drawPicture.image.height !== height)
+		drawPicture.image = new ImageData(width, height);
+	const out = drawPicture.image.data.fill(255);
 	for (let i = 0, k = 0; k < out.length; i += channels, k += 4) {
 		out[k] = bytes[i];
 		out[k + 1] = bytes[i + green];
-		out[k + 2] = bytes[i + blue];
+		out[k + 2] = bytes[i + 2 * green];
 	}
-	canvas.getContext("2d").putImageData(drawFrame.image, 0, 0);
-	setText($("camera").querySelector("figcaption"), `frame at ${place(t)}`);
-	widen();
+	drawFrame(t, width, height, g => g.putImageData(drawPicture.image, 0, 0));
+	link.picture = null;
 }
 
 // ---- the server ---------------------------------------------------------------------------
-
-const link = {socket: null, tries: 0, id: 0, asked: 0, again: false, frameAsked: 0, frameWanted: null,
-	picture: null, ages: new Float64Array(100), aged: 0, drawnTo: -Infinity};
+// One request for data is on the way, and one for a frame; the newest wish goes out when it is
+// answered.
+const asks = {get: {id: 0, wish: null}, frame: {id: 0, wish: null}};
+const link = {socket: null, tries: 0, id: 0, picture: null, ages: new Float64Array(100), aged: 0,
+	drawnTo: -Infinity};
 
 function send(message) {
-	if (link.socket?.readyState === 1)
-		link.socket.send(JSON.stringify(message));
-	return message.id;
+	if (link.socket?.readyState !== 1) return 0;
+	link.socket.send(JSON.stringify({id: ++link.id, ...message}));
+	return link.id;
 }
 
-// One request for data is on the way, and one for a frame; the newest wish goes out when it is answered.
-function askPart() {
-	link.again = true;
-	if (link.asked || !head)
-		return;
-	link.again = false;
-	const width = view.to - view.from;
-	const from = Math.max(head.from, view.from - width / 2), to = Math.min(head.to, view.to + width / 2);
-	const columns = clamp(Math.ceil(pixels * (to - from) / width), 1, 4000);
-	link.asked = send({id: ++link.id, get: {from, to, columns}});
+function ask(kind, wish) {
+	const one = asks[kind];
+	one.wish = wish ?? one.wish;
+	if (one.id || one.wish === null) return;
+	one.id = send({[kind]: one.wish});
+	one.wish = null;
 }
 
-function askFrame() {
-	if (link.frameAsked || link.frameWanted === null)
-		return;
-	link.frameAsked = send({id: ++link.id, frame: link.frameWanted});
-	link.frameWanted = null;
+function answered(id) {
+	for (const [kind, one] of Object.entries(asks))
+		if (id && one.id === id) {
+			one.id = 0;
+			ask(kind);
+		}
 }
 
 function pickPart() {
-	if (live || !part)
-		return;
-	const covers = part.from <= view.from + 1e-9 && part.to >= view.to - 1e-9;
-	series = (covers || !whole ? part : whole).series;
+	const covers = part && part.from <= view.from + 1e-9 && part.to >= view.to - 1e-9;
+	if (part && !live) series = (covers ? part : whole).series;
 }
 
 function takePart(message) {
+	const banded = series.some(s => s.u);
 	part = readPart(message);
-	if (!whole || part.from <= head.from && part.to >= head.to)
-		whole = part;
-	$("progress").hidden = (message.done ?? 1) >= 1;
-	$("progress").value = message.done ?? 1;
-	const banded = part.series.some(s => s.u);
+	if (!whole || part.from <= head.from && part.to >= head.to) whole = part;
+	showProgress(message.done ?? 1);
 	pickPart();
-	if (banded !== takePart.banded) { // the legend needs space for what is ±
-		takePart.banded = banded;
-		arrange();
-	}
-	dirty.data = dirty.over = true;
-	speak();
+	if (series.some(s => s.u) !== banded) arrange(); // the legend needs space for ±
 	wake();
 }
 
 function takeLive({t, tracks}) {
 	tracks.forEach((values, i) => {
-		if (values && series[i])
-			for (let k = 0; k < values.length; k++)
-				push(series[i], t[k], values[k] ?? NaN);
+		if (series[i]) values?.forEach((v, k) => push(series[i], t[k], v ?? NaN));
 	});
-	dirty.data = dirty.over = true;
 	wake();
 }
 
 // little-endian: u32 id, width, height, channels, f64 t, then bytes
 function takePicture(buffer) {
-	const at = new DataView(buffer), u32 = i => at.getUint32(4 * i, true);
-	const [id, width, lines, channels] = [u32(0), u32(1), u32(2), u32(3)];
-	const bytes = new Uint8Array(buffer, 24);
-	if (width * lines * channels !== bytes.length || !bytes.length)
-		return;
-	if (id && id === link.frameAsked)
-		link.frameAsked = 0;
-	link.picture = {width, height: lines, channels, t: at.getFloat64(16, true), bytes};
-	askFrame();
+	const at = new DataView(buffer), bytes = new Uint8Array(buffer, 24);
+	const [id, width, height, channels] = [0, 4, 8, 12].map(i => at.getUint32(i, true));
+	if (bytes.length && width * height * channels === bytes.length)
+		link.picture = {width, height, channels, t: at.getFloat64(16, true), bytes};
+	answered(id);
 	wake();
 }
 
+function takeEvent(event) {
+	head.events.push(event);
+	head.events.splice(0, head.events.length - EVENTS_KEPT);
+	wake();
+}
+
+function showProgress(done) {
+	$("progress").hidden = done >= 1;
+	$("progress").value = done;
+}
+
+const takers = {head: takeHead, part: takePart, live: takeLive, state: takeStatus, event: takeEvent,
+	progress: done => [showProgress(done), setView(view.from, view.to)],
+	ok: text => say(text), error: text => say(text, true)};
+
 function receive({data}) {
-	if (typeof data !== "string")
-		return takePicture(data);
-	const m = JSON.parse(data);
-	if (m.id && m.id === link.asked)
-		link.asked = 0;
-	if (m.id && m.id === link.frameAsked)
-		link.frameAsked = 0;
-	if (m.head)
-		takeHead(m.head);
-	if (m.part)
-		takePart(m.part);
-	if (m.live)
-		takeLive(m.live);
-	if (m.state)
-		takeStatus(m.state);
-	if (m.event) {
-		head.events.push(m.event);
-		if (head.events.length > EVENTS_KEPT)
-			head.events.shift();
-		dirty.data = true;
-		wake();
-	}
-	if (m.progress !== undefined) {
-		$("progress").hidden = m.progress >= 1;
-		$("progress").value = m.progress;
-		askPart();
-	} else if (link.again && head && !live)
-		askPart();
-	if (m.ok)
-		say(m.ok);
-	if (m.error)
-		say(m.error, true);
+	if (typeof data !== "string") return takePicture(data);
+	const message = JSON.parse(data);
+	for (const [name, takes] of Object.entries(takers))
+		if (message[name] !== undefined) takes(message[name]);
+	answered(message.id);
 }
 
 function connect() {
 	const [token, control] = (sessionStorage.getItem("incise") ?? "").split(".");
-	if (!token) {
-		showState("no token", false);
-		say("open the address that incise serve printed, with all that follows #", true);
-		return;
-	}
-	const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/ws`);
-	socket.binaryType = "arraybuffer";
-	socket.onopen = () => socket.send(JSON.stringify(control ? {token, control} : {token}));
-	socket.onmessage = receive;
+	const hint = "open the address that incise serve printed, with all that follows #";
+	if (!token) return showState("no token", false, hint);
+	const scheme = location.protocol === "https:" ? "wss" : "ws";
+	const socket = link.socket = new WebSocket(`${scheme}://${location.host}/ws`);
+	Object.assign(socket, {binaryType: "arraybuffer", onmessage: receive});
+	socket.onopen = () => socket.send(JSON.stringify({token, control}));
 	socket.onclose = ({code}) => {
 		link.socket = null;
-		link.asked = link.frameAsked = 0;
+		asks.get.id = asks.frame.id = 0;
 		if (code === 1008) {
 			sessionStorage.removeItem("incise");
-			showState("refused", false);
-			if (!$("said").textContent)
-				say("the server refuses the token; open the address that incise serve printed", true);
-			return;
+			return showState("refused", false, hint);
 		}
 		showState("no connection", false, "trying again");
-		if (live) // a line across the outage would be a lie
-			for (const ring of series)
-				push(ring, newest() + 1e-6, NaN);
+		for (const ring of live ? series : []) // a line across the outage would be a lie
+			push(ring, newest() + 1e-6, NaN);
 		setTimeout(connect, RETRY_MS[Math.min(link.tries++, RETRY_MS.length - 1)]);
 	};
-	link.socket = socket;
 }
 
 // ---- heads --------------------------------------------------------------------------------
-
 // A head that comes again, after a change or a new connection, keeps view, cursor and rings.
 function takeHead(h) {
-	const tracks = h.tracks.map(track => track.label).join("\n");
-	const same = head && head.kind === h.kind && head.tracks.map(track => track.label).join("\n") === tracks;
+	const names = one => one?.kind + one?.tracks.map(track => track.label), same = names(head) === names(h);
 	const wasWhole = !same || view.from <= head.from && view.to >= head.to;
-	const events = same && h.kind === "live" ? head.events : [];
-	head = {cuts: [], panels: [], ...h, events: h.events?.length ? h.events : events};
-	head.axis ??= {label: "time", unit: "s"};
+	const events = same && live && !h.events?.length ? head.events : h.events ?? [];
+	head = {cuts: [], panels: [], axis: {label: "time", unit: "s"}, ...h, events};
 	live = head.kind === "live";
-	if (head.path?.t)
-		head.path = {...head.path, x: numbers(head.path.t), low: numbers(head.path.x), high: numbers(head.path.y),
-			start: 0, count: head.path.t.length, mask: -1};
+	const {path, tools = []} = head;
+	if (path?.t) Object.assign(path, {x: numbers(path.t), low: numbers(path.x), high: numbers(path.y),
+		start: 0, count: path.t.length, mask: -1});
 	document.title = `${head.title} · incise`;
+	document.body.dataset.mode = head.kind;
 	setText($("title"), head.title);
-	$("note").hidden = !head.note;
 	setText($("note"), head.note ?? "");
 	$("control").hidden = !head.control;
-	$("tool-label").hidden = !head.tools?.length;
-	$("tool").replaceChildren(...(head.tools ?? []).map(name => make("option", name)));
-	$("table").hidden = !head.table;
-	if (head.table)
-		fillTable($("table"), head.table.head, head.table.rows);
-	document.body.dataset.mode = live ? "live" : head.kind;
+	$("tool-label").hidden = !tools.length;
+	$("tool").replaceChildren(...tools.map(name => make("option", name)));
+	fillTable($("table"), head.table?.head, head.table?.rows ?? []);
+	fillTable($("facts"), null, head.facts ?? []);
+	for (const button of document.querySelectorAll(".cuts")) button.hidden = !head.cuts.length;
+	setText(document.querySelector('[data-key=" "]'), live ? "freeze" : "play");
+	$("window").hidden = !live;
 	if (!same) {
-		part = whole = trail = cursor = hover = span = null;
+		part = whole = trail = hoverPx = span = null;
 		series = live ? head.tracks.map(() => newRing(RING_SLOTS)) : [];
 		playing = live;
-		buildButtons();
-		if (!live)
-			cursor = head.cuts[0]?.[0] ?? head.from;
+		cursor = live ? null : head.cuts[0]?.[0] ?? head.from;
 	}
 	link.tries = 0;
-	if (live && !same || !live && $("word").textContent === "no connection")
-		showState(live ? "live" : "connected", true);
-	if (head.facts)
-		showFacts(head.facts);
+	showState(live ? "live" : "", true);
 	say("");
-	if (!live)
-		listPlaces();
-	widen();
 	arrange();
-	if (!live) {
-		setView(wasWhole ? head.from : view.from, wasWhole ? head.to : view.to);
-		cursorMoved();
-	}
-	wake();
+	if (live) return;
+	setView(wasWhole ? head.from : view.from, wasWhole ? head.to : view.to);
+	moveCursor(cursor);
 }
 
-// ---- actions: keys and buttons ------------------------------------------------------------
+// ---- keys and buttons ---------------------------------------------------------------------
+// The page has the words for these in its list of keys.
+const actions = {
+	"ArrowLeft": event => stepBy(-1, event),
+	"ArrowRight": event => stepBy(1, event),
+	" ": () => setPlaying(!playing),
+	"+": () => zoom(0.5),
+	"-": () => zoom(2),
+	"0": () => [freeze(), setView(limits().from, limits().to)],
+	"Home": () => moveCursor(limits().from),
+	"End": () => moveCursor(limits().to),
+	"p": () => stepTo(head.cuts, -1, showCut),
+	"n": () => stepTo(head.cuts, 1, showCut),
+	",": () => stepTo(head.events, -1, ([x]) => moveCursor(x)),
+	".": () => stepTo(head.events, 1, ([x]) => moveCursor(x)),
+	"s": () => wake(selecting = !selecting),
+	"[": () => setSpan(cursor, span ? span[1] : view.to),
+	"]": () => setSpan(span ? span[0] : view.from, cursor),
+	"z": () => span && setView(...span),
+	"Escape": () => setSpan(null),
+	"e": copyCommand,
+	"?": () => $("keys").showModal(),
+};
 
-const step = () => (view.to - view.from) / STEPS;
-const actions = [
-	{key: "ArrowLeft", shown: "←", says: "cursor back; with Shift by ten", does: e => stepBy(-1, e)},
-	{key: "ArrowRight", shown: "→", says: "cursor on; with Shift by ten", does: e => stepBy(1, e)},
-	{key: " ", shown: "Space", says: "play or pause; live: freeze", button: "⏯", does: () => setPlaying(!playing)},
-	{key: "+", also: "=", says: "zoom in", button: "+", does: () => zoom(0.5)},
-	{key: "-", also: "_", shown: "−", says: "zoom out", button: "−", does: () => zoom(2)},
-	{key: "0", says: "show the whole", button: "whole", does: () => setView(-Infinity, Infinity)},
-	{key: "Home", says: "cursor to the start", button: "⏮", does: () => moveCursor(limits().from)},
-	{key: "End", says: "cursor to the end", button: "⏭", does: () => moveCursor(limits().to)},
-	{key: "p", says: "previous cut", button: "‹ cut", when: () => head.cuts.length, does: () => stepCut(-1)},
-	{key: "n", says: "next cut", button: "cut ›", when: () => head.cuts.length, does: () => stepCut(1)},
-	{key: ",", says: "previous event", does: () => stepEvent(-1)},
-	{key: ".", says: "next event", does: () => stepEvent(1)},
-	{key: "s", says: "select by dragging (else: Shift and drag)", button: "select", does: () => setSelecting(!selecting)},
-	{key: "[", says: "selection starts at the cursor", does: () => setSpan(cursor, span ? span[1] : view.to)},
-	{key: "]", says: "selection ends at the cursor", does: () => setSpan(span ? span[0] : view.from, cursor)},
-	{key: "z", says: "zoom to the selection", button: "zoom to it", when: () => !live,
-		does: () => span && setView(...span)},
-	{key: "Escape", shown: "Esc", says: "select nothing", does: () => setSpan(null)},
-	{key: "e", says: "copy the command that exports the selection, or else the view", does: copyCommand},
-	{key: "?", says: "these keys", button: "?", does: () => $("keys").showModal()},
-];
-
-function stepBy(way, event) {
-	moveCursor((cursor ?? (isFollowing() ? newest() : (view.from + view.to) / 2)) +
-		way * step() * (event.shiftKey ? 10 : 1));
-}
-
-function setSelecting(on) {
-	selecting = on;
-	document.querySelector('[data-key="s"]').ariaPressed = String(on);
-}
-
-function buildButtons() {
-	const shown = actions.filter(a => a.button && (!a.when || a.when()));
-	$("buttons").replaceChildren(...shown.map(a => {
-		const button = make("button", a.button, {type: "button", title: `${a.says} (${a.shown ?? a.key})`,
-			ariaLabel: a.says});
-		button.dataset.key = a.key;
-		if (a.key === " " || a.key === "s")
-			button.ariaPressed = "false";
-		button.addEventListener("click", a.does);
-		return button;
-	}));
-	if (live) {
-		const select = make("select", "", {id: "window", ariaLabel: "window"});
-		select.append(...WINDOWS_S.map(s => make("option", `${s} s`, {value: s})));
-		select.value = windowS;
-		select.addEventListener("change", () => {
-			windowS = Number(select.value);
-			setPlaying(true);
-		});
-		$("buttons").append(select);
-	}
-	fillTable($("keys").querySelector("table"), null, [...actions.map(a => [a.shown ?? a.key, a.says]),
-		["wheel, pinch", "zoom"], ["drag", "pan; on the axis: move the cursor"],
-		["±", "two standard uncertainties"]]);
-}
-
-document.addEventListener("keydown", event => {
-	const tag = event.target.tagName;
-	if (!head || event.ctrlKey || event.altKey || event.metaKey || $("keys").open ||
-			["INPUT", "SELECT", "TEXTAREA"].includes(tag) ||
-			event.key === " " && ["BUTTON", "SUMMARY"].includes(tag))
-		return;
-	const action = actions.find(a => a.key === event.key || a.also === event.key);
-	if (!action)
+function pressKey(event) {
+	const {key, target: {tagName}} = event, action = actions[{"=": "+", "_": "-"}[key] ?? key];
+	if (!head || !action || event.ctrlKey || event.altKey || event.metaKey || $("keys").open ||
+			["INPUT", "SELECT"].includes(tagName) ||
+			key === " " && ["BUTTON", "SUMMARY"].includes(tagName))
 		return;
 	event.preventDefault();
-	hover = null;
-	action.does(event);
-});
+	hoverPx = null;
+	action(event);
+}
 
 // ---- pointers -----------------------------------------------------------------------------
-
 // One pointer pans, scrubs on the axis or selects; two zoom. A press that does not move is a click.
 const pointers = new Map();
 let drag = null;
 
-const localX = event => event.clientX - $("over").getBoundingClientRect().left;
-const rowAt = event => {
-	const y = event.clientY - $("over").getBoundingClientRect().top;
-	return rows.find(row => y >= row.top && y < row.top + row.height);
-};
-
-function startDrag(event) {
-	if (!head || event.button)
-		return;
-	const px = localX(event);
-	$("over").setPointerCapture(event.pointerId);
-	pointers.set(event.pointerId, px);
-	hover = null;
-	const does = event.shiftKey || selecting ? "select" : rowAt(event)?.kind === "axis" ? "scrub" : "pan";
-	drag = {does, px, x: toX(px), from: view.from, to: view.to, moved: false, pinch: pinch()};
-	if (does === "scrub")
-		moveCursor(toX(px));
+function pointerPlace({clientX, clientY}) {
+	const {left, top} = canvasIn("stage").getBoundingClientRect();
+	return [clientX - left, rows.findLast(row => clientY - top >= row.top)?.kind];
 }
 
-function pinch() {
-	const [a, b] = pointers.values();
-	return b === undefined ? null : {xa: toX(a), xb: toX(b)};
+function startDrag(event) {
+	if (!head || event.button) return;
+	const [px, kind] = pointerPlace(event);
+	event.target.setPointerCapture(event.pointerId);
+	pointers.set(event.pointerId, px);
+	hoverPx = null;
+	drag = {does: event.shiftKey || selecting ? "select" : kind === "axis" ? "scrub" : "pan", px, x: toX(px),
+		...view, moved: false, pinch: pointers.size === 2 && [...pointers.values()].map(toX)};
+	if (drag.does === "scrub") moveCursor(toX(px));
 }
 
 function moveDrag(event) {
-	if (!head)
-		return;
-	const px = localX(event);
+	const [px] = pointerPlace(event), all = head && limits();
 	if (!pointers.has(event.pointerId)) {
-		if (event.pointerType === "mouse") {
-			hover = px >= LEFT && px <= LEFT + rows.width ? toX(px) : null;
-			dirty.over = true;
-			wake();
-		}
-		return;
+		const over = head && event.pointerType === "mouse" && px >= LEFT && px <= LEFT + plotWidth;
+		hoverPx = over ? px : null;
+		return wake();
 	}
 	pointers.set(event.pointerId, px);
 	drag.moved ||= Math.abs(px - drag.px) > 4;
-	if (drag.pinch && pointers.size === 2) {
-		freeze();
-		const [a, b] = pointers.values(), {xa, xb} = drag.pinch;
-		if (Math.abs(b - a) > 8) {
-			const scale = (xb - xa) / (b - a); // x a pixel that puts both places under the fingers
-			const from = xa - (a - LEFT) * scale;
-			if (scale > 0)
-				setView(from, from + rows.width * scale);
-		}
-	} else if (drag.moved && drag.does === "pan") {
-		freeze();
-		const moved = (drag.px - px) / rows.width * (drag.to - drag.from);
-		setView(drag.from + moved, drag.to + moved);
-	} else if (drag.moved && drag.does === "select") {
-		freeze();
-		setSpan(clamp(drag.x, limits().from, limits().to), clamp(toX(px), limits().from, limits().to));
+	if (drag.moved) freeze();
+	if (drag.pinch) {
+		const [a, b] = pointers.values(), scale = (drag.pinch[1] - drag.pinch[0]) / (b - a);
+		const from = drag.pinch[0] - (a - LEFT) * scale; // both places stay under their fingers
+		if (scale > 0 && Math.abs(b - a) > 8) setView(from, from + plotWidth * scale);
 	} else if (drag.does === "scrub")
 		moveCursor(toX(px));
+	else if (drag.moved && drag.does === "select")
+		setSpan(clamp(drag.x, all.from, all.to), clamp(toX(px), all.from, all.to));
+	else if (drag.moved) {
+		const moved = (drag.px - px) / plotWidth * (drag.to - drag.from);
+		setView(drag.from + moved, drag.to + moved);
+	}
 }
 
 function endDrag(event) {
-	if (!pointers.delete(event.pointerId) || !drag)
-		return;
-	if (event.type === "pointerup" && !drag.moved && !drag.pinch && drag.does !== "scrub") {
-		const x = toX(localX(event)), kind = rowAt(event)?.kind;
-		const cut = kind === "cuts" && head.cuts.find(([from, to]) => x >= from && x <= to);
-		if (cut)
-			setSpan(...cut);
-		moveCursor((kind === "events" && eventNear(x, 12)?.[0]) || x);
-	}
+	if (!pointers.delete(event.pointerId) || !drag) return;
+	const [px, kind] = pointerPlace(event), x = toX(px), {moved, pinch, does} = drag;
 	drag = null;
+	if (event.type !== "pointerup" || moved || pinch || does === "scrub") return;
+	const cut = kind === "cuts" && head.cuts.find(([from, to]) => x >= from && x <= to);
+	if (cut) setSpan(...cut);
+	moveCursor(kind === "events" ? eventNear(x)?.[0] ?? x : x);
 }
 
 function turnWheel(event) {
-	if (!head)
-		return;
 	event.preventDefault();
+	if (!head) return;
 	freeze();
-	hover = null;
-	const width = view.to - view.from;
-	if (Math.abs(event.deltaX) > Math.abs(event.deltaY))
-		setView(view.from + event.deltaX / rows.width * width, view.to + event.deltaX / rows.width * width);
-	else
-		zoom(Math.exp(clamp(event.deltaY, -240, 240) / 400), clamp(toX(localX(event)), view.from, view.to));
+	const {deltaX, deltaY} = event, moved = deltaX / plotWidth * (view.to - view.from);
+	const at = clamp(toX(pointerPlace(event)[0]), view.from, view.to);
+	if (Math.abs(deltaX) > Math.abs(deltaY)) setView(view.from + moved, view.to + moved);
+	else zoom(Math.exp(clamp(deltaY, -240, 240) / 400), at);
 }
 
 // ---- the clock ----------------------------------------------------------------------------
-
 function wake() {
-	if (asleep && head) {
-		asleep = false;
-		requestAnimationFrame(draw);
-	}
+	if (asleep && head) requestAnimationFrame(draw);
+	asleep &&= !head;
 }
 
 // The live window rolls with the newest sample. Where motion is to be reduced it stands still and
 // fills from the left, and the next one starts when it is full.
-function roll() {
-	const to = newest();
-	if (to === -Infinity)
-		return;
-	view.to = reducedMotion.matches ? Math.ceil(to / windowS) * windowS : to;
-	view.from = view.to - windowS;
-	dirty.data = dirty.over = true;
-}
-
-function play(now) {
-	if (cursor >= head.to)
-		return setPlaying(false);
-	const x = (cursor ?? view.from) + (now - playedAt) / 1000;
+function advance(now) {
+	const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
+	const to = still ? Math.ceil(newest() / windowS) * windowS : newest();
+	if (live && to !== -Infinity) Object.assign(view, {from: to - windowS, to});
+	if (live) return;
+	moveCursor(cursor + (now - playedAt) / 1000);
 	playedAt = now;
-	moveCursor(x);
-}
-
-function draw(now) {
-	asleep = true;
-	if (isFollowing())
-		roll();
-	else if (playing)
-		play(now);
-	if (link.picture) {
-		drawFrame(link.picture);
-		link.picture = null;
-	}
-	if (dirty.data) {
-		drawData();
-		noteAge();
-		if (!live)
-			drawAbove();
-	}
-	if (dirty.data || dirty.over)
-		drawOver();
-	if (!live && !dirty.data)
-		drawAbove();
-	dirty.data = dirty.over = false;
-	const {dataset} = document.body;
-	dataset.view = `${view.from} ${view.to}`;
-	dataset.cursor = cursor ?? "";
-	if (part || live && newest() > -Infinity)
-		dataset.ready = "1";
-	if (live)
-		speak();
-	if (playing && !live)
-		wake();
+	playing = cursor < head.to;
 }
 
 // How long ago the newest sample was taken, when it is first drawn: the median of the last 100.
 function noteAge() {
-	const to = live ? newest() : -Infinity;
-	if (!(to > link.drawnTo))
-		return;
-	link.drawnTo = to;
-	link.ages[link.aged++ % 100] = Date.now() - 1000 * to;
+	if (!live || !(newest() > link.drawnTo)) return;
+	link.drawnTo = newest();
+	link.ages[link.aged++ % 100] = Date.now() - 1000 * link.drawnTo;
 	const ages = link.ages.slice(0, Math.min(link.aged, 100)).sort();
 	document.body.dataset.behind = Math.round(ages[ages.length >> 1]);
 }
 
-function startControls() {
-	let id = 1e6; // apart from the requests for data
-	const order = message => send({id: ++id, ...message});
-	$("control").addEventListener("submit", event => {
-		event.preventDefault();
-		order({do: "mark", text: $("mark-text").value});
-	});
-	$("control").capture.addEventListener("click", () => order({do: "capture", name: $("capture-name").value}));
-	$("control").stop.addEventListener("click", () => order({do: "stop"}));
-	$("tool").addEventListener("change", () => order({do: "tool", tool: $("tool").value}));
+function draw(now) {
+	asleep = true;
+	if (playing) advance(now);
+	if (link.picture) drawPicture(link.picture);
+	drawPlots();
+	drawNearest();
+	noteAge();
+	if (!live) drawAbove();
+	showView();
+	speak();
+}
+
+function redraw() {
+	readColours();
+	if (head) arrange();
+}
+
+function listen() {
+	const canvas = canvasIn("stage");
+	Object.assign(canvas, {onpointerdown: startDrag, onpointermove: moveDrag, onpointerup: endDrag,
+		onpointercancel: endDrag, onwheel: turnWheel, onpointerleave: () => wake(hoverPx = null)});
+	document.onkeydown = pressKey;
+	for (const button of document.querySelectorAll("[data-key]"))
+		button.onclick = event => head && actions[button.dataset.key](event);
+	$("window").onchange = () => setPlaying(true, windowS = Number($("window").value));
+	$("copy").onclick = copyCommand;
+	$("control").onsubmit = event => event.preventDefault();
+	for (const one of $("control").querySelectorAll("[data-do]")) {
+		const {do: does, field} = one.dataset, input = one.form.elements[field];
+		one[one === input ? "onchange" : "onclick"] = () =>
+			send({do: does, ...input && {[field]: input.value}});
+	}
+	matchMedia("(prefers-color-scheme: dark)").onchange = redraw;
+	new ResizeObserver(redraw).observe($("stage"));
 }
 
 function start() {
 	readColours();
-	startControls();
-	$("copy").addEventListener("click", copyCommand);
-	$("over").addEventListener("pointerdown", startDrag);
-	$("over").addEventListener("pointermove", moveDrag);
-	$("over").addEventListener("pointerup", endDrag);
-	$("over").addEventListener("pointercancel", endDrag);
-	$("over").addEventListener("pointerleave", () => {
-		hover = null;
-		dirty.over = true;
-		wake();
-	});
-	$("over").addEventListener("wheel", turnWheel, {passive: false});
-	const again = () => {
-		readColours();
-		if (head) {
-			arrange();
-			wake();
-		}
-	};
-	matchMedia("(prefers-color-scheme: dark)").addEventListener("change", again);
-	new ResizeObserver(again).observe($("stage"));
+	listen();
 	const text = $("document").textContent.trim();
 	if (text) {
-		const document = JSON.parse(text);
-		frames = (document.frames ?? []).map(([t, src]) => [t, Object.assign(new Image(), {src, onload: again})]);
-		takeHead(document.head);
-		takePart(document.part);
-		cursorMoved();
-		return;
+		const own = JSON.parse(text), load = src => Object.assign(new Image(), {src, onload: wake});
+		frames = (own.frames ?? []).map(([t, src]) => [t, load(src)]);
+		takeHead(own.head);
+		return takePart(own.part);
 	}
-	const fragment = decodeURIComponent(location.hash.slice(1));
-	if (fragment) {
-		sessionStorage.setItem("incise", fragment);
+	if (location.hash.length > 1) {
+		sessionStorage.setItem("incise", decodeURIComponent(location.hash.slice(1)));
 		history.replaceState(null, "", location.pathname + location.search);
 	}
-	addEventListener("hashchange", () => location.reload());
+	onhashchange = () => location.reload();
 	connect();
 }
 
