@@ -170,16 +170,9 @@ function readColours() {
 	colours.font = `13px ${getComputedStyle(document.body).fontFamily}`;
 }
 
-function box(g, colour, x, y, w, h) {
-	g.fillStyle = colour;
-	g.fillRect(x, y, w, h);
-}
-
-function write(g, colour, text, x, y, align = "left", widest = 9999) {
-	g.fillStyle = colour;
-	g.textAlign = align;
-	g.fillText(text, x, y, widest);
-}
+const box = (g, colour, ...place) => Object.assign(g, {fillStyle: colour}).fillRect(...place);
+const write = (g, colour, text, x, y, align = "left", widest = 9999) =>
+	Object.assign(g, {fillStyle: colour, textAlign: align}).fillText(text, x, y, widest);
 
 function stroke(g, colour, width, trace) {
 	Object.assign(g, {strokeStyle: colour, lineWidth: width});
@@ -213,7 +206,7 @@ function cleared(canvas, w, h) {
 function arrangeLegend(g, width, panel) {
 	const own = panel.tracks.length === 1 && panel.label, unit = panel.unit ? ` (${panel.unit})` : "";
 	const name = own ? "" : (panel.label ?? "") + unit;
-	let x = LEFT + (name && g.measureText(name).width + 22), line = 0;
+	let x = LEFT + (name ? g.measureText(name).width + 22 : 0), line = 0;
 	const cells = panel.tracks.map((track, i) => {
 		const label = head.tracks[track]?.label || panel.label || "", text = own ? label + unit : label;
 		const room = series[track]?.u ? "  −000.000 ± 00.000" : "  −000.000";
@@ -337,7 +330,7 @@ function drawTrace(g, e, toY, joined) {
 		const good = e.low[i] === e.low[i];
 		if (good && !(down && joined)) g.moveTo(e.px[i], toY(e.low[i]));
 		if (good) g.lineTo(e.px[i], toY(e.low[i]));
-		if (good) g.lineTo(e.px[i], toY(e.high[i]));
+		if (good) g.lineTo(e.px[i], toY(e.high[i]) - 0.01); // a line of no length is not drawn
 		down = good;
 	}
 }
@@ -429,7 +422,7 @@ function drawAbove() {
 	line(colours.soft, 1.2, 0, p.count);
 	if (!trail) line(trackColour(0), 2, countBefore(p, view.from), countBefore(p, view.to));
 	const x = trail ? newestX(p) : shownX(), k = x === null ? -1 : nearest(p, x);
-	if (k >= 0) stroke(g, trackColour(1), 12, () => [g.moveTo(...at(k)), g.lineTo(...at(k))]);
+	if (k >= 0) stroke(g, trackColour(1), 12, () => [0, 0.01].forEach(d => g.lineTo(at(k)[0], at(k)[1] + d)));
 	const bar = niceStep(60 / scale), text = `${fixed(bar, decimalsOf(bar))} ${head.path?.unit ?? "mm"}`;
 	box(g, colours.ink, 12, tall - 12, bar * scale, 2);
 	write(g, colours.ink, text, 18 + bar * scale, tall - 12);
@@ -459,13 +452,10 @@ function drawLate({edges_us: edges, counts}) {
 	setText($("late").querySelector("figcaption"), canvas.ariaLabel);
 }
 
-function make(tag, text, more) {
-	return Object.assign(document.createElement(tag), {textContent: text ?? "", ...more});
-}
-
-function setText(element, text) {
-	if (element.textContent !== String(text)) element.textContent = text;
-}
+const make = (tag, text = "") => Object.assign(document.createElement(tag), {textContent: text});
+const setText = (element, text) => element.textContent !== String(text) && (element.textContent = text);
+const say = (text, ill) => Object.assign($("said"), {className: ill ? "ill" : "", textContent: text});
+const showProgress = done => Object.assign($("progress"), {hidden: done >= 1, value: done});
 
 // Cells that are there get their new texts in place, so that a selection of them stays.
 function fillTable(table, names, lines) {
@@ -486,11 +476,6 @@ function showState(word, well, text) {
 	$("state").className = well ? "well" : "ill";
 	setText($("state"), `${well ? "●" : "▲"} ${word}`);
 	setText($("text"), text ?? "");
-}
-
-function say(text, ill) {
-	$("said").className = ill ? "ill" : "";
-	setText($("said"), text);
 }
 
 function takeStatus(s) {
@@ -541,7 +526,7 @@ function moveCursor(x) {
 	cursor = clamp(x, limits().from, limits().to);
 	const width = view.to - view.from, lead = cursor > view.to ? 0.1 : 0.9;
 	if (!isSeen(cursor)) setView(cursor - width * lead, cursor + width * (1 - lead));
-	if (head.frames && !frames.length) ask("frame", cursor);
+	if (head.frames && !frames.length) ask("frame", cursor || 1e-9);
 	wake();
 }
 
@@ -558,10 +543,7 @@ function setPlaying(on) {
 	wake();
 }
 
-function setSpan(a, b) {
-	span = a === null ? null : [Math.min(a, b), Math.max(a, b)];
-	wake();
-}
+const setSpan = (a, b) => wake(span = a === null ? null : [Math.min(a, b), Math.max(a, b)]);
 
 function showCut([from, to]) {
 	freeze();
@@ -665,18 +647,14 @@ function send(message) {
 
 function ask(kind, wish) {
 	const one = asks[kind];
-	one.wish = wish ?? one.wish;
-	if (one.id || one.wish === null) return;
+	one.wish = wish || one.wish;
+	if (one.id || !one.wish) return;
 	one.id = send({[kind]: one.wish});
-	one.wish = null;
+	if (one.id) one.wish = null;
 }
 
 function answered(id) {
-	for (const [kind, one] of Object.entries(asks))
-		if (id && one.id === id) {
-			one.id = 0;
-			ask(kind);
-		}
+	for (const kind in asks) if (id && asks[kind].id === id) ask(kind, asks[kind].id = 0);
 }
 
 function pickPart() {
@@ -717,11 +695,6 @@ function takeEvent(event) {
 	wake();
 }
 
-function showProgress(done) {
-	$("progress").hidden = done >= 1;
-	$("progress").value = done;
-}
-
 const takers = {head: takeHead, part: takePart, live: takeLive, state: takeStatus, event: takeEvent,
 	progress: done => [showProgress(done), setView(view.from, view.to)],
 	ok: text => say(text), error: text => say(text, true)};
@@ -729,8 +702,7 @@ const takers = {head: takeHead, part: takePart, live: takeLive, state: takeStatu
 function receive({data}) {
 	if (typeof data !== "string") return takePicture(data);
 	const message = JSON.parse(data);
-	for (const [name, takes] of Object.entries(takers))
-		if (message[name] !== undefined) takes(message[name]);
+	for (const name in takers) if (message[name] !== undefined) takers[name](message[name]);
 	answered(message.id);
 }
 
