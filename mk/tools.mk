@@ -22,7 +22,7 @@ $(O)/obj/tools/cli/machine.o: cppflags += -DBUILD_FLAGS='"$(subst ',,$(subst ",,
 
 # Frames that incise serve decodes.
 has_jpeg := $(shell $(CC) -E -x c -include stdio.h -include jpeglib.h /dev/null >/dev/null 2>&1 && echo yes)
-$(O)/obj/tools/serve/pixels.o: cppflags += $(if $(has_jpeg),-DHAVE_JPEG)
+$(O)/obj/tools/cli/pixels.o: cppflags += $(if $(has_jpeg),-DHAVE_JPEG)
 
 # Image files: those that depth is calibrated from, and frames of a view.
 has_png := $(shell $(CC) -E -x c -include png.h /dev/null >/dev/null 2>&1 && echo yes)
@@ -48,19 +48,19 @@ $(O)/obj/tools/cli/features.o: cppflags += -DLEFT_OUT='"$(left_out_names)"'
 # The parts of all programs. The linker takes of them, and of the libraries, what a program
 # uses: a new part, command or benchmark is found by its place.
 tool_parts := $(O)/obj/tools/parts.a
-tool_texts := $(wildcard tools/cli/*.gp tools/bench/plots/*.gp)
+tool_texts := $(wildcard tools/cli/*.gp tools/bench/plots/*.gp tools/web/viewer.*)
 $(tool_parts): $(patsubst %.c,$(O)/obj/%.o,$(filter-out $(if $(filter serve,$(commands)),,tools/serve/igtl.c),$(wildcard tools/*/*.c))) $(tool_texts:%=$(O)/obj/%.o)
 	@rm -f $@
 	$(call step,AR)
 	$(Q)$(AR) rcs $@ $^
 
-# A script of gnuplot: scenes.gp becomes the string text_scenes_gp.
+# A script of gnuplot, or of a browser: scenes.gp becomes the string text_scenes_gp.
 $(tool_texts:%=$(O)/obj/%.o): $(O)/obj/%.o: %
 	@mkdir -p $(@D)
 	$(call step,CC)
 	$(Q){ echo 'extern const char text_$(subst .,_,$(notdir $<))[];'; \
 		echo 'const char text_$(subst .,_,$(notdir $<))[] ='; \
-		sed 's/[\\"]/\\&/g; s/.*/"&\\n"/' $<; echo ';'; } | \
+		sed 's/[\\"?]/\\&/g; s/.*/"&\\n"/' $<; echo ';'; } | \
 		$(CC) $(cflags) $(CFLAGS) -x c -c -o $@ -
 
 # Another project's evaluator beside ours in incise bench: a shared object of its own,

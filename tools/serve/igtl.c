@@ -21,8 +21,8 @@
 #include "../../lib/device/igtl/igtl_message.h"
 #include "../cli/cli.h"
 #include "../cli/json.h"
+#include "../cli/pixels.h"
 #include "clients.h"
-#include "pixels.h"
 #include "serve.h"
 
 enum output { POSE, FORCE, DATA, FRAME, STATUS, REPLY, OUTPUTS };
