@@ -11,14 +11,10 @@
 // x is in the head's unit: seconds, or UTC seconds when live. Sizes are CSS pixels.
 "use strict";
 
-const RING_SLOTS = 1 << 17;
-const WINDOWS_S = [5, 10, 30, 60];
-const NEAR_S = 60 / (0.9 * RING_SLOTS); // samples closer than this share a slot: no rate overflows
-const RETRY_MS = [500, 1000, 2000, 4000];
-const TRAIL = 512; // places of the live tool from above
-const EVENTS_KEPT = 1000;
-const LEFT = 62, RIGHT = 12; // of the plots
-const STEPS = 200; // of the cursor across the view
+const RING_SLOTS = 1 << 18; // a minute of 4 kHz; a faster track fills less of the longest window
+const WINDOWS_S = [5, 10, 30, 60], RETRY_MS = [500, 1000, 2000, 4000];
+const TRAIL = 512, EVENTS_KEPT = 1000; // places of the live tool from above; events when live
+const LEFT = 62, RIGHT = 12, STEPS = 200; // beside the plots; of the cursor across the view
 
 let head = null, live = false, status = {};
 let series = []; // one a track: of the newest part, or rings
@@ -51,25 +47,18 @@ function readPart({from, to, tracks}) {
 }
 
 function newRing(slots) {
-	return {x: new Float64Array(slots), low: new Float32Array(slots), high: new Float32Array(slots),
-		start: 0, count: 0, mask: slots - 1};
+	const values = new Float32Array(slots);
+	return {x: new Float64Array(slots), low: values, high: values, start: 0, count: 0, mask: slots - 1};
 }
 
 function push(ring, x, v) {
-	let k = slot(ring, ring.count - 1);
-	const since = x - newestX(ring);
-	if (since < -1) ring.start = ring.count = 0; // the clock was set back
-	else if (since < 0) return;
-	else if (since < NEAR_S && v === v && ring.low[k] === ring.low[k]) {
-		ring.low[k] = Math.min(ring.low[k], v);
-		ring.high[k] = Math.max(ring.high[k], v);
-		return;
-	}
+	if (x < newestX(ring) - 1) ring.start = ring.count = 0; // the clock was set back
+	else if (x < newestX(ring)) return;
 	if (ring.count > ring.mask) ring.start = slot(ring, 1);
 	else ring.count++;
-	k = slot(ring, ring.count - 1);
+	const k = slot(ring, ring.count - 1);
 	ring.x[k] = x;
-	ring.low[k] = ring.high[k] = v;
+	ring.low[k] = v;
 }
 
 function countBefore(s, x) {
@@ -115,7 +104,6 @@ function reduce(s) {
 	return Object.assign(s.seen, {n: e + 1, samples: i - first, least, most});
 }
 
-// ---- numbers as text ----------------------------------------------------------------------
 // A step of 1, 2 or 5 times a power of ten that is not below `least`.
 function niceStep(least) {
 	const power = 10 ** Math.floor(Math.log10(least));
@@ -123,7 +111,6 @@ function niceStep(least) {
 }
 
 const decimalsOf = step => Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
-const twoDigits = v => String(Math.floor(v)).padStart(2, "0");
 
 function fixed(v, decimals) {
 	if (!Number.isFinite(v)) return "–";
@@ -141,8 +128,8 @@ function place(x) {
 	if (live) return clock(x, 3);
 	const decimals = clamp(decimalsOf(niceStep((view.to - view.from) / 1500)), 0, 6);
 	const unit = head.axis.unit ?? "", text = `${fixed(x, decimals)} ${unit}`.trim();
-	const hours = `${Math.floor(x / 3600)}:${twoDigits(x / 60 % 60)}:${twoDigits(x % 60)}`;
-	return unit === "s" && head.to > 600 ? `${text} (${hours})` : text;
+	const long = unit === "s" && head.to > 600 && head.to < 86400;
+	return long ? `${text} (${new Date(1000 * x).toISOString().slice(11, 19)})` : text;
 }
 
 function valueText(s, x, decimals) {
@@ -197,8 +184,7 @@ function cleared(canvas, w, h) {
 	canvas.style.height = h + "px";
 	g.setTransform(scale, 0, 0, scale, 0, 0);
 	g.clearRect(0, 0, w, h);
-	return Object.assign(g, {font: colours.font, textBaseline: "middle", lineJoin: "round",
-		lineCap: "round"});
+	return Object.assign(g, {font: colours.font, textBaseline: "middle", lineJoin: "round", lineCap: "round"});
 }
 
 // A panel's legend has a cell a track, as wide as its longest value, so that nothing moves while
@@ -245,9 +231,7 @@ function spread(list, middle, half, draws) {
 	let free = -Infinity;
 	for (const one of list) {
 		const px = middle(one), room = half(one);
-		if (px - room < free) continue;
-		draws(one, px);
-		free = px + room;
+		if (px - room >= free) draws(one, px, free = px + room);
 	}
 }
 
@@ -421,8 +405,8 @@ function drawAbove() {
 	});
 	line(colours.soft, 1.2, 0, p.count);
 	if (!trail) line(trackColour(0), 2, countBefore(p, view.from), countBefore(p, view.to));
-	const x = trail ? newestX(p) : shownX(), k = x === null ? -1 : nearest(p, x);
-	if (k >= 0) stroke(g, trackColour(1), 12, () => [0, 0.01].forEach(d => g.lineTo(at(k)[0], at(k)[1] + d)));
+	const k = nearest(p, trail ? newestX(p) : shownX() ?? NaN);
+	if (k >= 0) stroke(g, trackColour(1), 12, () => [0, 0.01].forEach(d => g.lineTo(at(k)[0] + d, at(k)[1])));
 	const bar = niceStep(60 / scale), text = `${fixed(bar, decimalsOf(bar))} ${head.path?.unit ?? "mm"}`;
 	box(g, colours.ink, 12, tall - 12, bar * scale, 2);
 	write(g, colours.ink, text, 18 + bar * scale, tall - 12);
@@ -441,10 +425,8 @@ function drawLate({edges_us: edges, counts}) {
 		box(g, colour, a, h - 24 - bar, count ? Math.max(2, b - a - 1) : 0, bar);
 	});
 	box(g, colours.soft, 8, h - 24, w - 16, 1);
-	for (let us = 1; us <= last; us *= 10) {
-		const text = us < 1000 ? us + " µs" : us / 1000 + " ms";
-		write(g, colours.soft, text, clamp(px(us), 18, w - 22), h - 11, "center");
-	}
+	for (let us = 1; us <= last; us *= 10)
+		write(g, colours.soft, us < 1000 ? us + " µs" : us / 1000 + " ms", px(us) + 4, h - 11);
 	box(g, colours.bad, px(deadline) - 1, 20, 2, h - 44);
 	write(g, colours.bad, "deadline", px(deadline) - 5, 12, "right");
 	const sum = from => counts.reduce((n, count, i) => n + (edges[i] >= from ? count : 0), 0);
@@ -488,7 +470,7 @@ function takeStatus(s) {
 		["behind", behind && behind + " ms"], ["position", p && join(p, 2) + " mm"],
 		["quaternion", q && join(q, 3)]].filter(([, value]) => value ?? false));
 	if (s.pose && p) {
-		trail ??= newRing(TRAIL);
+		trail ??= {...newRing(TRAIL), high: new Float32Array(TRAIL)};
 		push(trail, performance.now() / 1000, p[0]);
 		trail.high[slot(trail, trail.count - 1)] = p[1];
 		drawAbove();
@@ -496,6 +478,35 @@ function takeStatus(s) {
 	fillTable($("warnings"), null, warnings.map(text => ["▲ " + text]));
 	if (status.tool && document.activeElement !== $("tool")) $("tool").value = status.tool;
 	if (s.late) drawLate(late);
+}
+
+function drawFrame(t, width, height, draws) {
+	const canvas = canvasIn("camera"), caption = $("camera").querySelector("figcaption");
+	if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, {width, height});
+	$("camera").hidden = false;
+	setText(caption, `frame at ${place(t)}`);
+	draws(canvas.getContext("2d"));
+}
+
+function drawNearest() {
+	const far = ([t]) => Math.abs(t - cursor), loaded = frames.filter(([, image]) => image.naturalWidth);
+	if (!loaded.length) return;
+	const [t, image] = loaded.reduce((a, b) => far(b) < far(a) ? b : a);
+	drawFrame(t, image.naturalWidth, image.naturalHeight, g => g.drawImage(image, 0, 0));
+}
+
+function drawPicture({width, height, channels, t, bytes}) {
+	const green = channels === 3 ? 1 : 0;
+	if (drawPicture.image?.width !== width || drawPicture.image.height !== height)
+		drawPicture.image = new ImageData(width, height);
+	const out = drawPicture.image.data.fill(255);
+	for (let i = 0, k = 0; k < out.length; i += channels, k += 4) {
+		out[k] = bytes[i];
+		out[k + 1] = bytes[i + green];
+		out[k + 2] = bytes[i + 2 * green];
+	}
+	drawFrame(t, width, height, g => g.putImageData(drawPicture.image, 0, 0));
+	link.picture = null;
 }
 
 // ---- the view -----------------------------------------------------------------------------
@@ -517,16 +528,15 @@ function setView(from, to) {
 	wake();
 }
 
-function zoom(factor, at = cursor !== null && isSeen(cursor) ? cursor : (view.from + view.to) / 2) {
+const zoom = (factor, at = cursor !== null && isSeen(cursor) ? cursor : (view.from + view.to) / 2) =>
 	setView(at - (at - view.from) * factor, at + (view.to - at) * factor);
-}
 
 function moveCursor(x) {
 	freeze();
 	cursor = clamp(x, limits().from, limits().to);
 	const width = view.to - view.from, lead = cursor > view.to ? 0.1 : 0.9;
 	if (!isSeen(cursor)) setView(cursor - width * lead, cursor + width * (1 - lead));
-	if (head.frames && !frames.length) ask("frame", cursor || 1e-9);
+	if (head.frames && !frames.length) ask("frame", cursor);
 	wake();
 }
 
@@ -558,10 +568,8 @@ function stepTo(list, way, goes) {
 	if (after.length) goes(after.at(way > 0 ? 0 : -1));
 }
 
-function stepBy(way, {shiftKey}) {
-	const from = cursor ?? (isFollowing() ? newest() : (view.from + view.to) / 2);
-	moveCursor(from + way * (view.to - view.from) / STEPS * (shiftKey ? 10 : 1));
-}
+const stepBy = (way, {shiftKey}) =>
+	moveCursor((shownX() ?? view.from) + way * (view.to - view.from) / STEPS * (shiftKey ? 10 : 1));
 
 // Buttons, command and the state for tests.
 function showView() {
@@ -572,6 +580,7 @@ function showView() {
 	setText($("command"), filled);
 	keyButton(" ").ariaPressed = String(live ? !playing : playing);
 	keyButton("s").ariaPressed = String(selecting);
+	keyButton("z").hidden = !span;
 	Object.assign(document.body.dataset, {view: `${view.from} ${view.to}`, cursor: cursor ?? ""});
 	if (part || live && newest() > -Infinity) document.body.dataset.ready = "1";
 }
@@ -602,39 +611,8 @@ function speak() {
 	}, 1000);
 }
 
-// ---- frames -------------------------------------------------------------------------------
-function drawFrame(t, width, height, draws) {
-	const canvas = canvasIn("camera"), caption = $("camera").querySelector("figcaption");
-	if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, {width, height});
-	$("camera").hidden = false;
-	setText(caption, `frame at ${place(t)}`);
-	draws(canvas.getContext("2d"));
-}
-
-function drawNearest() {
-	const far = ([t]) => Math.abs(t - cursor), loaded = frames.filter(([, image]) => image.naturalWidth);
-	if (!loaded.length) return;
-	const [t, image] = loaded.reduce((a, b) => far(b) < far(a) ? b : a);
-	drawFrame(t, image.naturalWidth, image.naturalHeight, g => g.drawImage(image, 0, 0));
-}
-
-function drawPicture({width, height, channels, t, bytes}) {
-	const green = channels === 3 ? 1 : 0;
-	if (drawPicture.image?.width !== width || drawPicture.image.height !== height)
-		drawPicture.image = new ImageData(width, height);
-	const out = drawPicture.image.data.fill(255);
-	for (let i = 0, k = 0; k < out.length; i += channels, k += 4) {
-		out[k] = bytes[i];
-		out[k + 1] = bytes[i + green];
-		out[k + 2] = bytes[i + 2 * green];
-	}
-	drawFrame(t, width, height, g => g.putImageData(drawPicture.image, 0, 0));
-	link.picture = null;
-}
-
 // ---- the server ---------------------------------------------------------------------------
-// One request for data is on the way, and one for a frame; the newest wish goes out when it is
-// answered.
+// One request of each kind is on the way; the newest wish goes out when it is answered.
 const asks = {get: {id: 0, wish: null}, frame: {id: 0, wish: null}};
 const link = {socket: null, tries: 0, id: 0, picture: null, ages: new Float64Array(100), aged: 0,
 	drawnTo: -Infinity};
@@ -647,8 +625,8 @@ function send(message) {
 
 function ask(kind, wish) {
 	const one = asks[kind];
-	one.wish = wish || one.wish;
-	if (one.id || !one.wish) return;
+	one.wish = wish ?? one.wish;
+	if (one.id || one.wish === null) return;
 	one.id = send({[kind]: one.wish});
 	if (one.id) one.wish = null;
 }
@@ -663,20 +641,11 @@ function pickPart() {
 }
 
 function takePart(message) {
-	const banded = series.some(s => s.u);
 	part = readPart(message);
 	if (!whole || part.from <= head.from && part.to >= head.to) whole = part;
 	showProgress(message.done ?? 1);
 	pickPart();
-	if (series.some(s => s.u) !== banded) arrange(); // the legend needs space for ±
-	wake();
-}
-
-function takeLive({t, tracks}) {
-	tracks.forEach((values, i) => {
-		if (series[i]) values?.forEach((v, k) => push(series[i], t[k], v ?? NaN));
-	});
-	wake();
+	arrange(); // the legend needs space for ±
 }
 
 // little-endian: u32 id, width, height, channels, f64 t, then bytes
@@ -689,13 +658,10 @@ function takePicture(buffer) {
 	wake();
 }
 
-function takeEvent(event) {
-	head.events.push(event);
-	head.events.splice(0, head.events.length - EVENTS_KEPT);
-	wake();
-}
-
-const takers = {head: takeHead, part: takePart, live: takeLive, state: takeStatus, event: takeEvent,
+const takers = {head: takeHead, part: takePart, state: takeStatus,
+	live: ({t, tracks}) => wake(tracks.forEach((values, i) => series[i] &&
+		values?.forEach((v, k) => push(series[i], t[k], v ?? NaN)))),
+	event: event => wake(head.events = [...head.events, event].slice(-EVENTS_KEPT)),
 	progress: done => [showProgress(done), setView(view.from, view.to)],
 	ok: text => say(text), error: text => say(text, true)};
 
@@ -728,7 +694,6 @@ function connect() {
 	};
 }
 
-// ---- heads --------------------------------------------------------------------------------
 // A head that comes again, after a change or a new connection, keeps view, cursor and rings.
 function takeHead(h) {
 	const names = one => one?.kind + one?.tracks.map(track => track.label), same = names(head) === names(h);
@@ -741,15 +706,14 @@ function takeHead(h) {
 		start: 0, count: path.t.length, mask: -1});
 	document.title = `${head.title} · incise`;
 	document.body.dataset.mode = head.kind;
-	setText($("title"), head.title);
-	setText($("note"), head.note ?? "");
+	for (const name of ["title", "note"]) setText($(name), head[name] ?? "");
 	$("control").hidden = !head.control;
 	$("tool-label").hidden = !tools.length;
 	$("tool").replaceChildren(...tools.map(name => make("option", name)));
 	fillTable($("table"), head.table?.head, head.table?.rows ?? []);
 	fillTable($("facts"), null, head.facts ?? []);
-	for (const button of document.querySelectorAll(".cuts")) button.hidden = !head.cuts.length;
-	setText(document.querySelector('[data-key=" "]'), live ? "freeze" : "play");
+	keyButton("p").hidden = keyButton("n").hidden = !head.cuts.length;
+	setText(keyButton(" "), live ? "freeze" : "play");
 	$("window").hidden = !live;
 	if (!same) {
 		part = whole = trail = hoverPx = span = null;
@@ -769,24 +733,17 @@ function takeHead(h) {
 // ---- keys and buttons ---------------------------------------------------------------------
 // The page has the words for these in its list of keys.
 const actions = {
-	"ArrowLeft": event => stepBy(-1, event),
-	"ArrowRight": event => stepBy(1, event),
-	" ": () => setPlaying(!playing),
-	"+": () => zoom(0.5),
-	"-": () => zoom(2),
+	"ArrowLeft": event => stepBy(-1, event), "ArrowRight": event => stepBy(1, event),
+	" ": () => setPlaying(!playing), "+": () => zoom(0.5), "-": () => zoom(2),
 	"0": () => [freeze(), setView(limits().from, limits().to)],
-	"Home": () => moveCursor(limits().from),
-	"End": () => moveCursor(limits().to),
-	"p": () => stepTo(head.cuts, -1, showCut),
-	"n": () => stepTo(head.cuts, 1, showCut),
+	"Home": () => moveCursor(limits().from), "End": () => moveCursor(limits().to),
+	"p": () => stepTo(head.cuts, -1, showCut), "n": () => stepTo(head.cuts, 1, showCut),
 	",": () => stepTo(head.events, -1, ([x]) => moveCursor(x)),
 	".": () => stepTo(head.events, 1, ([x]) => moveCursor(x)),
 	"s": () => wake(selecting = !selecting),
 	"[": () => setSpan(cursor, span ? span[1] : view.to),
 	"]": () => setSpan(span ? span[0] : view.from, cursor),
-	"z": () => span && setView(...span),
-	"Escape": () => setSpan(null),
-	"e": copyCommand,
+	"z": () => span && setView(...span), "Escape": () => setSpan(null), "e": copyCommand,
 	"?": () => $("keys").showModal(),
 };
 
@@ -826,8 +783,7 @@ function moveDrag(event) {
 	const [px] = pointerPlace(event), all = head && limits();
 	if (!pointers.has(event.pointerId)) {
 		const over = head && event.pointerType === "mouse" && px >= LEFT && px <= LEFT + plotWidth;
-		hoverPx = over ? px : null;
-		return wake();
+		return wake(hoverPx = over ? px : null);
 	}
 	pointers.set(event.pointerId, px);
 	drag.moved ||= Math.abs(px - drag.px) > 4;
@@ -875,10 +831,9 @@ function wake() {
 // The live window rolls with the newest sample. Where motion is to be reduced it stands still and
 // fills from the left, and the next one starts when it is full.
 function advance(now) {
-	const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
-	const to = still ? Math.ceil(newest() / windowS) * windowS : newest();
-	if (live && to !== -Infinity) Object.assign(view, {from: to - windowS, to});
-	if (live) return;
+	const still = matchMedia("(prefers-reduced-motion: reduce)").matches, x = newest();
+	const to = still ? Math.ceil(x / windowS) * windowS : x;
+	if (live) return x > -Infinity && Object.assign(view, {from: to - windowS, to});
 	moveCursor(cursor + (now - playedAt) / 1000);
 	playedAt = now;
 	playing = cursor < head.to;
@@ -911,8 +866,7 @@ function redraw() {
 }
 
 function listen() {
-	const canvas = canvasIn("stage");
-	Object.assign(canvas, {onpointerdown: startDrag, onpointermove: moveDrag, onpointerup: endDrag,
+	Object.assign(canvasIn("stage"), {onpointerdown: startDrag, onpointermove: moveDrag, onpointerup: endDrag,
 		onpointercancel: endDrag, onwheel: turnWheel, onpointerleave: () => wake(hoverPx = null)});
 	document.onkeydown = pressKey;
 	for (const button of document.querySelectorAll("[data-key]"))
@@ -932,13 +886,10 @@ function listen() {
 function start() {
 	readColours();
 	listen();
-	const text = $("document").textContent.trim();
-	if (text) {
-		const own = JSON.parse(text), load = src => Object.assign(new Image(), {src, onload: wake});
-		frames = (own.frames ?? []).map(([t, src]) => [t, load(src)]);
-		takeHead(own.head);
-		return takePart(own.part);
-	}
+	const text = $("document").textContent.trim(), own = text && JSON.parse(text);
+	const load = src => Object.assign(new Image(), {src, onload: wake});
+	frames = (own.frames ?? []).map(([t, src]) => [t, load(src)]);
+	if (own) return takeHead(own.head), takePart(own.part);
 	if (location.hash.length > 1) {
 		sessionStorage.setItem("incise", decodeURIComponent(location.hash.slice(1)));
 		history.replaceState(null, "", location.pathname + location.search);
