@@ -216,8 +216,7 @@ function arrange() {
 	rows.push(...(head.members ?? []).map(member => ({kind: "member", height: 40, member})));
 	if (frames.length > 1) rows.push({kind: "frames", height: 64});
 	const used = [...rows, ...panels].reduce((sum, row) => sum + (row.height ?? row.legend + 16), 60);
-	const plot = clamp((innerHeight - $("stage").offsetTop - used) / (panels.length || 1), 110,
-		live || panels.length < 3 ? 260 : 190);
+	const plot = clamp((innerHeight - $("stage").offsetTop - used) / (panels.length || 1), 110, 360);
 	rows.push(...panels.map(row => ({...row, plot, height: row.legend + plot + 16})));
 	rows.height = rows.reduce((top, row) => (row.top = top) + row.height, 0);
 	plotWidth = Math.max(50, width - LEFT - RIGHT);
