@@ -289,13 +289,13 @@ static struct cut_text cut_text(const struct session_cut *cut)
 
 static void print_lines(const struct assessed *a, const struct assessed *reference)
 {
-	printf("\n%-34s %8s %-3s %-12s met", "", "value", "", "asked");
+	printf("\n%-34s %8s %-3s %-12s met", "", "value", "", "required");
 	printf(reference ? "  %10s %10s\n" : "\n", "reference", "difference");
 	for (int i = 0; i < LINES; i++) {
 		struct assess_line line = line_of(a, reference, i);
 
-		printf("%-34s %8s %-3s %-12s %-3s", line.label, line.value, line.unit,
-		       line.asked, line.met);
+		printf("%-34s %8s %-3s %-12s %*s", line.label, line.value, line.unit,
+		       line.asked, reference ? -3 : 0, line.met);
 		printf(reference ? "  %10s %10s\n" : "\n", line.reference,
 		       line.difference);
 	}

@@ -78,7 +78,7 @@ while at < len(data):
 	# the boxes of an MP4, its index before the frames
 	[[ "$(boxes_of n.mp4)" == ftyp*moov*mdat* ]] || complain "$(boxes_of n.mp4)"
 	[ ! -e n.mp4.part ]
-	[ "$(head -c 24 n.png | tail -c 8 | od -An -tu1 | tr -s ' \n' ' ')" = " 0 0 1 64 0 0 0 120 " ]
+	[ "$(head -c 24 n.png | tail -c 8 | od -An -tu1 | tr -s ' \n' ' ')" = " 0 0 1 64 0 0 0 132 " ]
 	run --separate-stderr incise view neck --procedure -o no/n.mkv --duration 1s $small
 	failed_with no/n.mkv.part "No such file"
 	fails incise view neck --procedure -o /dev/full/x --duration 1s $small -- /dev/full
@@ -138,7 +138,7 @@ wrote s.session" ]
 	incise demo --scene wall -o out >said
 	grep -q '^\$ incise view wall --procedure -o out/wall.mkv' said
 	[ "$(head -c 4 out/wall.mkv | od -An -tx1 | tr -d ' \n')" = 1a45dfa3 ]
-	[ "$(head -c 24 out/wall.png | tail -c 8 | od -An -tu1 | tr -s ' \n' ' ')" = " 0 0 10 0 0 0 1 224 " ]
+	[ "$(head -c 24 out/wall.png | tail -c 8 | od -An -tu1 | tr -s ' \n' ' ')" = " 0 0 10 0 0 0 1 243 " ]
 	fails incise demo --scene wall -o out -- out --overwrite
 }
 

@@ -319,6 +319,13 @@ void cli_catch_signals(void);
 extern volatile sig_atomic_t cli_stop;
 
 /*
+ * Ask on standard error, and read the answer from standard input, without its line's end; one that is
+ * longer than @size - 2 is refused and asked for again. Returns false if the input ends or a caught
+ * signal comes.
+ */
+bool cli_ask(const char *question, char *answer, int size);
+
+/*
  * The escape sequence that begins a colour, or with CLI_PLAIN ends it; "" unless the stream is a
  * terminal with colours. NO_COLOR, not empty, turns them off (no-color.org), TERM=dumb as well.
  */
