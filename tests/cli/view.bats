@@ -278,10 +278,12 @@ begin_view() {
 	local source
 	! compgen -G "/dev/dri/card*" >/dev/null || skip "this machine may have a screen of its own"
 	for source in "--rig sim:mouse" "--procedure"; do
+		[ "$source" = --procedure ] && remedy="without a display give -o FILE.mp4" ||
+			remedy="'incise view neck --procedure -o FILE.mp4' writes a film"
 		# shellcheck disable=SC2086
 		run --separate-stderr timeout 60 env -u DISPLAY -u WAYLAND_DISPLAY -u SDL_VIDEODRIVER \
 			XDG_RUNTIME_DIR="$PWD" incise view neck.scene $source $small
-		failed_with "no screen for a window" "without a display give -o FILE.mp4" || complain "$source"
+		failed_with "no screen for a window" "$remedy" || complain "$source"
 	done
 	# Who names that driver has asked for it.
 	run -0 --separate-stderr timeout 60 env -u DISPLAY -u WAYLAND_DISPLAY SDL_VIDEODRIVER=offscreen \
