@@ -631,7 +631,7 @@ function ask(kind, wish) {
 }
 
 function answered(id) {
-	for (const kind in asks) if (id && asks[kind].id === id) ask(kind, asks[kind].id = 0);
+	for (const kind in asks) if (id && asks[kind].id === id) ask(kind, asks[kind].id = null);
 }
 
 function pickPart() {
