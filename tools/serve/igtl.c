@@ -283,7 +283,8 @@ static void igtl_send(struct serve_sink *sink, const struct serve_item *item)
 		[SERVE_STATUS] = send_status,
 	};
 
-	send[item->kind]((struct igtl *)sink, item);
+	if (send[item->kind])
+		send[item->kind]((struct igtl *)sink, item);
 }
 
 /* --- receiving ----------------------------------------------------------------------- */
