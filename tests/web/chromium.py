@@ -90,8 +90,8 @@ class Page:
             self.mouse("mouseMoved", x0 + (x1 - x0) * i / 5, y0 + (y1 - y0) * i / 5, **more)
         self.mouse("mouseReleased", x1, y1, **more)
 
-    def screenshot(self, path, whole=True):
-        answer = self.call("Page.captureScreenshot", format="png", captureBeyondViewport=whole)
+    def screenshot(self, path):
+        answer = self.call("Page.captureScreenshot", format="png")
         with open(path, "wb") as file:
             file.write(base64.b64decode(answer["data"]))
 

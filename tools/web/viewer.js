@@ -328,7 +328,7 @@ function drawPanel(g, row) {
 	}
 	within(g, LEFT, base - 3, plotWidth, plot + 6, () => cells.forEach(({track, colour}) => {
 		const {seen, u} = series[track];
-		Object.assign(g, {fillStyle: trackColour(colour), globalAlpha: 0.22});
+		Object.assign(g, {fillStyle: trackColour(colour), globalAlpha: 0.22 / Math.sqrt(cells.length)});
 		if (u) drawBand(g, seen, toY);
 		g.globalAlpha = 1;
 		stroke(g, trackColour(colour), 1.6, () => drawTrace(g, seen, toY, true));
@@ -375,10 +375,10 @@ function drawCursor(g) {
 }
 
 function drawPlots() {
-	const g = cleared(canvasIn("stage"), LEFT + plotWidth + RIGHT, rows.height);
-	const ticks = drawAxis(g, rows[0]), top = rows.find(row => row.kind === "panel")?.top ?? rows.height;
+	const g = cleared(canvasIn("stage"), LEFT + plotWidth + RIGHT, rows.height), ticks = drawAxis(g, rows[0]);
+	const {top, legend} = rows.find(row => row.kind === "panel") ?? rows[0];
 	within(g, LEFT, top, plotWidth, rows.height - top - 4, () => {
-		for (const px of ticks) box(g, colours.line, Math.round(px), top + 26, 1, rows.height);
+		for (const px of ticks) box(g, colours.line, Math.round(px), top + legend, 1, rows.height);
 		for (const [from, to] of seenCuts())
 			box(g, colours.cut, toPx(from), top, Math.max(1, toPx(to) - toPx(from)), rows.height);
 	});
