@@ -23,6 +23,7 @@
 
 #define ROWS 1024 /* of a message: more are left out, counted */
 #define GATHER_NS 30000000LL
+#define STATE_NS 190000000LL
 #define OCTAVE 8 /* buckets of a histogram in one of the page */
 
 enum { FORCE, DEPTH, X, Y, Z, TRACKS };
@@ -46,6 +47,7 @@ struct http {
 	char state[20], text[300], tool[16];
 	double pose[7];
 	bool has_pose;
+	int64_t told_ns;
 };
 
 static void put_row(struct http *http, const struct serve_item *item, int track,
@@ -241,6 +243,18 @@ static void http_flush(struct serve_sink *sink)
 	http->n = 0;
 }
 
+/* Five times a second: the pose, and a capture, of a rig; a loop's state has its own pace. */
+static void http_tick(struct serve_sink *sink, int64_t now_ns)
+{
+	struct http *http = (struct http *)sink;
+
+	if (http->info->commanded || !http->has_pose ||
+	    now_ns - http->told_ns < STATE_NS || !http_server_has_visitors(http->server))
+		return;
+	http->told_ns = now_ns;
+	send_state(http, json_object());
+}
+
 /* --- orders ------------------------------------------------------------------------------ */
 
 static int http_fd(const struct serve_sink *sink)
@@ -327,6 +341,7 @@ static void http_free(struct serve_sink *sink)
 static const struct serve_sink_ops http_ops = {
 	.send = http_send,
 	.flush = http_flush,
+	.tick = http_tick,
 	.fd = http_fd,
 	.work = http_work,
 	.summary = http_summary,

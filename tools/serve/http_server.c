@@ -22,7 +22,6 @@
 #define PATIENCE_US 5000000 /* for the token */
 #define SPANS (1 << 18)
 #define HEADER 512
-#define LIVE_ROWS_MAX (1 << 20)
 
 enum what { EVENT, FRAME, ANSWER };
 
@@ -47,6 +46,7 @@ struct visitor {
 };
 
 struct http_server {
+	lws_sorted_usec_list_t tick; /* first */
 	struct http_server_setup setup;
 	struct lws_context *context;
 	pthread_t thread, reader;
@@ -433,7 +433,6 @@ static bool let_in(struct http_server *server, struct visitor *visitor,
 				 (unsigned char *)(uintptr_t)why, sizeof(why) - 1);
 		return false;
 	}
-	lws_set_timer_usecs(visitor->wsi, LWS_SET_TIMER_USEC_CANCEL);
 	visitor->allowed = true;
 	visitor->control =
 		server->setup.control && control && is_token(control, server->control);
@@ -620,7 +619,7 @@ static int handle(struct lws *wsi, enum lws_callback_reasons reason, void *user,
 		leave(server, visitor);
 		return 0;
 	case LWS_CALLBACK_TIMER:
-		return -1; /* no token came */
+		return visitor->allowed ? 0 : -1; /* no token came */
 	case LWS_CALLBACK_RECEIVE:
 		return receive(server, visitor, in, n);
 	case LWS_CALLBACK_SERVER_WRITEABLE:
@@ -654,32 +653,22 @@ static void tell_progress(struct http_server *server)
 	}
 }
 
-static void tick(lws_sorted_usec_list_t *list);
-
-struct ticking {
-	lws_sorted_usec_list_t list; /* first */
-	struct http_server *server;
-};
-
 static void tick(lws_sorted_usec_list_t *list)
 {
-	struct ticking *ticking = (struct ticking *)list;
+	struct http_server *server = (struct http_server *)list;
 
-	tell_progress(ticking->server);
-	lws_sul_schedule(ticking->server->context, 0, list, tick, LWS_US_PER_SEC / 4);
+	tell_progress(server);
+	lws_sul_schedule(server->context, 0, list, tick, LWS_US_PER_SEC / 4);
 }
 
 static void *serve_pages(void *of)
 {
 	struct http_server *server = of;
-	struct ticking ticking = {.server = server};
 
 	if (server->setup.file)
-		lws_sul_schedule(server->context, 0, &ticking.list, tick, 1);
+		lws_sul_schedule(server->context, 0, &server->tick, tick, 1);
 	while (!server->stop && lws_service(server->context, 0) >= 0)
 		;
-	lws_sul_schedule(server->context, 0, &ticking.list, tick,
-			 LWS_SET_TIMER_USEC_CANCEL);
 	return NULL;
 }
 

@@ -167,7 +167,7 @@ static void end_capture(struct rig *rig, const char *why)
 	struct incise_error err = {0};
 
 	if (incise_recorder_close(rig->recorder, &err))
-		cli_warn("%s.rec: %s", rig->capture, err.text);
+		cli_warn("%s%s%s", why, *why ? "; " : "", err.text);
 	else
 		cli_note("wrote %s.rec", rig->capture);
 	rig->recorder = NULL;

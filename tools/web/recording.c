@@ -292,7 +292,7 @@ static json_t *web_recording_head(struct web_file *file)
 	char number[16];
 
 	web_head_panel(head, "force", "N", "force");
-	web_head_panel(head, "depth", "mm", "tracker");
+	web_head_panel(head, "depth", "mm", "depth");
 	web_head_panel(head, "speed", "mm/s", "speed");
 	if (has_frames(w))
 		web_head_panel(head, "depth by camera", "mm", "camera");

@@ -124,6 +124,8 @@ void web_series_put(const struct web_series *series, double from, double to, int
 {
 	double step = (to - from) / columns;
 
+	if (u && isnan(u(of, 0)))
+		u = NULL;
 	if (series->samples <= series->room && series->samples <= columns + 2) {
 		put_samples(series, from, to, u, of, out);
 		return;
