@@ -51,11 +51,12 @@ class Page:
         while time.monotonic() < end:
             value = self.evaluate(
                 "new Promise(done => { const look = n => { let v; try { v = (%s); } catch { } "
-                "v || !n ? done(v) : setTimeout(look, 15, n - 1); }; look(60); })" % expression
+                "v || !n ? done(v) : setTimeout(look, 15, n - 1); }; look(20); })" % expression
             )
             if value:
                 return value
-        raise AssertionError(f"not within {LIMIT_S} s: {expression}; the page said: {self.says}")
+        shown = self.evaluate("document.body.innerText.slice(0, 300)")
+        raise AssertionError(f"not within {LIMIT_S} s: {expression}; {self.says}; shown: {shown}")
 
     def resize(self, width, height=900, ratio=1):
         self.call(
@@ -122,7 +123,8 @@ class Chromium:
 
         self.process = subprocess.Popen(
             [path, "--headless=new", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--no-first-run",
-             "--disable-dev-shm-usage", f"--user-data-dir={self.profile.name}",
+             "--disable-dev-shm-usage", "--disable-background-timer-throttling", "--disable-renderer-backgrounding",
+             "--disable-backgrounding-occluded-windows", f"--user-data-dir={self.profile.name}",
              "--remote-debugging-pipe", "about:blank"],
             preexec_fn=place, pass_fds=(3, 4), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
             stderr=open(os.path.join(self.profile.name, "stderr"), "wb"), start_new_session=True,

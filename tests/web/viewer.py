@@ -8,11 +8,13 @@ Pages with a document are files; a live page has a socket of the test's own inst
 
 import json
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
+import time
 
-from chromium import Chromium
+from chromium import LIMIT_S, Chromium
 
 HERE = pathlib.Path(__file__).resolve().parent
 
@@ -547,6 +549,118 @@ def memory(browser):
     print("heap in kB:", *(heap // 1000 for heap in heaps))
     assert max(heaps[6:]) - min(heaps[5:7]) < 500_000, heaps
     says(page)
+
+
+class Server:
+    """incise serve with a page at a free port; the address with its tokens is in self.url."""
+
+    def __init__(self, *arguments, port=0):
+        folder = pathlib.Path(tempfile.mkdtemp(prefix="serve-", dir="."))
+        self.log = folder / "log"
+        self.process = subprocess.Popen(
+            ["incise", "serve", *arguments, "--http", str(port), "--url", folder / "url"],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=self.log.open("w"),
+        )
+        end = time.monotonic() + LIMIT_S
+        while not (folder / "url").exists() or not (folder / "url").read_text().endswith("\n"):
+            assert self.process.poll() is None, self.log.read_text()
+            assert time.monotonic() < end, "no address"
+            time.sleep(0.02)
+        self.url = (folder / "url").read_text().strip()
+        self.port = int(self.url.split("/")[2].split(":")[1])
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.process.terminate()
+        self.process.wait(LIMIT_S)
+
+
+def visiting(browser, url):
+    page = browser.page()
+    page.resize(1280)
+    page.call("Page.bringToFront")  # a tab behind others draws nothing
+    page.open(url)
+    drawn(page)
+    return page
+
+
+def mailed(browser):
+    """incise plot c.rec -o page.html: a picture, frames and the command, without a network."""
+    page = browser.page()
+    page.resize(1280)
+    page.open(pathlib.Path("page.html").resolve().as_uri())
+    drawn(page)
+    page.evaluate(COLOURED)
+    assert page.evaluate("document.body.dataset.mode") == "recording"
+    assert page.evaluate("[performance.getEntriesByType('resource').length, link.socket]") == [0, None]
+    middle = "(view.from + view.to) / 2"
+    assert page.evaluate(f"coloured(0, {middle}, 0).length")
+    page.wait_for("frames.length > 1 && !camera.hidden")
+    page.evaluate("setView(view.from, view.to / 2)")
+    page.wait_for("command.textContent.includes(` --range ${view.from.toFixed(4)}s..`)")
+    says(page)
+
+
+def served(browser):
+    """A served recording: the whole, then a part of its own for a view, and frames at the cursor."""
+    with Server("c.rec") as server:
+        page = visiting(browser, server.url)
+        assert page.evaluate("location.href") == f"http://127.0.0.1:{server.port}/"
+        page.evaluate(COLOURED)
+        assert page.evaluate("document.body.dataset.mode") == "recording"
+        page.wait_for("progress.hidden && part.from == head.from && part.to == head.to")
+        assert page.evaluate("coloured(0, (view.from + view.to) / 2, 0).length")
+        page.wait_for("!camera.hidden")
+        first = page.evaluate("camera.innerText")
+        page.key("End")
+        page.wait_for(f"camera.innerText != {json.dumps(first)}")
+        page.evaluate("setView(1, 1.5)")
+        page.wait_for("part.from > 0.5 && part.to < 2 && series === part.series")
+        page.wait_for("coloured(0, 1.25, 0).length")
+        says(page)
+        stranger = browser.page()
+        stranger.open(server.url.split("#")[0] + "#" + "0" * 32)
+        stranger.wait_for("state.textContent.includes('refused')")
+        assert stranger.evaluate("sessionStorage.length") == 0
+
+
+def tabs(browser):
+    """Two tabs of a live rig, one with control, which marks an event; both outlive the server."""
+    with Server("--rig", "sim:", "--control") as server:
+        both = [visiting(browser, server.url), visiting(browser, re.sub(r"(#[0-9a-f]+).*", r"\1", server.url))]
+        for page in both:
+            page.call("Page.bringToFront")
+            drawn(page)
+            page.wait_for("state.textContent.includes('running') && document.body.dataset.behind")
+            seen = page.evaluate("newest()")
+            page.wait_for(f"newest() > {seen} + 0.2")
+        assert both[0].evaluate("control.hidden") is False
+        assert both[1].evaluate("control.hidden") is True
+        order = """(does, name, value) => { const find = what => document.querySelector(`#control ${what}`);
+            if (name) find(`[name=${name}]`).value = value; find(`[data-do=${does}]`).click(); }"""
+        both[0].evaluate(f"({order})('mark', 'text', 'early')")
+        both[0].wait_for("said.className == 'ill'")  # nothing is recorded yet
+        both[0].evaluate(f"({order})('capture', 'name', 'trial')")
+        for page in both:
+            page.wait_for("facts.innerText.includes('trial')")
+        both[0].evaluate(f"({order})('mark', 'text', 'tap')")
+        both[0].wait_for("said.className == '' && said.textContent.includes('tap')")
+        both[0].evaluate(f"({order})('stop')")
+        for page in both:
+            page.wait_for("!facts.innerText.includes('trial')")
+    for page in both:
+        page.wait_for("state.textContent.includes('no connection')")
+    with Server("--rig", "sim:", "--control", port=server.port):
+        for page in both:
+            page.call("Page.bringToFront")
+            page.wait_for("state.textContent.includes('refused')")  # by new tokens
+            page.wait_for("text.textContent.includes('incise serve printed')")
+    for page in both:
+        says(page)
 
 
 if __name__ == "__main__":

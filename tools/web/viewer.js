@@ -71,10 +71,10 @@ function countBefore(s, x) {
 	return a;
 }
 
-// The place of the sample nearest to x, or -1 outside the series.
+// The place of the sample nearest to x, or -1 five samples beyond an end: live, some tracks lag.
 function nearest(s, x) {
-	const first = s.x[slot(s, 0)], last = newestX(s), spacing = (last - first) / (s.count - 1) || 0;
-	if (!s.count || !(x >= first - spacing && x <= last + spacing)) return -1;
+	const first = s.x[slot(s, 0)], last = newestX(s), reach = 5 * (last - first) / (s.count - 1) || 0;
+	if (!s.count || !(x >= first - reach && x <= last + reach)) return -1;
 	const i = countBefore(s, x), a = slot(s, Math.max(0, i - 1)), b = slot(s, Math.min(i, s.count - 1));
 	return x - s.x[a] <= s.x[b] - x ? a : b;
 }
@@ -361,7 +361,7 @@ function drawLabel(g, text, middle, y) {
 function drawCursor(g) {
 	const [a, b] = span ? span.map(toPx) : [0, 0], x = shownX(), event = x !== null && eventNear(x);
 	within(g, LEFT, 0, plotWidth, rows.height, () => {
-		g.globalAlpha = 0.16;
+		g.globalAlpha = 0.1;
 		box(g, colours.mark, a, 0, b - a, rows.height);
 		g.globalAlpha = 1;
 		for (const px of span ? [a, b] : []) box(g, colours.mark, px - 1, 0, 2, rows.height);
@@ -679,12 +679,12 @@ function connect() {
 	const socket = link.socket = new WebSocket(`${scheme}://${location.host}/ws`);
 	Object.assign(socket, {binaryType: "arraybuffer", onmessage: receive});
 	socket.onopen = () => socket.send(JSON.stringify({token, control}));
-	socket.onclose = ({code}) => {
+	socket.onclose = ({code, reason}) => {
 		link.socket = null;
 		asks.get.id = asks.frame.id = 0;
 		if (code === 1008) {
 			sessionStorage.removeItem("incise");
-			return showState("refused", false, hint);
+			return showState("refused", false, `${reason || "not this token"}: ${hint}`);
 		}
 		showState("no connection", false, "trying again");
 		for (const ring of live ? series : []) // a line across the outage would be a lie
