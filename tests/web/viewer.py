@@ -649,7 +649,11 @@ def tabs(browser):
             page.wait_for("facts.innerText.includes('trial')")
         both[0].evaluate(f"({order})('mark', 'text', 'tap')")
         both[0].wait_for("said.className == '' && said.textContent.includes('tap')")
+        started = both[0].evaluate("newest()")
+        both[0].wait_for(f"newest() > {started} + 1")
         both[0].evaluate(f"({order})('stop')")
+        both[0].wait_for("said.textContent.includes('wrote trial.rec')")
+        assert pathlib.Path("trial.rec").is_dir()
         for page in both:
             page.wait_for("!facts.innerText.includes('trial')")
     for page in both:
