@@ -63,7 +63,8 @@ static const struct cli_option options[] = {
 	 "without ADDR to this machine only; its address with a token is printed on the terminal",
 	 CLI_TEXT(struct serve_job, http.address)},
 	{0, "url", "FILE",
-	 "of --http: write the page's address, a secret, into this file",
+	 "of --http: write the page's address, a secret, into this file; over one that is there, with "
+	 "--overwrite, its tokens stay, so that open pages come back",
 	 CLI_OUTPUT(struct serve_job, http.url)},
 	{0, "control", NULL,
 	 "of --http: a second token lets a page start and stop a capture, mark an event and set the "

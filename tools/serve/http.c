@@ -374,6 +374,24 @@ static char *live_head(const struct http *http)
 	return text;
 }
 
+/*
+ * The address in the file of a server before, so that its pages come back to this one: of a file that nobody else
+ * could read. NULL: none.
+ */
+static char *address_before(const char *path)
+{
+	struct stat st;
+	FILE *file = path ? fopen(path, "re") : NULL;
+	char line[300];
+	bool ours = file && !fstat(fileno(file), &st) && S_ISREG(st.st_mode) &&
+		    st.st_uid == geteuid() && !(st.st_mode & 077) &&
+		    fgets(line, sizeof(line), file);
+
+	if (file)
+		fclose(file);
+	return ours ? cli_text("%s", line) : NULL;
+}
+
 /* The secret address: to a person at a terminal, or into a file for this user alone; never to a log. */
 static void tell_url(const struct http *http)
 {
@@ -403,6 +421,7 @@ struct serve_sink *serve_http_new(const struct serve_http_options *options,
 					  .control = options->control,
 					  .file = options->view ? web_open(options->view)
 								: NULL};
+	char *before;
 
 	if (!options->url && !isatty(STDERR_FILENO))
 		cli_fail(
@@ -416,7 +435,9 @@ struct serve_sink *serve_http_new(const struct serve_http_options *options,
 	if (http->wake < 0)
 		cli_fail("--http: %s", strerror(errno));
 	setup.head = live_head(http);
+	setup.before = before = address_before(options->url);
 	http->server = http_server_new(&setup);
+	free(before);
 	tell_url(http);
 	return &http->base;
 }

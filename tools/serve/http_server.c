@@ -685,10 +685,14 @@ static void *read_file(void *of)
 
 /* --- opening ------------------------------------------------------------------------------- */
 
-static void make_token(char token[TOKEN])
+static void make_token(char token[TOKEN], const char *before)
 {
 	uint8_t bytes[TOKEN / 2];
 
+	if (before && strspn(before, "0123456789abcdef") == TOKEN - 1) {
+		snprintf(token, TOKEN, "%s", before);
+		return;
+	}
 	if (getrandom(bytes, sizeof(bytes), 0) != sizeof(bytes))
 		cli_fail("--http: no random numbers: %s", strerror(errno));
 	for (size_t i = 0; i < sizeof(bytes); i++)
@@ -721,6 +725,8 @@ static void listen_at(struct http_server *server)
 	char host[64];
 	struct in6_addr any;
 	int port = split_address(server->setup.address, host);
+	const char *end =
+		server->setup.before ? strstr(server->setup.before, "/#") : NULL;
 	struct lws_context_creation_info info = {
 		.protocols = protocols,
 		.options = LWS_SERVER_OPTION_EXPLICIT_VHOSTS |
@@ -740,6 +746,9 @@ static void listen_at(struct http_server *server)
 	struct lws_vhost *vhost = NULL;
 	bool v6 = strchr(host, ':');
 
+	while (!port && end && end > server->setup.before && end[-1] != ':')
+		end--;
+	info.port = port ? port : end ? atoi(end) & 0xffff : 0;
 	if (inet_pton(v6 ? AF_INET6 : AF_INET, host, &any) != 1)
 		cli_usage("--http: '%s' is no address; give one of this machine, such as "
 			  "127.0.0.1:8080 or [::1]:8080, or the port alone",
@@ -763,12 +772,15 @@ struct http_server *http_server_new(const struct http_server_setup *setup)
 {
 	struct http_server *server = cli_alloc(1, sizeof(*server));
 	struct incise_error err = {0};
+	const char *mark;
 	char *page;
 
 	server->setup = *setup;
 	pthread_mutex_init(&server->lock, NULL);
-	make_token(server->token);
-	make_token(server->control);
+	mark = setup->before ? strchr(setup->before, '#') : NULL;
+	make_token(server->token, mark ? mark + 1 : NULL);
+	mark = mark ? strchr(mark, '.') : NULL;
+	make_token(server->control, mark ? mark + 1 : NULL);
 	page = cli_require(web_page(NULL, &server->page_n, &err), &err);
 	server->page = cli_alloc(1, LWS_PRE + server->page_n);
 	memcpy(server->page + LWS_PRE, page, server->page_n);

@@ -30,6 +30,8 @@ struct http_server_setup {
 	struct web_file *file; /* the viewer's; NULL: live */
 	char *head;	       /* JSON for each visitor, live; the server frees it */
 	int wake;	       /* an eventfd that is written when an order waits */
+	/* An address of before, whose tokens stay, and whose port where the address has 0; or NULL. */
+	const char *before;
 };
 
 /* Start, or fail the program. */

@@ -10,6 +10,7 @@
 #include <incise/uncertainty.h>
 #include "../cli/cli.h"
 #include "../cli/json.h"
+#include "../cli/plot.h"
 #include "web.h"
 
 #define LINES 5	   /* values of the second input, from its least to its largest */
@@ -40,22 +41,33 @@ static json_t *web_model_head(struct web_file *file)
 {
 	const struct web_model *w = (struct web_model *)file;
 	const struct incise_model_info *info = w->info;
-	json_t *head = web_head_new("model", file->path, info->input[0].name, "",
-				    info->input[0].min, info->input[0].max);
+	const char *name = info->input[0].name, *unit;
+	json_t *head;
 	double x[INCISE_MODEL_INPUTS_MAX];
-	char labels[600] = "";
+	char labels[600] = "", *label;
+	size_t length;
+
+	unit = plot_unit_of(name, &length);
+	label = cli_text("%.*s", (int)length, name);
+	head = web_head_new("model", file->path, label, unit, info->input[0].min,
+			    info->input[0].max);
+	free(label);
 
 	for (int k = 0; k < w->lines; k++) {
 		size_t n = strlen(labels);
 
 		place_model(w, k, 0, x);
 		if (info->n_inputs > 1)
-			snprintf(labels + n, sizeof(labels) - n, "%s%.60s %.4g",
-				 k ? "|" : "", info->input[1].name, x[1]);
+			snprintf(labels + n, sizeof(labels) - n, "%sat %.4g %s",
+				 k ? "|" : "", x[1],
+				 plot_unit_of(info->input[1].name, &length));
 		else
 			snprintf(labels, sizeof(labels), "%s", info->output.name);
 	}
-	web_head_panel(head, info->output.name, "", labels);
+	unit = plot_unit_of(info->output.name, &length);
+	label = cli_text("%.*s", (int)length, info->output.name);
+	web_head_panel(head, label, unit, labels);
+	free(label);
 	json_object_set_new(
 		head, "facts",
 		json_pack("[[ss]]", "band",

@@ -26,6 +26,7 @@
 #define OVERVIEW_ROWS 2000000U /* fewer are read at once */
 #define JOINED_ROWS 5000000U   /* a joined recording is read whole for any part of it */
 #define EVENTS_MOST 2000
+#define SPAN_LEAST_S 0.05
 
 enum { FORCE, DEPTH, SPEED, CAMERA, X, Y, Z, TRACKS };
 
@@ -187,6 +188,8 @@ static int web_recording_read(struct web_file *file, int spans,
 	struct incise_export_options options;
 	int rc = 0;
 
+	/* Not so short that a slow stream has less than a row in a column of two spans. */
+	spans = (int)fmin(spans, 1 + w->to_s / SPAN_LEAST_S);
 	incise_export_options_init(&options);
 	pthread_mutex_lock(&w->lock);
 	for (int i = 0; i < TRACKS; i++)
