@@ -15,7 +15,7 @@ import subprocess
 import tempfile
 import time
 
-LIMIT_S = 20
+LIMIT_S = 120
 
 
 class Page:
@@ -112,7 +112,9 @@ class Chromium:
         path = shutil.which("chromium")
         if not path:
             raise FileNotFoundError("chromium is not installed")
-        self.profile = tempfile.TemporaryDirectory(prefix="incise-chromium-", ignore_cleanup_errors=True)
+        self.profile = tempfile.TemporaryDirectory(
+            prefix="incise-chromium-", ignore_cleanup_errors=True
+        )
         there, self.write = os.pipe()
         self.read, back = os.pipe()
         high = [fcntl.fcntl(fd, fcntl.F_DUPFD, 10) for fd in (there, back)]
@@ -122,9 +124,10 @@ class Chromium:
             os.dup2(high[1], 4)
 
         self.process = subprocess.Popen(
-            [path, "--headless=new", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--no-first-run",
-             "--disable-dev-shm-usage", "--disable-background-timer-throttling", "--disable-renderer-backgrounding",
-             "--disable-backgrounding-occluded-windows", f"--user-data-dir={self.profile.name}",
+            [path, "--headless=new", "--no-sandbox", "--disable-gpu", "--hide-scrollbars",
+             "--no-first-run", "--disable-dev-shm-usage", "--disable-background-timer-throttling",
+             "--disable-renderer-backgrounding", "--disable-backgrounding-occluded-windows",
+             f"--user-data-dir={self.profile.name}",
              "--remote-debugging-pipe", "about:blank"],
             preexec_fn=place, pass_fds=(3, 4), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
             stderr=open(os.path.join(self.profile.name, "stderr"), "wb"), start_new_session=True,

@@ -73,16 +73,17 @@ LIVE_HEAD = {
 FAKE = """
 window.sockets = []; window.delays = [];
 const later = window.setTimeout;
-window.setTimeout = (does, ms) => does.name == "connect" ? (delays.push(ms), later(does, 0)) : later(does, ms);
+window.setTimeout = (does, ms) =>
+	does.name == "connect" ? (delays.push(ms), later(does, 0)) : later(does, ms);
 window.WebSocket = class {
 	constructor(url) { Object.assign(this, {url, readyState: 0, sent: []}); sockets.push(this); }
 	send(text) { this.sent.push(JSON.parse(text)); }
 	open() { this.readyState = 1; this.onopen({}); }
-	say(message) { this.onmessage({data: message instanceof ArrayBuffer ? message : JSON.stringify(message)}); }
+	say(what) { this.onmessage({data: what instanceof ArrayBuffer ? what : JSON.stringify(what)}); }
 	drop(code) { this.readyState = 3; this.onclose({code}); }
 };
 """
-# The heights in CSS pixels, from the panel's top, where a column of the canvas has a track's colour.
+# Heights from the panel's top, in CSS pixels, where a column of the canvas has a track's colour.
 COLOURED = """
 window.coloured = (panel, x, track) => {
 	const canvas = document.querySelector("#stage canvas"), ratio = canvas.width / canvas.clientWidth;
@@ -160,8 +161,8 @@ def pixels(browser):
             """(() => { const canvas = document.querySelector("#stage canvas");
             const g = canvas.getContext("2d"), ratio = canvas.width / canvas.clientWidth;
             const row = rows.filter(row => row.kind == "panel")[1];
-            const at = v => g.getImageData(toPx(3.3) * ratio, row.toY(v) * ratio, 1, 1).data[2] * 1000 +
-                g.getImageData(toPx(3.3) * ratio, row.toY(v) * ratio, 1, 1).data[3];
+            const at = v => String(
+                g.getImageData(toPx(3.3) * ratio, row.toY(v) * ratio, 1, 1).data);
             return [0.33, 0.43, 0.57, 0.67].map(at).concat([at(0.73), at(0.27)]); })()"""
         )
         assert len(set(band[:4])) == 1 and len(set(band[4:])) == 1 and band[0] != band[4], band
@@ -230,8 +231,8 @@ def keys(browser):
     # the buttons do the same; the canvas is what a screen reader reads, with the cursor's values
     page.evaluate("""keys.close(); document.querySelector('[data-key="n"]').click()""")
     near(page, "cursor", 1)
-    page.wait_for("""document.querySelector("#stage canvas").ariaLabel.includes("at 1.000")""")
-    page.wait_for("""document.querySelector("#stage canvas").ariaLabel.includes("predicted 0.50")""")
+    for text in ("at 1.000", "predicted 0.50"):
+        page.wait_for(f"canvasIn('stage').ariaLabel.includes('{text}')")
     page.wait_for("""spoken.textContent.includes("force 0.00")""")
     says(page)
 
@@ -240,7 +241,7 @@ def pointers(browser):
     """Drag, wheel, select, scrub, and two fingers."""
     page = shown(browser)
     box = page.evaluate(
-        """(() => { const {left, top} = document.querySelector("#stage canvas").getBoundingClientRect();
+        """(() => { const {left, top} = canvasIn("stage").getBoundingClientRect();
         const row = rows.find(row => row.kind == "panel");
         return [left + LEFT, plotWidth, top + row.top + row.legend + 40, top + 10]; })()"""
     )
@@ -307,7 +308,8 @@ def looks(browser):
                 const against = (a, b) => (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
                 const page = light(colours.page);
                 return {tracks: colours.tracks.map(c => against(light(c), page)),
-                    texts: ["ink", "soft", "mark", "bad"].map(c => against(light(colours[c]), page))};
+                    texts: ["ink", "soft", "mark", "bad"]
+                        .map(c => against(light(colours[c]), page))};
                 })()"""
             )
             # WCAG 2: 3 for graphics, 4.5 for texts
@@ -321,8 +323,8 @@ def looks(browser):
 def bare(browser):
     """A head with nothing but what it must have; a part without numbers; a model's axis."""
     head = {"kind": "model", "title": "m.fis", "version": "1", "from": 0, "to": 4, "cuts": []}
-    head |= {"axis": {"label": "depth", "unit": "mm"}, "panels": [{"label": "force", "tracks": [0]}]}
-    head |= {"tracks": [{"label": "force"}], "frames": None}
+    head |= {"axis": {"label": "depth", "unit": "mm"}, "tracks": [{"label": "force"}]}
+    head |= {"panels": [{"label": "force", "tracks": [0]}], "frames": None}
     part = {"from": 0, "to": 4, "tracks": [{"x": [], "y": []}]}
     page = shown(browser, {"head": head, "part": part})
     page.key("ArrowRight")
@@ -363,7 +365,7 @@ def start_live(page):
 
 
 def token(browser):
-    """The token goes from the address into the session, first over the wire, and is forgotten when refused."""
+    """The token goes from the address into the session, and out of it when it is refused."""
     page = opened(browser)
     page.wait_for("sockets.length")
     assert page.evaluate("location.href").endswith("page.html")
@@ -443,16 +445,19 @@ def stream(browser):
     )
     page.wait_for("!camera.hidden")
     seen = page.evaluate(
-        """[...document.querySelector("#camera canvas").getContext("2d").getImageData(0, 0, 2, 1).data]"""
+        """[...canvasIn("camera").getContext("2d").getImageData(0, 0, 2, 1).data]"""
     )
     assert seen == [255, 0, 0, 255, 0, 0, 255, 255], seen
     page.evaluate(
-        """sockets.at(-1).say({state: {word: "stopped", well: false, text: "a limit", tool: "handle",
-        warnings: ["<b>late</b>"], lost: 3, rate_hz: 1000, late: {edges_us: [1, 10, 100, 1000], counts:
-        [5, 4, 3, 1]}, pose: {position_mm: [1, 2, 3], quaternion: [1, 0, 0, 0]}, capture: "trial3"}})"""
+        """sockets.at(-1).say({state: {word: "stopped", well: false, text: "a limit",
+        tool: "handle", warnings: ["<b>late</b>"], lost: 3, rate_hz: 1000, capture: "trial3",
+        late: {edges_us: [1, 10, 100, 1000], counts: [5, 4, 3, 1]},
+        pose: {position_mm: [1, 2, 3], quaternion: [1, 0, 0, 0]}}})"""
     )
     assert page.evaluate("state.textContent + state.className") == "▲ stoppedill"
-    shown_facts = page.evaluate("facts.innerText + warnings.innerText + late.innerText + tool.value")
+    shown_facts = page.evaluate(
+        "facts.innerText + warnings.innerText + late.innerText + tool.value"
+    )
     for text in ("handle", "trial3", "1.00 2.00 3.00 mm", "<b>late</b>", "13 ticks, 1 over"):
         assert text in " ".join(shown_facts.split()), (text, shown_facts)
     page.evaluate(
@@ -462,13 +467,12 @@ def stream(browser):
         find("[data-do=stop]").click();
         tool.value = "blade"; tool.dispatchEvent(new Event("change")); })()"""
     )
-    sent = [{k: v for k, v in m.items() if k != "id"} for m in page.evaluate("sockets.at(-1).sent")[1:]]
-    assert sent == [
+    assert page.evaluate("sockets.at(-1).sent.slice(1).map(({id, ...order}) => order)") == [
         {"do": "mark", "text": "tap"},
         {"do": "capture", "name": "trial4"},
         {"do": "stop"},
         {"do": "tool", "tool": "blade"},
-    ], sent
+    ]
     page.evaluate("""sockets.at(-1).say({id: 9, error: "no such tool"})""")
     assert page.evaluate("said.textContent + said.className") == "no such toolill"
     says(page)
@@ -500,8 +504,8 @@ def requests(browser):
     page.evaluate("window.gets = () => sockets[0].sent.filter(m => m.get)")
     page.evaluate("window.frameAsks = () => sockets[0].sent.filter(m => m.frame !== undefined)")
     page.wait_for("gets().length == 1")
-    first = page.evaluate("gets()[0]")
-    assert (first["get"]["from"], first["get"]["to"]) == (0, 10) and 1 <= first["get"]["columns"] <= 4000
+    first = page.evaluate("gets()[0].get")
+    assert first["from"] == 0 and first["to"] == 10 and 1 <= first["columns"] <= 4000, first
     for view in ("4, 6", "5, 6", "5.2, 5.6"):
         page.evaluate(f"setView({view})")
     assert page.evaluate("gets().length") == 1
@@ -538,8 +542,9 @@ def memory(browser):
     for part in range(10):
         page.evaluate(f"pour(1000 + {part} * 100, 10000, 0.001)")
         page.evaluate(
-            """for (let i = 0; i < 200; i++) sockets.at(-1).say({event: [newest(), "marker", "m" + i],
-            state: {word: "running", lost: i, pose: {position_mm: [i, i, i], quaternion: [1, 0, 0, 0]}}})"""
+            """for (let i = 0; i < 200; i++) sockets.at(-1).say({
+            event: [newest(), "marker", "m" + i], state: {word: "running", lost: i,
+            pose: {position_mm: [i, i, i], quaternion: [1, 0, 0, 0]}}})"""
         )
         drawn(page)
         heaps.append(page.heap())
@@ -552,13 +557,14 @@ def memory(browser):
 
 
 class Server:
-    """incise serve with a page at a free port; the address with its tokens is in self.url."""
+    """incise serve with a page at a free port; the address with its tokens is in self.url. One in
+    the folder of one before has the same tokens and port."""
 
-    def __init__(self, *arguments, port=0):
-        folder = pathlib.Path(tempfile.mkdtemp(prefix="serve-", dir="."))
+    def __init__(self, *arguments, folder=None):
+        self.folder = folder = folder or pathlib.Path(tempfile.mkdtemp(prefix="serve-", dir="."))
         self.log = folder / "log"
         self.process = subprocess.Popen(
-            ["incise", "serve", *arguments, "--http", str(port), "--url", folder / "url"],
+            ["incise", "serve", *arguments, "--http", "0", "--url", folder / "url", "--overwrite"],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=self.log.open("w"),
@@ -596,7 +602,8 @@ def mailed(browser):
     drawn(page)
     page.evaluate(COLOURED)
     assert page.evaluate("document.body.dataset.mode") == "recording"
-    assert page.evaluate("[performance.getEntriesByType('resource').length, link.socket]") == [0, None]
+    assert page.evaluate("performance.getEntriesByType('resource').length") == 0
+    assert page.evaluate("link.socket") is None
     middle = "(view.from + view.to) / 2"
     assert page.evaluate(f"coloured(0, {middle}, 0).length")
     page.wait_for("frames.length > 1 && !camera.hidden")
@@ -606,7 +613,7 @@ def mailed(browser):
 
 
 def served(browser):
-    """A served recording: the whole, then a part of its own for a view, and frames at the cursor."""
+    """A served recording: the whole, a part of its own for a view, frames at the cursor."""
     with Server("c.rec") as server:
         page = visiting(browser, server.url)
         assert page.evaluate("location.href") == f"http://127.0.0.1:{server.port}/"
@@ -630,8 +637,12 @@ def served(browser):
 
 def tabs(browser):
     """Two tabs of a live rig, one with control, which marks an event; both outlive the server."""
-    with Server("--rig", "sim:", "--control") as server:
-        both = [visiting(browser, server.url), visiting(browser, re.sub(r"(#[0-9a-f]+).*", r"\1", server.url))]
+    # a force channel whose zero is known records from the first sample on, wherever the blade is
+    pathlib.Path("zero.conf").write_text("force_zero_mV = 180.0;\n")
+    rig = ("--rig", "sim:", "--calibration", "zero.conf", "--control")
+    with Server(*rig) as server:
+        seer = re.sub(r"(#[0-9a-f]+).*", r"\1", server.url)  # without the second token
+        both = [visiting(browser, server.url), visiting(browser, seer)]
         for page in both:
             page.call("Page.bringToFront")
             drawn(page)
@@ -640,8 +651,10 @@ def tabs(browser):
             page.wait_for(f"newest() > {seen} + 0.2")
         assert both[0].evaluate("control.hidden") is False
         assert both[1].evaluate("control.hidden") is True
-        order = """(does, name, value) => { const find = what => document.querySelector(`#control ${what}`);
-            if (name) find(`[name=${name}]`).value = value; find(`[data-do=${does}]`).click(); }"""
+        order = """(does, name, value) => {
+            const find = what => document.querySelector(`#control ${what}`);
+            if (name) find(`[name=${name}]`).value = value;
+            find(`[data-do=${does}]`).click(); }"""
         both[0].evaluate(f"({order})('mark', 'text', 'early')")
         both[0].wait_for("said.className == 'ill'")  # nothing is recorded yet
         both[0].evaluate(f"({order})('capture', 'name', 'trial')")
@@ -656,13 +669,15 @@ def tabs(browser):
         assert pathlib.Path("trial.rec").is_dir()
         for page in both:
             page.wait_for("!facts.innerText.includes('trial')")
+    last = [page.evaluate("newest()") for page in both]
     for page in both:
         page.wait_for("state.textContent.includes('no connection')")
-    with Server("--rig", "sim:", "--control", port=server.port):
-        for page in both:
+    with Server(*rig, folder=server.folder) as again:
+        assert again.url == server.url
+        for page, seen in zip(both, last):
             page.call("Page.bringToFront")
-            page.wait_for("state.textContent.includes('refused')")  # by new tokens
-            page.wait_for("text.textContent.includes('incise serve printed')")
+            page.wait_for("state.textContent.includes('running')")
+            page.wait_for(f"newest() > {seen} + 0.2")
     for page in both:
         says(page)
 
