@@ -50,8 +50,8 @@ struct http {
 	int64_t told_ns;
 };
 
-static void put_row(struct http *http, const struct serve_item *item, int track,
-		    const double *values, int n)
+static void put_http_row(struct http *http, const struct serve_item *item, int track,
+			 const double *values, int n)
 {
 	double *row;
 
@@ -165,7 +165,7 @@ static void http_send(struct serve_sink *sink, const struct serve_item *item)
 		return;
 	switch (item->kind) {
 	case SERVE_POSE:
-		put_row(http, item, X, item->pose.position_mm, 3);
+		put_http_row(http, item, X, item->pose.position_mm, 3);
 		memcpy(http->pose, item->pose.position_mm, 3 * sizeof(double));
 		memcpy(http->pose + 3, item->pose.quaternion, 4 * sizeof(double));
 		http->has_pose = true;
@@ -174,10 +174,10 @@ static void http_send(struct serve_sink *sink, const struct serve_item *item)
 		size_N = http->info->commanded
 				 ? sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2])
 				 : f[2];
-		put_row(http, item, FORCE, &size_N, 1);
+		put_http_row(http, item, FORCE, &size_N, 1);
 		break;
 	case SERVE_DEPTH:
-		put_row(http, item, DEPTH, &item->depth_mm, 1);
+		put_http_row(http, item, DEPTH, &item->depth_mm, 1);
 		break;
 	case SERVE_FRAME:
 		send_pixels(http, item);

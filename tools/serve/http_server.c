@@ -55,7 +55,7 @@ struct http_server {
 	size_t page_n;
 	volatile sig_atomic_t stop;
 
-	/* Of the thread. */
+	/* The thread alone uses these. */
 	struct visitor *visitor[HTTP_VISITORS];
 	uint64_t next;
 	double told; /* share that is read, as visitors know it */
@@ -653,12 +653,12 @@ static void tell_progress(struct http_server *server)
 	}
 }
 
-static void tick(lws_sorted_usec_list_t *list)
+static void tick_pages(lws_sorted_usec_list_t *list)
 {
 	struct http_server *server = (struct http_server *)list;
 
 	tell_progress(server);
-	lws_sul_schedule(server->context, 0, list, tick, LWS_US_PER_SEC / 4);
+	lws_sul_schedule(server->context, 0, list, tick_pages, LWS_US_PER_SEC / 4);
 }
 
 static void *serve_pages(void *of)
@@ -666,7 +666,7 @@ static void *serve_pages(void *of)
 	struct http_server *server = of;
 
 	if (server->setup.file)
-		lws_sul_schedule(server->context, 0, &server->tick, tick, 1);
+		lws_sul_schedule(server->context, 0, &server->tick, tick_pages, 1);
 	while (!server->stop && lws_service(server->context, 0) >= 0)
 		;
 	return NULL;

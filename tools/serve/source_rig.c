@@ -162,17 +162,21 @@ static void read_frames(struct rig *rig, struct serve_stream *stream)
 
 /* --- a capture --------------------------------------------------------------------------- */
 
-static void end_capture(struct rig *rig, const char *why)
+/* Returns whether it failed, and in @reply why, or what was written. @why: it ended by itself. */
+static bool end_capture(struct rig *rig, const char *why, char *reply, size_t size)
 {
 	struct incise_error err = {0};
+	bool failed = incise_recorder_close(rig->recorder, &err);
 
-	if (incise_recorder_close(rig->recorder, &err))
-		cli_warn("%s%s%s", why, *why ? "; " : "", err.text);
+	if (failed)
+		snprintf(reply, size, "%s%s%s", why, *why ? "; " : "", err.text);
 	else
-		cli_note("wrote %s.rec", rig->capture);
+		snprintf(reply, size, "wrote %s.rec", rig->capture);
+	cli_note("%s", reply);
 	rig->recorder = NULL;
 	*rig->capture = '\0';
 	snprintf(rig->ended, sizeof(rig->ended), "%s", why);
+	return failed;
 }
 
 /* The recorder reads all samples; the page gets the last of each. */
@@ -180,9 +184,10 @@ static void read_recorder(struct rig *rig, struct serve_stream *stream, int64_t 
 {
 	struct incise_recorder_stats stats;
 	struct incise_error err = {0};
+	char reply[400];
 
 	if (incise_recorder_poll(rig->recorder, &err)) {
-		end_capture(rig, err.text);
+		end_capture(rig, err.text, reply, sizeof(reply));
 		return;
 	}
 	incise_recorder_stats(rig->recorder, &stats);
@@ -251,13 +256,10 @@ static bool rig_order(struct serve_source *source, const char *what, const char 
 		snprintf(reply, size, "marked: %s", text);
 		if (!incise_recorder_mark(rig->recorder, "marker", text, &err))
 			return false;
-		snprintf(reply, size, "%s", err.text);
-		end_capture(rig, err.text);
+		end_capture(rig, err.text, reply, size);
 		return true;
 	}
-	snprintf(reply, size, "wrote %s.rec", rig->capture);
-	end_capture(rig, "");
-	return false;
+	return end_capture(rig, "", reply, size);
 }
 
 /* --- the source -------------------------------------------------------------------------- */
@@ -305,7 +307,7 @@ static void rig_free(struct serve_source *source)
 	struct rig *rig = (struct rig *)source;
 
 	if (rig->recorder)
-		end_capture(rig, "");
+		end_capture(rig, "", (char[400]){0}, 400);
 	incise_rig_close(rig->rig);
 	free(rig);
 }

@@ -178,7 +178,7 @@ static void put_frames(struct web_file *file, double from, double to, FILE *out)
 	free(pixels.bytes);
 }
 
-/* What the page holds in place of a server. */
+/* The document: all that the page holds in place of a server. */
 static int put_document(struct web_file *file, FILE *out, struct incise_error *err)
 {
 	json_t *head;

@@ -85,8 +85,8 @@ static void put_list(FILE *out, const char *name, const double *values, int n)
 	fputc(']', out);
 }
 
-static void put_line(const struct web_model *w, int line, double from, double to, int n,
-		     FILE *out)
+static void put_model_line(const struct web_model *w, int line, double from, double to,
+			   int n, FILE *out)
 {
 	double at[POINTS], y[POINTS], u[POINTS], x[INCISE_MODEL_INPUTS_MAX];
 	struct incise_uncertainty_parts parts;
@@ -122,11 +122,11 @@ static int web_model_part(struct web_file *file, double from, double to, int col
 	to = fmin(fmax(to, from), input->max);
 	fprintf(out, "{\"from\":%.10g,\"to\":%.10g,\"done\":1,\"tracks\":[", from, to);
 	for (int k = 0; k < w->lines; k++)
-		put_line(w, k, from, to,
-			 columns < 2	    ? 2
-			 : columns > POINTS ? POINTS
-					    : columns,
-			 out);
+		put_model_line(w, k, from, to,
+			       columns < 2	  ? 2
+			       : columns > POINTS ? POINTS
+						  : columns,
+			       out);
 	fputs("]}", out);
 	return 0;
 }

@@ -35,7 +35,7 @@ int web_read(struct web_file *file, int spans, const volatile sig_atomic_t *stop
 /* Share that is read, 0 to 1. */
 double web_done(struct web_file *file);
 
-/* What the page has to know once; again when it is read. */
+/* The head: all that the page has to know once, and again when the file is read. */
 json_t *web_head(struct web_file *file);
 
 /* An object of JSON: each track in columns, or in samples where they are fewer. 0 or -errno. */
