@@ -15,7 +15,7 @@ import subprocess
 import tempfile
 import time
 
-LIMIT_S = 20
+LIMIT_S = 120
 
 
 class Page:
@@ -51,11 +51,12 @@ class Page:
         while time.monotonic() < end:
             value = self.evaluate(
                 "new Promise(done => { const look = n => { let v; try { v = (%s); } catch { } "
-                "v || !n ? done(v) : setTimeout(look, 15, n - 1); }; look(60); })" % expression
+                "v || !n ? done(v) : setTimeout(look, 15, n - 1); }; look(20); })" % expression
             )
             if value:
                 return value
-        raise AssertionError(f"not within {LIMIT_S} s: {expression}; the page said: {self.says}")
+        shown = self.evaluate("document.body.innerText.slice(0, 300)")
+        raise AssertionError(f"not within {LIMIT_S} s: {expression}; {self.says}; shown: {shown}")
 
     def resize(self, width, height=900, ratio=1):
         self.call(
@@ -90,8 +91,8 @@ class Page:
             self.mouse("mouseMoved", x0 + (x1 - x0) * i / 5, y0 + (y1 - y0) * i / 5, **more)
         self.mouse("mouseReleased", x1, y1, **more)
 
-    def screenshot(self, path, whole=True):
-        answer = self.call("Page.captureScreenshot", format="png", captureBeyondViewport=whole)
+    def screenshot(self, path):
+        answer = self.call("Page.captureScreenshot", format="png")
         with open(path, "wb") as file:
             file.write(base64.b64decode(answer["data"]))
 
@@ -111,7 +112,9 @@ class Chromium:
         path = shutil.which("chromium")
         if not path:
             raise FileNotFoundError("chromium is not installed")
-        self.profile = tempfile.TemporaryDirectory(prefix="incise-chromium-", ignore_cleanup_errors=True)
+        self.profile = tempfile.TemporaryDirectory(
+            prefix="incise-chromium-", ignore_cleanup_errors=True
+        )
         there, self.write = os.pipe()
         self.read, back = os.pipe()
         high = [fcntl.fcntl(fd, fcntl.F_DUPFD, 10) for fd in (there, back)]
@@ -121,8 +124,10 @@ class Chromium:
             os.dup2(high[1], 4)
 
         self.process = subprocess.Popen(
-            [path, "--headless=new", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--no-first-run",
-             "--disable-dev-shm-usage", f"--user-data-dir={self.profile.name}",
+            [path, "--headless=new", "--no-sandbox", "--disable-gpu", "--hide-scrollbars",
+             "--no-first-run", "--disable-dev-shm-usage", "--disable-background-timer-throttling",
+             "--disable-renderer-backgrounding", "--disable-backgrounding-occluded-windows",
+             f"--user-data-dir={self.profile.name}",
              "--remote-debugging-pipe", "about:blank"],
             preexec_fn=place, pass_fds=(3, 4), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
             stderr=open(os.path.join(self.profile.name, "stderr"), "wb"), start_new_session=True,

@@ -47,8 +47,8 @@ function readPart({from, to, tracks}) {
 }
 
 function newRing(slots) {
-	const values = new Float32Array(slots);
-	return {x: new Float64Array(slots), low: values, high: values, start: 0, count: 0, mask: slots - 1};
+	const v = new Float32Array(slots);
+	return {x: new Float64Array(slots), low: v, high: v, start: 0, count: 0, mask: slots - 1};
 }
 
 function push(ring, x, v) {
@@ -71,21 +71,21 @@ function countBefore(s, x) {
 	return a;
 }
 
-// The place of the sample nearest to x, or -1 outside the series.
+// The place of the sample nearest to x, or -1 five samples beyond an end: live, some tracks lag.
 function nearest(s, x) {
-	const first = s.x[slot(s, 0)], last = newestX(s), spacing = (last - first) / (s.count - 1) || 0;
-	if (!s.count || !(x >= first - spacing && x <= last + spacing)) return -1;
-	const i = countBefore(s, x), a = slot(s, Math.max(0, i - 1)), b = slot(s, Math.min(i, s.count - 1));
+	const first = s.x[slot(s, 0)], last = newestX(s), reach = 5 * (last - first) / (s.count - 1) || 0;
+	if (!s.count || !(x >= first - reach && x <= last + reach)) return -1;
+	const i = countBefore(s, x), [a, b] = [i - 1, i].map(n => slot(s, clamp(n, 0, s.count - 1)));
 	return x - s.x[a] <= s.x[b] - x ? a : b;
 }
 
 // The visible samples as at most one entry a device pixel, in s.seen; one more on either side
 // leads the line out of the picture. `least` and `most` are the range with the band.
 function reduce(s) {
-	if (!s.seen || s.seen.px.length < pixels + 4)
-		s.seen = Object.fromEntries(["px", "low", "high", "u"].map(k => [k, new Float64Array(pixels + 4)]));
+	const room = pixels + 4, first = Math.max(0, countBefore(s, view.from) - 1);
+	if (!(s.seen?.px.length >= room))
+		s.seen = Object.fromEntries(["px", "low", "high", "u"].map(k => [k, new Float64Array(room)]));
 	const {px, low, high, u} = s.seen, scale = pixels / (view.to - view.from);
-	const first = Math.max(0, countBefore(s, view.from) - 1);
 	let e = -1, column = -2, i = first, least = Infinity, most = -Infinity;
 	for (; i < s.count && column < pixels; i++) {
 		const k = slot(s, i), at = (s.x[k] - view.from) * scale, band = s.u ? 2 * s.u[k] || 0 : 0;
@@ -162,7 +162,7 @@ const write = (g, colour, text, x, y, align = "left", widest = 9999) =>
 	Object.assign(g, {fillStyle: colour, textAlign: align}).fillText(text, x, y, widest);
 
 function stroke(g, colour, width, trace) {
-	Object.assign(g, {strokeStyle: colour, lineWidth: width});
+	Object.assign(g, {strokeStyle: colour, lineWidth: width, lineJoin: "round", lineCap: "round"});
 	g.beginPath();
 	trace();
 	g.stroke();
@@ -177,18 +177,17 @@ function within(g, x, y, w, h, draws) {
 	g.restore();
 }
 
-function cleared(canvas, w, h) {
-	const scale = Math.min(devicePixelRatio || 1, 16000 / Math.max(w, h, 1)), g = canvas.getContext("2d");
-	const size = {width: Math.round(w * scale), height: Math.round(h * scale)};
-	if (canvas.width !== size.width || canvas.height !== size.height) Object.assign(canvas, size);
+function cleared(canvas, h) {
+	const w = canvas.clientWidth, scale = Math.min(devicePixelRatio, 16000 / Math.max(w, h, 1));
+	const g = canvas.getContext("2d"), [width, height] = [w, h].map(v => Math.round(v * scale));
+	if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, {width, height});
 	canvas.style.height = h + "px";
 	g.setTransform(scale, 0, 0, scale, 0, 0);
 	g.clearRect(0, 0, w, h);
-	return Object.assign(g, {font: colours.font, textBaseline: "middle", lineJoin: "round", lineCap: "round"});
+	return Object.assign(g, {font: colours.font, textBaseline: "middle"});
 }
 
-// A panel's legend has a cell a track, as wide as its longest value, so that nothing moves while
-// values change.
+// A legend's cell is as wide as its longest value, so that nothing moves while values change.
 function arrangeLegend(g, width, panel) {
 	const own = panel.tracks.length === 1 && panel.label, unit = panel.unit ? ` (${panel.unit})` : "";
 	const name = own ? "" : (panel.label ?? "") + unit;
@@ -220,7 +219,7 @@ function arrange() {
 	rows.push(...panels.map(row => ({...row, plot, height: row.legend + plot + 16})));
 	rows.height = rows.reduce((top, row) => (row.top = top) + row.height, 0);
 	plotWidth = Math.max(50, width - LEFT - RIGHT);
-	pixels = Math.round(plotWidth * Math.min(devicePixelRatio || 1, 16000 / rows.height));
+	pixels = Math.round(plotWidth * Math.min(devicePixelRatio, 16000 / rows.height));
 	document.body.dataset.columns = pixels;
 	wake();
 }
@@ -328,14 +327,14 @@ function drawPanel(g, row) {
 	}
 	within(g, LEFT, base - 3, plotWidth, plot + 6, () => cells.forEach(({track, colour}) => {
 		const {seen, u} = series[track];
-		Object.assign(g, {fillStyle: trackColour(colour), globalAlpha: 0.22});
+		Object.assign(g, {fillStyle: trackColour(colour), globalAlpha: 0.22 / Math.sqrt(cells.length)});
 		if (u) drawBand(g, seen, toY);
 		g.globalAlpha = 1;
 		stroke(g, trackColour(colour), 1.6, () => drawTrace(g, seen, toY, true));
 		if (seen.samples < plotWidth / 12) // few: each is a dot
 			stroke(g, trackColour(colour), 5, () => drawTrace(g, seen, toY, false));
 	}));
-	if (row.empty) write(g, colours.soft, "no data here", LEFT + plotWidth / 2, base + plot / 2, "center");
+	if (row.empty) write(g, colours.soft, "no data", LEFT + plotWidth / 2, base + plot / 2, "center");
 	g.font = "600 " + colours.font;
 	write(g, colours.ink, row.name, LEFT, top + 12);
 	g.font = colours.font;
@@ -361,7 +360,7 @@ function drawLabel(g, text, middle, y) {
 function drawCursor(g) {
 	const [a, b] = span ? span.map(toPx) : [0, 0], x = shownX(), event = x !== null && eventNear(x);
 	within(g, LEFT, 0, plotWidth, rows.height, () => {
-		g.globalAlpha = 0.16;
+		g.globalAlpha = 0.1;
 		box(g, colours.mark, a, 0, b - a, rows.height);
 		g.globalAlpha = 1;
 		for (const px of span ? [a, b] : []) box(g, colours.mark, px - 1, 0, 2, rows.height);
@@ -375,10 +374,10 @@ function drawCursor(g) {
 }
 
 function drawPlots() {
-	const g = cleared(canvasIn("stage"), LEFT + plotWidth + RIGHT, rows.height);
-	const ticks = drawAxis(g, rows[0]), top = rows.find(row => row.kind === "panel")?.top ?? rows.height;
+	const g = cleared(canvasIn("stage"), rows.height), ticks = drawAxis(g, rows[0]);
+	const {top, legend} = rows.find(row => row.kind === "panel") ?? rows[0];
 	within(g, LEFT, top, plotWidth, rows.height - top - 4, () => {
-		for (const px of ticks) box(g, colours.line, Math.round(px), top + 26, 1, rows.height);
+		for (const px of ticks) box(g, colours.line, Math.round(px), top + legend, 1, rows.height);
 		for (const [from, to] of seenCuts())
 			box(g, colours.cut, toPx(from), top, Math.max(1, toPx(to) - toPx(from)), rows.height);
 	});
@@ -392,7 +391,7 @@ function drawAbove() {
 	const p = trail ?? head.path, canvas = canvasIn("above");
 	$("above").hidden = !p?.count;
 	if (!p?.count) return;
-	const size = canvas.clientWidth, tall = Math.round(size * 0.7), g = cleared(canvas, size, tall);
+	const size = canvas.clientWidth, tall = Math.round(size * 0.7), g = cleared(canvas, tall);
 	const range = list => list.subarray(0, p.count).reduce(([a, b], v) =>
 		[v < a ? v : a, v > b ? v : b], [Infinity, -Infinity]);
 	const [x0, x1] = range(p.low), [y0, y1] = range(p.high), middle = (tall - 24) / 2;
@@ -405,8 +404,8 @@ function drawAbove() {
 	line(colours.soft, 1.2, 0, p.count);
 	if (!trail) line(trackColour(0), 2, countBefore(p, view.from), countBefore(p, view.to));
 	const k = nearest(p, trail ? newestX(p) : shownX() ?? NaN);
-	if (k >= 0) stroke(g, trackColour(1), 12, () => [0, 0.01].forEach(d => g.lineTo(at(k)[0] + d, at(k)[1])));
-	const bar = niceStep(60 / scale), text = `${fixed(bar, decimalsOf(bar))} ${head.path?.unit ?? "mm"}`;
+	if (k >= 0) stroke(g, trackColour(1), 12, () => g.arc(...at(k), 0.01, 0, 7));
+	const bar = niceStep(60 / scale), text = `${bar} ${head.path?.unit ?? "mm"}`;
 	box(g, colours.ink, 12, tall - 12, bar * scale, 2);
 	write(g, colours.ink, text, 18 + bar * scale, tall - 12);
 }
@@ -414,7 +413,7 @@ function drawAbove() {
 // Lateness on a logarithmic axis from 1 µs on, counts logarithmic; the line is the period.
 function drawLate({edges_us: edges, counts}) {
 	$("late").hidden = false;
-	const canvas = canvasIn("late"), w = canvas.clientWidth, h = 130, g = cleared(canvas, w, h);
+	const canvas = canvasIn("late"), w = canvas.clientWidth, h = 130, g = cleared(canvas, h);
 	const deadline = 1e6 / (status.rate_hz || 1000), last = Math.max(deadline * 2, edges.at(-1) || 1);
 	const px = us => 8 + (w - 16) * Math.log(Math.max(1, us)) / Math.log(last);
 	const most = Math.log(1 + Math.max(1, ...counts)), colour = trackColour(0);
@@ -434,8 +433,8 @@ function drawLate({edges_us: edges, counts}) {
 }
 
 const make = (tag, text = "") => Object.assign(document.createElement(tag), {textContent: text});
-const setText = (element, text) => element.textContent !== String(text) && (element.textContent = text);
-const say = (text, ill) => Object.assign($("said"), {className: ill ? "ill" : "", textContent: text});
+const setText = (e, text) => e.textContent !== String(text) && (e.textContent = text);
+const say = (text, className = "") => Object.assign($("said"), {className, textContent: text});
 const showProgress = done => Object.assign($("progress"), {hidden: done >= 1, value: done});
 
 // Cells that are there get their new texts in place, so that a selection of them stays.
@@ -488,7 +487,7 @@ function drawFrame(t, width, height, draws) {
 }
 
 function drawNearest() {
-	const far = ([t]) => Math.abs(t - cursor), loaded = frames.filter(([, image]) => image.naturalWidth);
+	const far = ([t]) => Math.abs(t - cursor), loaded = frames.filter(([, i]) => i.naturalWidth);
 	if (!loaded.length) return;
 	const [t, image] = loaded.reduce((a, b) => far(b) < far(a) ? b : a);
 	drawFrame(t, image.naturalWidth, image.naturalHeight, g => g.drawImage(image, 0, 0));
@@ -527,7 +526,7 @@ function setView(from, to) {
 	wake();
 }
 
-const zoom = (factor, at = cursor !== null && isSeen(cursor) ? cursor : (view.from + view.to) / 2) =>
+const zoom = (factor, at = isSeen(cursor ?? NaN) ? cursor : (view.from + view.to) / 2) =>
 	setView(at - (at - view.from) * factor, at + (view.to - at) * factor);
 
 function moveCursor(x) {
@@ -631,7 +630,7 @@ function ask(kind, wish) {
 }
 
 function answered(id) {
-	for (const kind in asks) if (id && asks[kind].id === id) ask(kind, asks[kind].id = 0);
+	for (const kind in asks) if (id && asks[kind].id === id) ask(kind, asks[kind].id = null);
 }
 
 function pickPart() {
@@ -662,7 +661,7 @@ const takers = {head: takeHead, part: takePart, state: takeStatus,
 		values?.forEach((v, k) => push(series[i], t[k], v ?? NaN)))),
 	event: event => wake(head.events = [...head.events, event].slice(-EVENTS_KEPT)),
 	progress: done => [showProgress(done), setView(view.from, view.to)],
-	ok: text => say(text), error: text => say(text, true)};
+	ok: text => say(text), error: text => say(text, "ill")};
 
 function receive({data}) {
 	if (typeof data !== "string") return takePicture(data);
@@ -679,12 +678,12 @@ function connect() {
 	const socket = link.socket = new WebSocket(`${scheme}://${location.host}/ws`);
 	Object.assign(socket, {binaryType: "arraybuffer", onmessage: receive});
 	socket.onopen = () => socket.send(JSON.stringify({token, control}));
-	socket.onclose = ({code}) => {
+	socket.onclose = ({code, reason}) => {
 		link.socket = null;
 		asks.get.id = asks.frame.id = 0;
 		if (code === 1008) {
 			sessionStorage.removeItem("incise");
-			return showState("refused", false, hint);
+			return showState("refused", false, `${reason || "not this token"}: ${hint}`);
 		}
 		showState("no connection", false, "trying again");
 		for (const ring of live ? series : []) // a line across the outage would be a lie
@@ -695,7 +694,7 @@ function connect() {
 
 // A head that comes again, after a change or a new connection, keeps view, cursor and rings.
 function takeHead(h) {
-	const names = one => one?.kind + one?.tracks.map(track => track.label), same = names(head) === names(h);
+	const names = one => one?.kind + one?.tracks.map(t => t.label), same = names(head) === names(h);
 	const wasWhole = !same || view.from <= head.from && view.to >= head.to;
 	const events = same && live && !h.events?.length ? head.events : h.events ?? [];
 	head = {cuts: [], panels: [], axis: {label: "time", unit: "s"}, ...h, events};
@@ -769,11 +768,11 @@ function pointerPlace({clientX, clientY}) {
 
 function startDrag(event) {
 	if (!head || event.button) return;
-	const [px, kind] = pointerPlace(event);
+	const [px, kind] = pointerPlace(event), selects = event.shiftKey || selecting;
 	event.target.setPointerCapture(event.pointerId);
 	pointers.set(event.pointerId, px);
 	hoverPx = null;
-	drag = {does: event.shiftKey || selecting ? "select" : kind === "axis" ? "scrub" : "pan", px, x: toX(px),
+	drag = {does: selects ? "select" : kind === "axis" ? "scrub" : "pan", px, x: toX(px),
 		...view, moved: false, pinch: pointers.size === 2 && [...pointers.values()].map(toX)};
 	if (drag.does === "scrub") moveCursor(toX(px));
 }
@@ -865,8 +864,9 @@ function redraw() {
 }
 
 function listen() {
-	Object.assign(canvasIn("stage"), {onpointerdown: startDrag, onpointermove: moveDrag, onpointerup: endDrag,
-		onpointercancel: endDrag, onwheel: turnWheel, onpointerleave: () => wake(hoverPx = null)});
+	Object.assign(canvasIn("stage"), {onpointerdown: startDrag, onpointermove: moveDrag,
+		onpointerup: endDrag, onpointercancel: endDrag, onwheel: turnWheel,
+		onpointerleave: () => wake(hoverPx = null)});
 	document.onkeydown = pressKey;
 	for (const button of document.querySelectorAll("[data-key]"))
 		button.onclick = event => head && actions[button.dataset.key](event);
