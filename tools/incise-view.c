@@ -106,6 +106,7 @@ static const struct cli_command command = {
 	.notes = "Keys: h lists all; left button presses, right button turns the camera, "
 		 "the wheel zooms; b blade, n handle, t tube, + and - the depth of a "
 		 "press, s saves the image, q ends.",
+	.more = scene_argument_installed,
 	.examples = "incise view neck --rig sim:mouse\n"
 		    "incise view neck --procedure -o neck.mp4",
 };

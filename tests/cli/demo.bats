@@ -96,6 +96,19 @@ pictures="fig2-force fig3a-membership fig3b-surface fig5-prediction tick-latenes
 	cmp m.fis "$demo/liver.fis"
 }
 
+@test "demo ends with a page of its figures and results, and without warnings of halves that are small" {
+	need_demo
+	[ "$(tail -n 1 "$BATS_FILE_TMPDIR/printed")" = "open my demo's/index.html" ] ||
+		{ grep -q "python3-jinja2 is not installed" "$BATS_FILE_TMPDIR/warned" && skip "no jinja2"; }
+	[ "$(grep -o 'src="data:image/svg+xml;base64,' "$demo/index.html" | wc -l)" = "$(wc -w <<<"$pictures")" ]
+	run ! grep -qE '(src|href)="(https?:|//|/)' "$demo/index.html"
+	cp "$demo/summary.json" .
+	error=$(printf %.3g "$(key summary.json train_unseen_cuts.check.rmse_N)")
+	grep -qE ">$error(0*) N rms<" "$demo/index.html" || complain "no $error N"
+	[ "$(key summary.json warnings_of_splits)" -ge 12 ]
+	run ! grep "incise train: warning" "$BATS_FILE_TMPDIR/warned"
+}
+
 @test "the commands that demo prints are those that it ran" {
 	need_demo
 	for verb in capture export train replay haptic; do

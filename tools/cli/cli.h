@@ -119,6 +119,7 @@ struct cli_command {
 	const char *summary;  /* for --help, as of help_print_text() */
 	const struct cli_option *options;
 	const char *notes;    /* the same, below the options; or NULL */
+	char *(*more)(void);  /* one more line below them, free(3); or NULL */
 	const char *examples; /* a command a line; or NULL */
 	/* Meaning of exit status 0 and 1; NULL: "success" and "failure". */
 	const char *success, *failure;

@@ -439,12 +439,7 @@ static const char *const keys[] = {
 	"left button\tpress the tool in",
 	"b  n  t\tblade, handle, tube",
 	"+  -\tdepth of a press",
-	"right button\tturn the camera",
-	"wheel\tnear, far",
-	"Home\tcamera as it was",
-	"g\tgraphs",
 	"s\tsave the image",
-	"h  F1\tthis",
 	"q\tend",
 };
 
@@ -460,6 +455,11 @@ void view_job_view(struct view_job *job)
 	struct incise_error err = {0};
 
 	job->view = incise_view_new(job->scene, job->plan, &setup, &err);
+	if (!job->view && window && job->rig)
+		cli_fail(
+			"%s; without a display a hand has nothing to see, but 'incise view "
+			"%s --procedure -o FILE.mp4' writes a film",
+			err.text, scene_argument_name(job->argument.path));
 	if (!job->view)
 		cli_fail("%s%s", err.text,
 			 window ? "; without a display give -o FILE.mp4, FILE.png "
