@@ -168,7 +168,7 @@ deps: ## install the packages that building, testing and the demo need
 	@mk/deps build check demo
 
 # The second make sees the packages that the first step brought.
-demo: ## walk paper 1 on the virtual rig; pictures and summary in demo.out/
+demo: ## walk paper 1 on the virtual rig; results in demo.out/index.html
 	@mk/deps demo
 	+@$(MAKE) --no-print-directory all
 	$(O)/bin/incise demo -o $(DEMO) --overwrite

@@ -292,10 +292,16 @@ _Noreturn static void fail_without(const char *path)
 		cli_fail("%s: says nothing of its origin; 'incise export' without "
 			 "--no-lineage writes it into a CSV",
 			 path);
+	case FILE_SESSION:
+		cli_fail(
+			"%s: a session has its origin in keys source and scene; 'incise assess "
+			"%s' reports on it",
+			path, path);
 	default:
-		cli_fail("%s: says nothing of its origin: another program or an older "
-			 "incise made it",
-			 path);
+		cli_fail(
+			"%s: says nothing of its origin: it is a page of sessions, or another "
+			"program or an older incise made it",
+			path);
 	}
 }
 
