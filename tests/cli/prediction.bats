@@ -38,7 +38,7 @@ train() {
 	train a.csv b.csv c.csv -o m.fis
 	grep -q "uncertainties: own parts .* N; calibrations .* N on the model, .* N of another rig" out
 	grep -qx "common [1-9].*" m.fis.sd
-	grep -q "^% incise: options: .*, weighted by uncertainties" m.fis
+	grep -q "^% incise: options: .* --uncertainty parts" m.fis
 	printf '3 20\n8 30\n12 40\n' >points
 	incise eval m.fis points --uncertainty parts >got
 	awk 'NF != 6 || $6 < $5 * 0.1 || $6 > $2 { bad = 1 } { d = $2 ^ 2 - $3 ^ 2 - $4 ^ 2 - $5 ^ 2

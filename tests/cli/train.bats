@@ -201,7 +201,7 @@ parameters() {
 		[ "$(key r.json pairs_tuned)" = "${sample#*:}" ] || complain "$sample: $(key r.json pairs_tuned)" || return
 		[ "$(key r.json pairs)" = 5000 ]
 	done
-	grep -q '^% incise: options: .*search on all pairs' m.fis
+	grep -q '^% incise: options: .* --search sample=0' m.fis
 }
 
 # The largest resident memory of a command, in kB. Address space is no measure of it: a library
