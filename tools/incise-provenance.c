@@ -314,6 +314,11 @@ _Noreturn static void fail_without(const char *path)
 		cli_fail("%s: says nothing of its origin; 'incise export' without "
 			 "--no-lineage writes it into a CSV",
 			 path);
+	case FILE_MODEL:
+		cli_fail(
+			"%s: says nothing of its origin: Python's incise.train() of a table, "
+			"another program or an older incise made it; train it from files",
+			path);
 	default:
 		cli_fail("%s: says nothing of its origin: another program or an older "
 			 "incise made it",

@@ -112,6 +112,8 @@ setup() {
 	fails incise provenance away -- "away:"
 	incise export "$made/a b;.rec" --average 6x6,count=5 --no-lineage -o plain.csv >/dev/null
 	fails incise provenance plain.csv -- "plain.csv:"
+	sed '/^% incise/d' "$made/m.fis" >table.fis
+	fails incise provenance table.fis -- "table.fis:" "incise.train() of a table"
 	fails incise provenance m.fis.sd -- "m.fis.sd:"
 	fails incise provenance none -- "none:"
 	a=$(printf 'a%.0s' {1..64})
