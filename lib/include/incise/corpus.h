@@ -234,6 +234,7 @@ struct incise_corpus_group {
 	double sum[INCISE_MODEL_INPUTS_MAX + 1], min[INCISE_MODEL_INPUTS_MAX + 1],
 		max[INCISE_MODEL_INPUTS_MAX + 1];
 	bool check; /**< held out */
+	int number; /**< that of its pairs in a sample (incise_train_side), and of its namesakes elsewhere */
 };
 
 /** The survey of a source. */
