@@ -489,6 +489,7 @@ static void report_plan_text(const struct plan_job *job, const struct incise_pla
 	print_stability(job, plan);
 	if (rig)
 		print_axes(rig, &stability);
+	printf("accepted    %s\n", job->scene.path);
 }
 
 /* Only watch the actuator if it can be watched: a loop may run on it. */

@@ -319,10 +319,16 @@ _Noreturn static void fail_without(const char *path)
 			"%s: says nothing of its origin: Python's incise.train() of a table, "
 			"another program or an older incise made it; train it from files",
 			path);
+	case FILE_SESSION:
+		cli_fail(
+			"%s: a session has its origin in keys source and scene; 'incise assess "
+			"%s' reports on it",
+			path, path);
 	default:
-		cli_fail("%s: says nothing of its origin: another program or an older "
-			 "incise made it",
-			 path);
+		cli_fail(
+			"%s: says nothing of its origin: it is a page of sessions, or another "
+			"program or an older incise made it",
+			path);
 	}
 }
 

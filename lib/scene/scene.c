@@ -517,8 +517,12 @@ static int load_model(const struct incise_scene *scene, struct incise_scene_mode
 	else
 		cut->model = incise_model_load(path, &why);
 	if (!cut->model && !cut->compiled)
-		return incise_error_set(err, why.code, "%s: its model %s", scene->path,
-					why.text);
+		return incise_error_set(
+			err, why.code, "%s: its model %s%s", scene->path, why.text,
+			why.code == ENOENT
+				? "; a scene's files are looked for in the folder "
+				  "of the scene"
+				: "");
 	return find_inputs(scene, cut, err);
 }
 

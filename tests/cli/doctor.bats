@@ -101,7 +101,7 @@ group() {
 	mkdir python
 	echo 'raise ImportError' >python/jinja2.py
 	run --separate-stderr env PYTHONPATH="$PWD/python" incise doctor --rig sim:
-	[[ "$(finding programs jinja2)" == "  warning "*"no HTML reports"*"→ sudo apt-get install python3-jinja2, or pip install jinja2" ]]
+	[[ "$(finding programs jinja2)" == "  warning "*"no HTML reports"*"→ sudo apt-get install python3-jinja2    # or: pip install jinja2" ]]
 }
 
 @test "doctor lists CAN interfaces and USB devices by name" {

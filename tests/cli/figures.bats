@@ -37,6 +37,7 @@ finds() {
 	[[ "$output" == "made.svg: "$1 ]] || complain "$output"
 }
 
+# bats test_tags=check
 @test "the check accepts a sound figure, and finds each fault of another" {
 	figure 'plot x title "line"'
 	measured made.svg

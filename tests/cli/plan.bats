@@ -16,6 +16,7 @@ setup() {
 		for word in kept "left out" devices libraries arithmetic stability; do
 			[[ "$output" == *$'\n'"$word"* ]]
 		done
+		[ "${lines[-1]}" = "accepted    $scene.scene" ]
 	done
 }
 

@@ -116,6 +116,8 @@ setup() {
 	fails incise provenance table.fis -- "table.fis:" "incise.train() of a table"
 	fails incise provenance m.fis.sd -- "m.fis.sd:"
 	fails incise provenance none -- "none:"
+	incise haptic neck --procedure --duration 1s -o s.session >/dev/null
+	fails incise provenance s.session -- s.session "keys source and scene"
 	a=$(printf 'a%.0s' {1..64})
 	printf 'x\0incise:1:model:%s:0:-:%%1B%%5B31m%%2E.fis;incise:1:model:%s:0:-:%%1B%%5B31m.fis;' "$a" "$a" >odd
 	run -1 --separate-stderr incise provenance odd
