@@ -469,7 +469,7 @@ static void report_plan_text(const struct plan_job *job, const struct incise_pla
 	printf("devices     %s; not touched: %s\n",
 	       !job->rig && !access("rig.conf", F_OK)
 		       ? "none: --rig rig.conf takes the rig of this folder"
-	       : !job->rig ? "none without --rig"
+	       : !job->rig		? "none without --rig"
 	       : incise_rig_haptic(rig) ? "haptic"
 					: "tracker, stepper",
 	       job->rig ? "force, camera" : "tracker, stepper, force, camera");
