@@ -121,7 +121,8 @@ static void send_loop(struct http *http, const struct incise_state_now *now)
 	json_t *warnings = json_array(), *more;
 
 	for (int i = 0; i < INCISE_TICK_FLAGS; i++)
-		if (now->tick.flags >> i & 1 && loop_flag_names[i])
+		if ((now->tick.flags & ~INCISE_TICK_CONTACT) >> i & 1 &&
+		    loop_flag_names[i])
 			json_array_append_new(warnings, json_text(loop_flag_names[i]));
 	if (now->skipped)
 		json_array_append_new(
