@@ -224,6 +224,10 @@ group() {
 		assert [s["pass"] for s in steps if s["step"] == "weight"] == [True]
 	END
 	[[ "$(finding devices walls)" == "  ok "*"0, 0, 0, 0 swings a second at 25, 50, 75, 90 % of 1."* ]]
+}
+
+@test "doctor warns of a device that swings, sticks or stops" {
+	rig=sim:haptic,clock=simulated,motion=still,noise_mm=0.03
 	# a device with less damping than it states swings, and friction holds a weight
 	cat >rig.conf <<-'END'
 		clock = "simulated";
@@ -247,7 +251,6 @@ group() {
 	[[ "$(finding devices rate)" == "  warning "*"1000 Hz, but it declares 400 Hz"* ]]
 }
 
-# bats test_tags=check
 @test "doctor gives a force after an Enter behind its request only" {
 	export INCISE_MODULE_PATH=$INCISE_BUILD/tests/haptic
 	python3 - "spring:doctor-$$" >out <<-'END'

@@ -423,10 +423,6 @@ struct serve_sink *serve_http_new(const struct serve_http_options *options,
 								: NULL};
 	char *before;
 
-	if (!options->url && !isatty(STDERR_FILENO))
-		cli_fail(
-			"--http: the page's address holds a secret, and standard error is no "
-			"terminal; give --url FILE");
 	http->base.ops = &http_ops;
 	http->info = info;
 	http->options = options;
@@ -438,6 +434,10 @@ struct serve_sink *serve_http_new(const struct serve_http_options *options,
 	setup.before = before = address_before(options->url);
 	http->server = http_server_new(&setup);
 	free(before);
+	if (!options->url && !isatty(STDERR_FILENO))
+		cli_fail(
+			"the address of the page holds a secret, and standard error is no "
+			"terminal; give --url FILE");
 	tell_url(http);
 	return &http->base;
 }
