@@ -579,6 +579,12 @@ static void choose_further(struct train_options *options)
 /* Pairs per parameter below which a model follows noise rather than tissue. */
 #define PAIRS_PER_PARAMETER 3
 
+/* Groups up to which Student's t makes an interval more than half as wide again. */
+#define WIDE 4
+
+/* Groups held out up to which the text has the error of each. */
+#define NAMED 12
+
 /* The unit of a column, from its name: force_N is in N. */
 static const char *unit_of_train(const char *column)
 {
@@ -587,15 +593,92 @@ static const char *unit_of_train(const char *column)
 	return score ? score + 1 : "";
 }
 
-/* A number in the unit of the target, which ends its key. */
-static void set_in_unit(json_t *object, const char *name,
-			const struct train_options *options, double value)
+/* A group that is held out, and the error of the model on its pairs in the sample. */
+struct held_group {
+	char *name;
+	double rmse;
+};
+
+/* Name a group of a source for people: a recording by its name, a cut of several sources with its source. */
+static char *name_group(const struct incise_trained *trained, int source, int g)
+{
+	const struct incise_corpus_survey *survey =
+		incise_corpus_source(trained->corpus, source);
+	bool recording = !strcmp(trained->group, "recording");
+	bool one = incise_corpus_sources(trained->corpus) == 1 ||
+		   strcmp(trained->group, "cut") != 0;
+
+	return cli_text("%s %s%s%s", trained->group,
+			recording ? survey->name : survey->groups[g].name,
+			one ? "" : " of ", one ? "" : survey->name);
+}
+
+static double group_rmse(const struct incise_trained *trained, int number)
+{
+	const struct incise_train_side *held =
+		&incise_corpus_side(trained->corpus, true)->sample;
+	int n = held->pairs.n_inputs, pairs = 0;
+	double sum = 0;
+
+	for (size_t i = 0; i < held->pairs.n; i++) {
+		const double *x = held->pairs.rows + i * (size_t)(n + 1);
+
+		if (held->groups[i] != number)
+			continue;
+		sum += pow(incise_model_eval(trained->model, x, NULL) - x[n], 2);
+		pairs++;
+	}
+	return sqrt(sum / pairs);
+}
+
+/* The groups that are held out, in the order of the sources, to be freed with free_held(). */
+static struct held_group *find_held(const struct incise_trained *trained, int *n)
+{
+	int most = incise_corpus_side(trained->corpus, true)->n_groups, last = -1;
+	struct held_group *held = cli_alloc((size_t)most + 1, sizeof(*held));
+
+	*n = 0;
+	for (int i = 0; i < incise_corpus_sources(trained->corpus) && trained->group;
+	     i++) {
+		const struct incise_corpus_survey *survey =
+			incise_corpus_source(trained->corpus, i);
+
+		for (int g = 0; g < survey->n_groups && *n < most; g++) {
+			const struct incise_corpus_group *group = &survey->groups[g];
+
+			/* Namesakes in other sources have the number of the first one. */
+			if (!group->check || group->number <= last)
+				continue;
+			last = group->number;
+			held[(*n)++] = (struct held_group){name_group(trained, i, g),
+							   group_rmse(trained, last)};
+		}
+	}
+	return held;
+}
+
+static void free_held(struct held_group *held, int n)
+{
+	for (int i = 0; i < n; i++)
+		free(held[i].name);
+	free(held);
+}
+
+/* A value in the unit of the target, which ends its key. */
+static void set_json_in_unit(json_t *object, const char *name,
+			     const struct train_options *options, json_t *value)
 {
 	const char *unit = unit_of_train(options->target);
 	char key[80];
 
 	snprintf(key, sizeof(key), "%s%s%.50s", name, *unit ? "_" : "", unit);
-	json_set_number(object, key, value);
+	json_object_set_new(object, key, value);
+}
+
+static void set_in_unit(json_t *object, const char *name,
+			const struct train_options *options, double value)
+{
+	set_json_in_unit(object, name, options, json_number(value));
 }
 
 static json_t *error_object(const struct train_options *options, double rmse, double r2,
@@ -717,6 +800,9 @@ static void report_train_json(const struct train_options *options,
 	const struct incise_train_report *report = &trained->report;
 	const struct incise_baselines *baselines = &trained->baselines;
 	json_t *object = json_object(), *unfired = json_array(), *mfs = json_array();
+	json_t *names = json_array(), *errors = json_array();
+	int n_held;
+	struct held_group *held = find_held(trained, &n_held);
 
 	json_set_integer(object, "pairs", trained->pairs + trained->check_pairs);
 	json_set_integer(object, "left_out", trained->left_out);
@@ -742,6 +828,13 @@ static void report_train_json(const struct train_options *options,
 			 incise_corpus_side(trained->corpus, false)->n_groups);
 	json_set_integer(object, "check_groups",
 			 incise_corpus_side(trained->corpus, true)->n_groups);
+	for (int i = 0; i < n_held; i++) {
+		json_array_append_new(names, json_text(held[i].name));
+		json_array_append_new(errors, json_number(held[i].rmse));
+	}
+	free_held(held, n_held);
+	json_object_set_new(object, "check_names", names);
+	set_json_in_unit(object, "check_names_rms_error", options, errors);
 	json_set_integer(object, "rules", incise_model_info(model)->n_rules);
 	json_set_integer(object, "parameters", report->parameters);
 	json_set_integer(object, "epochs", report->epochs);
@@ -793,6 +886,18 @@ static void print_row(const char *name, double train, double check)
 	printf("  %-22s", name);
 	isnan(train) ? printf("%12s", "") : printf("%12.5g", train);
 	isnan(check) ? printf("\n") : printf("%14.5g\n", check);
+}
+
+/* The error of each group that is held out, unless they are many. */
+static void print_held(const struct incise_trained *trained, const char *unit)
+{
+	int n;
+	struct held_group *held = find_held(trained, &n);
+
+	for (int i = 0; i < n && n <= NAMED; i++)
+		if (isfinite(held[i].rmse))
+			printf("  %-36s%12.5g %s\n", held[i].name, held[i].rmse, unit);
+	free_held(held, n);
 }
 
 /* The law that the model is, or the kind of its penalty. */
@@ -857,7 +962,8 @@ static void report_train_text(const struct train_options *options,
 			     : cuts			? "unseen cuts"
 			     : trained->group		? "unseen groups"
 							: "unseen pairs";
-	char knn[40];
+	const char *unit = unit_of_train(options->target);
+	char knn[40], head[30];
 
 	printf("%s: %s to train", options->data, cli_count(trained->pairs, "pair"));
 	if (trained->group)
@@ -885,17 +991,9 @@ static void report_train_text(const struct train_options *options,
 	if (isfinite(report->condition))
 		printf(", condition %.2g", report->condition);
 	printf("\n");
-	printf("  %-22s%12s%14s\n", "RMSE", "training", check ? unseen : "");
+	snprintf(head, sizeof(head), "RMSE%s%.20s", *unit ? ", " : "", unit);
+	printf("  %-22s%12s%14s\n", head, "training", check ? unseen : "");
 	print_row("this model", report->train_rmse, report->check_rmse);
-	if (isfinite(report->crossval_rmse))
-		printf("  cross-validated: %.5g", report->crossval_rmse);
-	if (isfinite(report->crossval_quadratic))
-		printf(", quadratic %.5g", report->crossval_quadratic);
-	if (isfinite(report->crossval_plane))
-		printf(", plane %.5g, mean %.5g", report->crossval_plane,
-		       report->crossval_mean);
-	if (isfinite(report->crossval_rmse))
-		printf("\n");
 	snprintf(knn, sizeof(knn), "%d nearest", baselines->k);
 	print_row("mean", check ? NAN : baselines->mean, check ? baselines->mean : NAN);
 	print_row("linear regression", check ? NAN : baselines->linear,
@@ -904,8 +1002,19 @@ static void report_train_text(const struct train_options *options,
 	print_row("MSE of this model", pow(report->train_rmse, 2),
 		  pow(report->check_rmse, 2));
 	print_row("R² of this model", report->train_r2, report->check_r2);
-	printf("  95 %% interval: noise %.4g %s", trained->noise,
-	       unit_of_train(options->target));
+	print_held(trained, unit);
+	if (isfinite(report->crossval_rmse))
+		printf("  cross-validated: %.5g", report->crossval_rmse);
+	if (isfinite(report->crossval_quadratic))
+		printf(", quadratic %.5g", report->crossval_quadratic);
+	if (isfinite(report->crossval_plane))
+		printf(", linear %.5g, mean %.5g", report->crossval_plane,
+		       report->crossval_mean);
+	if (isfinite(report->crossval_rmse))
+		printf("%s%s\n", *unit ? " " : "", unit);
+	printf("  95 %% interval: noise %.4g %s", trained->noise, unit);
+	if (trained->group && fit->n_groups <= WIDE)
+		printf(" (wide: only %s)", cli_count(fit->n_groups, group));
 	if (check)
 		printf(", holds %.1f %% of the %s", 100 * trained->coverage, unseen);
 	if (check && isfinite(third[0] + third[1] + third[2]))
