@@ -280,7 +280,7 @@ static void http_work(struct serve_sink *sink)
 
 		snprintf(reply, sizeof(reply), "%s has no such order: %s",
 			 http->info->name, order.what);
-		if (http->source->ops->order)
+		if (http->source && http->source->ops->order)
 			failed = http->source->ops->order(http->source, order.what,
 							  order.text, reply,
 							  sizeof(reply));
