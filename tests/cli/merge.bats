@@ -43,7 +43,7 @@ large_shares() {
 	for i in 1 2 3 4; do
 		grep -q "source: $(sha256sum <s$i.csv | cut -c1-64) [0-9]* pairs, s$i.csv" out
 	done
-	grep -q -e "options: --group cut --check 0.3 --seed 1 --mf 5,4" out
+	grep -q -e "options: --group cut --inputs depth_mm,velocity_mm_s --target force_N --check 0.3 --seed 1 --mf 5,4" out
 }
 
 @test "a source given twice is named, and a group may be a source" {
