@@ -65,6 +65,9 @@ large_shares() {
 	incise train s2.csv --premises start.fis --group cut -o c.fac >/dev/null
 	incise merge c.fac a.fac b.fac -o merged.fis >out
 	grep -q "3 factors: 32000 pairs of 320 groups from 4 sources" out
+	mean=$(awk -F, 'FNR > 1 { s += $4; q += $4 ^ 2; n++ } END { printf "%.5g", sqrt(q / n - (s / n) ^ 2) }' s?.csv)
+	grep -q "^RMSE [0-9.]*, of the mean $mean, R² " out
+	grep -q "^RMSE of parts that were held out 0" out
 	cmp all.fis merged.fis
 	cmp all.fis.sd merged.fis.sd
 	incise merge a.fac b.fac -o ab.fac >/dev/null
