@@ -380,7 +380,7 @@ full() {
 		compile m.fis -o out.fx -o other.fx|--output other.fx: FILE.fx|NAME.plan is given twice
 		replay d.rec m.scene -o out.odd|--output: out.odd: unknown extension .odd; give .csv, .png or .svg
 		haptic m.scene -o out.odd|--output: out.odd: unknown extension .odd; give .csv or .session
-		plot d.rec -o out.odd|--output: out.odd: unknown extension .odd; give .png, .svg or .pdf
+		plot d.rec -o out.odd|--output: out.odd: unknown extension .odd; give .png, .svg, .pdf or .html
 		calibrate tip --from none.csv -o out.odd|--output: out.odd: unknown extension .odd; give .csv
 		capture -o out.odd|expected a name that ends in .rec
 	END
