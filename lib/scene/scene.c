@@ -779,6 +779,11 @@ void incise_scene_leave_texture_out(struct incise_scene *scene)
 	scene->texture_path = NULL;
 }
 
+const char *incise_scene_texture_left_out(const struct incise_scene *scene)
+{
+	return scene->texture_left_out;
+}
+
 void incise_scene_free(struct incise_scene *scene)
 {
 	if (!scene)

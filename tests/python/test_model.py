@@ -173,6 +173,10 @@ class Models(Case):
             with warnings.catch_warnings():
                 warnings.simplefilter("error")
                 thing([(5, 20), (7, 20)])
+        with self.assertWarns(UserWarning):
+            sd = self.model([(low - 1, 20), (5, 20)], sd=True)[1]
+        self.assertTrue(math.isnan(sd[0]))
+        self.assertEqual(sd[1], self.model((5, 20), sd=True)[1])
 
     def test_files(self):
         self.model.save(self.path("a.fis"))

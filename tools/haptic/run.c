@@ -646,7 +646,7 @@ static void report_run_text(const struct haptic *haptic)
 	       (unsigned long long)ticks_with(s, INCISE_TICK_SLEWED),
 	       (unsigned long long)ticks_with(s, INCISE_TICK_TRAVEL),
 	       (unsigned long long)ticks_with(s, INCISE_TICK_STARTING));
-	loop_texture_line(s);
+	loop_texture_line(s, haptic->scene);
 	kernel_line(haptic);
 	haptic_device_line(haptic);
 	for (int i = 0; (stepper = incise_rig_axis(haptic->rig, i, NULL)); i++)

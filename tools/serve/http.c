@@ -21,6 +21,10 @@
 #include "http_server.h"
 #include "serve.h"
 
+/* Flags of a tick that are no warnings. */
+#define EVERYDAY                                                           \
+	(INCISE_TICK_CONTACT | INCISE_TICK_IN_CUT | INCISE_TICK_MEMBRANE | \
+	 INCISE_TICK_LUMEN)
 #define ROWS 1024 /* of a message: more are left out, counted */
 #define GATHER_NS 30000000LL
 #define STATE_NS 190000000LL
@@ -121,7 +125,7 @@ static void send_loop(struct http *http, const struct incise_state_now *now)
 	json_t *warnings = json_array(), *more;
 
 	for (int i = 0; i < INCISE_TICK_FLAGS; i++)
-		if (now->tick.flags >> i & 1 && loop_flag_names[i])
+		if ((now->tick.flags & ~EVERYDAY) >> i & 1 && loop_flag_names[i])
 			json_array_append_new(warnings, json_text(loop_flag_names[i]));
 	if (now->skipped)
 		json_array_append_new(
@@ -423,10 +427,6 @@ struct serve_sink *serve_http_new(const struct serve_http_options *options,
 								: NULL};
 	char *before;
 
-	if (!options->url && !isatty(STDERR_FILENO))
-		cli_fail(
-			"--http: the page's address holds a secret, and standard error is no "
-			"terminal; give --url FILE");
 	http->base.ops = &http_ops;
 	http->info = info;
 	http->options = options;
@@ -438,6 +438,10 @@ struct serve_sink *serve_http_new(const struct serve_http_options *options,
 	setup.before = before = address_before(options->url);
 	http->server = http_server_new(&setup);
 	free(before);
+	if (!options->url && !isatty(STDERR_FILENO))
+		cli_fail(
+			"the address of the page holds a secret, and standard error is no "
+			"terminal; give --url FILE");
 	tell_url(http);
 	return &http->base;
 }

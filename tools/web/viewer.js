@@ -194,8 +194,8 @@ function arrangeLegend(g, width, panel) {
 	let x = LEFT + (name ? g.measureText(name).width + 22 : 0), line = 0;
 	const cells = panel.tracks.map((track, i) => {
 		const label = head.tracks[track]?.label || panel.label || "", text = own ? label + unit : label;
-		const room = series[track]?.u ? "  −000.000 ± 00.000" : "  −000.000";
-		const cell = 24 + g.measureText(text + room).width;
+		const {u, low, high} = whole?.series[track] ?? {}, range = low === high ? "" : " … −000.00";
+		const cell = 24 + g.measureText(`${text}  −000.00${range}${u ? " ± 00.000" : ""}`).width;
 		if (x + cell > width - RIGHT && x > LEFT) [x, line] = [LEFT, line + 1];
 		x += cell;
 		return {track, text, label, colour: i, x: x - cell, line};
@@ -224,7 +224,7 @@ function arrange() {
 	wake();
 }
 
-// Draws what does not touch the one before; the rest is left out.
+// Draws what does not touch the one before.
 function spread(list, middle, half, draws) {
 	let free = -Infinity;
 	for (const one of list) {
@@ -368,7 +368,7 @@ function drawCursor(g) {
 		if (hoverPx !== null) box(g, colours.soft, hoverPx - 0.5, 0, 1, rows.height);
 	});
 	if (cursor === null && hoverPx === null) return;
-	drawLabel(g, place(x), toPx(x), 12);
+	drawLabel(g, (head.axis.label + " ").replace("time ", "") + place(x), toPx(x), 12);
 	if (event) drawLabel(g, event.slice(1).filter(Boolean).join(": "), toPx(event[0]),
 		rows.find(row => row.kind === "events").top + 12);
 }
@@ -699,7 +699,7 @@ function takeHead(h) {
 	const events = same && live && !h.events?.length ? head.events : h.events ?? [];
 	head = {cuts: [], panels: [], axis: {label: "time", unit: "s"}, ...h, events};
 	live = head.kind === "live";
-	const {path, tools = []} = head;
+	const {path, tools = [], axis} = head;
 	if (path?.t) Object.assign(path, {x: numbers(path.t), low: numbers(path.x), high: numbers(path.y),
 		start: 0, count: path.t.length, mask: -1});
 	document.title = `${head.title} · incise`;
@@ -711,7 +711,7 @@ function takeHead(h) {
 	fillTable($("table"), head.table?.head, head.table?.rows ?? []);
 	fillTable($("facts"), null, head.facts ?? []);
 	keyButton("p").hidden = keyButton("n").hidden = !head.cuts.length;
-	setText(keyButton(" "), live ? "freeze" : "play");
+	Object.assign(keyButton(" "), {textContent: live ? "freeze" : "play", hidden: axis.unit !== "s"});
 	$("window").hidden = !live;
 	if (!same) {
 		part = whole = trail = hoverPx = span = null;
