@@ -86,6 +86,8 @@ def realism(report):
     rows = {(row["set"], row["kind"]): row for row in report["rows"]}
     for name in dict.fromkeys(row["set"] for row in report["rows"]):
         with_it, without = rows[name, "texture"], rows[name, "none"]
+        if None in (row[key] for row in (with_it, without) for key in ("event_rate", "spectrum_dB")):
+            continue
         alike = (abs(with_it["event_rate"] - 1) < abs(without["event_rate"] - 1)
                  and with_it["spectrum_dB"] < without["spectrum_dB"])
         yield (f"texture of {name}: rate of events {with_it['event_rate']:.2f}, without it "
