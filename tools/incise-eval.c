@@ -71,7 +71,7 @@ struct evaluator {
 #define SD_PARTS 4
 static const char *const part_names[SD_PARTS] = {"data", "model", "calibration", "mean"};
 
-/* Outside the data nothing bounds the error. */
+/* The standard deviation and its parts are NaN outside the data, where nothing bounds the error. */
 static double find_sd(const struct evaluator *e, const double *x, bool outside)
 {
 	return outside ? NAN : incise_uncertainty_sd(e->uncertainty, e->model, x);

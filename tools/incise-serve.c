@@ -111,7 +111,7 @@ static const struct cli_command command = {
 };
 
 struct serve_run {
-	struct serve_source *source;
+	struct serve_source *source; /* NULL: a file is shown in the viewer alone */
 	struct serve_info info;
 	struct serve_stream *stream;
 	struct serve_sink *sink[SERVE_SINKS];
@@ -172,10 +172,12 @@ static void open_source(struct serve_run *run, struct serve_job *job)
 	}
 	run->info.rate_hz = job->source.rate_hz;
 	run->info.kinds[SERVE_STATUS] = true;
-	run->source = viewed	  ? serve_view_open(&job->source, &run->info)
-		      : job->rig  ? serve_rig_open(&job->source, &run->info)
-		      : recording ? serve_recording_open(&job->source, &run->info)
-				  : serve_loop_open(&job->source, &run->info);
+	if (viewed)
+		run->info.name = cli_text("viewer of %s", operand);
+	else
+		run->source = job->rig	  ? serve_rig_open(&job->source, &run->info)
+			      : recording ? serve_recording_open(&job->source, &run->info)
+					  : serve_loop_open(&job->source, &run->info);
 	/* Faults of the rig are said first. */
 	if (job->rig && !calibration.path)
 		calibration_use(&calibration, job->calibration, job->rig);
@@ -277,7 +279,7 @@ static void serve(struct serve_run *run, const struct serve_job *job)
 	bool ended = false;
 
 	while (!cli_stop && now < end && !ended) {
-		if (now >= next)
+		if (run->source && now >= next)
 			ended = run->source->ops->read(run->source, run->stream, now,
 						       &next);
 		if (now >= tick) {
@@ -285,7 +287,7 @@ static void serve(struct serve_run *run, const struct serve_job *job)
 			show_serve(run, (now - start) / 1e9);
 			tick = now + TICK_NS;
 		}
-		wait_until(run, next < tick ? next : tick);
+		wait_until(run, run->source && next < tick ? next : tick);
 		now = cli_now_ns();
 	}
 	run->seconds = (now - start) / 1e9;
@@ -358,7 +360,8 @@ int main(int argc, char **argv)
 	for (int i = 0; i < run.sinks; i++)
 		run.sink[i]->ops->free(run.sink[i]);
 	serve_stream_free(run.stream);
-	run.source->ops->free(run.source);
+	if (run.source)
+		run.source->ops->free(run.source);
 	cli_finish();
 	return 0;
 }

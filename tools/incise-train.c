@@ -593,92 +593,65 @@ static const char *unit_of_train(const char *column)
 	return score ? score + 1 : "";
 }
 
-/* A group that is held out, and the error of the model on its pairs in the sample. */
-struct held_group {
-	char *name;
-	double rmse;
-};
-
-/* Name a group of a source for people: a recording by its name, a cut of several sources with its source. */
-static char *name_group(const struct incise_trained *trained, int source, int g)
-{
-	const struct incise_corpus_survey *survey =
-		incise_corpus_source(trained->corpus, source);
-	bool recording = !strcmp(trained->group, "recording");
-	bool one = incise_corpus_sources(trained->corpus) == 1 ||
-		   strcmp(trained->group, "cut") != 0;
-
-	return cli_text("%s %s%s%s", trained->group,
-			recording ? survey->name : survey->groups[g].name,
-			one ? "" : " of ", one ? "" : survey->name);
-}
-
+/* The root-mean-square error on the pairs of a group that are in the sample held out. */
 static double group_rmse(const struct incise_trained *trained, int number)
 {
 	const struct incise_train_side *held =
 		&incise_corpus_side(trained->corpus, true)->sample;
-	int n = held->pairs.n_inputs, pairs = 0;
-	double sum = 0;
+	size_t width = (size_t)held->pairs.n_inputs + 1;
+	double sum = 0, n = 0;
 
 	for (size_t i = 0; i < held->pairs.n; i++) {
-		const double *x = held->pairs.rows + i * (size_t)(n + 1);
+		const double *x = held->pairs.rows + i * width;
 
 		if (held->groups[i] != number)
 			continue;
-		sum += pow(incise_model_eval(trained->model, x, NULL) - x[n], 2);
-		pairs++;
+		sum += pow(incise_model_eval(trained->model, x, NULL) - x[width - 1], 2);
+		n++;
 	}
-	return sqrt(sum / pairs);
+	return sqrt(sum / n);
 }
 
-/* The groups that are held out, in the order of the sources, to be freed with free_held(). */
-static struct held_group *find_held(const struct incise_trained *trained, int *n)
+/* The names of the groups that are held out, in the order of the sources, and the errors on them. */
+static void find_held(const struct incise_trained *trained, json_t *names, json_t *errors)
 {
-	int most = incise_corpus_side(trained->corpus, true)->n_groups, last = -1;
-	struct held_group *held = cli_alloc((size_t)most + 1, sizeof(*held));
+	int n = incise_corpus_sources(trained->corpus), last = -1;
+	const char *of = trained->group ? trained->group : "";
 
-	*n = 0;
-	for (int i = 0; i < incise_corpus_sources(trained->corpus) && trained->group;
-	     i++) {
+	for (int i = 0; i < n; i++) {
 		const struct incise_corpus_survey *survey =
 			incise_corpus_source(trained->corpus, i);
+		bool cut = n > 1 && !strcmp(of, "cut");
 
-		for (int g = 0; g < survey->n_groups && *n < most; g++) {
+		for (int g = 0; g < survey->n_groups; g++) {
 			const struct incise_corpus_group *group = &survey->groups[g];
+			bool whole = !strcmp(of, "recording"); /* its text is a hash */
+			char *name;
 
 			/* Namesakes in other sources have the number of the first one. */
 			if (!group->check || group->number <= last)
 				continue;
 			last = group->number;
-			held[(*n)++] = (struct held_group){name_group(trained, i, g),
-							   group_rmse(trained, last)};
+			name = cli_text("%s %s%s%s", of,
+					whole ? survey->name : group->name,
+					cut ? " of " : "", cut ? survey->name : "");
+			json_array_append_new(names, json_text(name));
+			json_array_append_new(errors,
+					      json_number(group_rmse(trained, last)));
+			free(name);
 		}
 	}
-	return held;
 }
 
-static void free_held(struct held_group *held, int n)
-{
-	for (int i = 0; i < n; i++)
-		free(held[i].name);
-	free(held);
-}
-
-/* A value in the unit of the target, which ends its key. */
-static void set_json_in_unit(json_t *object, const char *name,
-			     const struct train_options *options, json_t *value)
+/* A number in the unit of the target, which ends its key. */
+static void set_in_unit(json_t *object, const char *name,
+			const struct train_options *options, double value)
 {
 	const char *unit = unit_of_train(options->target);
 	char key[80];
 
 	snprintf(key, sizeof(key), "%s%s%.50s", name, *unit ? "_" : "", unit);
-	json_object_set_new(object, key, value);
-}
-
-static void set_in_unit(json_t *object, const char *name,
-			const struct train_options *options, double value)
-{
-	set_json_in_unit(object, name, options, json_number(value));
+	json_set_number(object, key, value);
 }
 
 static json_t *error_object(const struct train_options *options, double rmse, double r2,
@@ -801,9 +774,11 @@ static void report_train_json(const struct train_options *options,
 	const struct incise_baselines *baselines = &trained->baselines;
 	json_t *object = json_object(), *unfired = json_array(), *mfs = json_array();
 	json_t *names = json_array(), *errors = json_array();
-	int n_held;
-	struct held_group *held = find_held(trained, &n_held);
+	const char *unit = unit_of_train(options->target);
+	char key[80];
 
+	snprintf(key, sizeof(key), "check_names_rms_error%s%.50s", *unit ? "_" : "",
+		 unit);
 	json_set_integer(object, "pairs", trained->pairs + trained->check_pairs);
 	json_set_integer(object, "left_out", trained->left_out);
 	json_set_integer(object, "repeated", trained->repeated);
@@ -828,13 +803,9 @@ static void report_train_json(const struct train_options *options,
 			 incise_corpus_side(trained->corpus, false)->n_groups);
 	json_set_integer(object, "check_groups",
 			 incise_corpus_side(trained->corpus, true)->n_groups);
-	for (int i = 0; i < n_held; i++) {
-		json_array_append_new(names, json_text(held[i].name));
-		json_array_append_new(errors, json_number(held[i].rmse));
-	}
-	free_held(held, n_held);
+	find_held(trained, names, errors);
 	json_object_set_new(object, "check_names", names);
-	set_json_in_unit(object, "check_names_rms_error", options, errors);
+	json_object_set_new(object, key, errors);
 	json_set_integer(object, "rules", incise_model_info(model)->n_rules);
 	json_set_integer(object, "parameters", report->parameters);
 	json_set_integer(object, "epochs", report->epochs);
@@ -891,13 +862,16 @@ static void print_row(const char *name, double train, double check)
 /* The error of each group that is held out, unless they are many. */
 static void print_held(const struct incise_trained *trained, const char *unit)
 {
-	int n;
-	struct held_group *held = find_held(trained, &n);
+	json_t *names = json_array(), *errors = json_array(), *name;
+	size_t i;
 
-	for (int i = 0; i < n && n <= NAMED; i++)
-		if (isfinite(held[i].rmse))
-			printf("  %-36s%12.5g %s\n", held[i].name, held[i].rmse, unit);
-	free_held(held, n);
+	find_held(trained, names, errors);
+	json_array_foreach(names, i, name) if (json_array_size(names) <= NAMED &&
+					       json_is_real(json_array_get(errors, i)))
+		printf("  %-36s%12.5g %s\n", json_string_value(name),
+		       json_number_value(json_array_get(errors, i)), unit);
+	json_decref(names);
+	json_decref(errors);
 }
 
 /* The law that the model is, or the kind of its penalty. */

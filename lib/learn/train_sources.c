@@ -78,11 +78,9 @@ static int name_training(struct training *t, int rc)
 /* The options of incise train that make this model of its sources: free(3). */
 static char *describe_options(const struct training *t)
 {
-	static const char *const usual[] = {"depth_mm", "velocity_mm_s", "force_N"};
 	const struct incise_sources_options *options = t->options;
 	const struct incise_train_options *train = &options->train;
 	int n = options->n_inputs;
-	bool named = options->premises || n != 2;
 	char *text = NULL;
 	size_t size;
 	FILE *out = open_memstream(&text, &size);
@@ -92,12 +90,12 @@ static char *describe_options(const struct training *t)
 	fprintf(out, "--group %s%s%s", t->reading.group ? t->reading.group : "none",
 		options->all_rows ? " --all-rows" : "",
 		options->averaged ? " --rate HZ" : "");
-	for (int i = 0; i < n && !named; i++)
-		named |= strcmp(options->columns[i], usual[i]) != 0;
-	for (int i = 0; i < n && named && !options->premises; i++)
-		fprintf(out, "%s%s", i ? "," : " --inputs ", options->columns[i]);
-	if (!options->premises && strcmp(options->columns[n], usual[2]))
-		fprintf(out, " --target %s", options->columns[n]);
+	for (int i = 0; i <= n && !options->premises; i++)
+		fprintf(out, "%s%s",
+			!i	? " --inputs "
+			: i < n ? ","
+				: " --target ",
+			options->columns[i]);
 	if (options->n_parts)
 		fputs(" --uncertainty parts", out);
 	if (options->check > 0)

@@ -306,14 +306,12 @@ void incise_uncertainty_parts(const struct incise_uncertainty *u,
 	};
 }
 
-static bool is_in_ranges(const struct incise_model *model, const double *x)
+static bool is_inside(const struct incise_model *model, const double *x)
 {
-	bool inside = true;
+	unsigned int flags = 0;
 
-	for (int i = 0; i < model->info.n_inputs; i++)
-		inside &= x[i] >= model->info.input[i].min &&
-			  x[i] <= model->info.input[i].max;
-	return inside;
+	incise_model_eval(model, x, &flags);
+	return !(flags & INCISE_MODEL_EXTRAPOLATED);
 }
 
 void incise_uncertainty_parts_many(const struct incise_uncertainty *uncertainty,
@@ -321,7 +319,7 @@ void incise_uncertainty_parts_many(const struct incise_uncertainty *uncertainty,
 				   size_t n, struct incise_uncertainty_parts *parts)
 {
 	for (size_t k = 0; k < n; k++, x += model->info.n_inputs)
-		if (is_in_ranges(model, x))
+		if (is_inside(model, x))
 			incise_uncertainty_parts(uncertainty, model, x, &parts[k]);
 		else
 			parts[k] = (struct incise_uncertainty_parts){NAN, NAN, NAN,
@@ -467,7 +465,6 @@ void incise_uncertainty_sd_many(const struct incise_uncertainty *uncertainty,
 				size_t n, double *sd)
 {
 	for (size_t k = 0; k < n; k++, x += model->info.n_inputs)
-		sd[k] = is_in_ranges(model, x)
-				? incise_uncertainty_sd(uncertainty, model, x)
-				: NAN;
+		sd[k] = is_inside(model, x) ? incise_uncertainty_sd(uncertainty, model, x)
+					    : NAN;
 }

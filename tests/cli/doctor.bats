@@ -157,6 +157,7 @@ group() {
 		'actuator = { spring_N_mm = 2; travel_mm = 20; lead_mm = 4; };' >rig.conf
 	run --separate-stderr incise doctor
 	[[ "$(finding kernel module)" == "  warning "*"→ sudo modprobe incise_stepper"* ]]
+	[[ "$(finding devices stepper)" == "  problem "*"→ sudo cp /usr/share/incise/stepper.conf.example /etc/incise/stepper.conf"* ]]
 }
 
 # bats test_tags=check

@@ -53,14 +53,14 @@ setup() {
 @test "a model keeps the options that make it again" {
 	incise train p.csv --group cut --check 0.3 --mf 3,2 --seed 7 --ridge 1 --all-rows -o a.fis >/dev/null 2>&1
 	run -0 --separate-stderr incise provenance a.fis
-	options="--group cut --all-rows --check 0.3 --seed 7 --mf 3,2 --ridge 1"
+	options="--group cut --all-rows --inputs depth_mm,velocity_mm_s --target force_N --check 0.3 --seed 7 --mf 3,2 --ridge 1"
 	[ "${lines[0]}" = "a.fis was made by incise train … $options of" ]
 	# shellcheck disable=SC2086 # the options are words
 	incise train p.csv $options -o b.fis >/dev/null 2>&1
 	cmp a.fis b.fis
 	incise train p.csv --inputs velocity_mm_s,depth_mm --search type=gbellmf,classic,step=0.1 --epochs 2 \
 		--mf 2,2 -o c.fis >/dev/null 2>&1
-	command="incise train … --group cut --inputs velocity_mm_s,depth_mm --mf 2,2 --search type=gbellmf"
+	command="incise train … --group cut --inputs velocity_mm_s,depth_mm --target force_N --mf 2,2 --search type=gbellmf"
 	command+=" --search classic,step=0.1 --epochs 2"
 	[ "$(incise provenance c.fis --json | jq -r .command)" = "$command" ]
 	${command/…/p.csv} -o d.fis >/dev/null 2>&1

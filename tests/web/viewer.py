@@ -40,7 +40,7 @@ DOCUMENT = {
         "path": {"unit": "mm", "t": [0, 5, 10], "x": [0, 10, 10], "y": [0, 0, 10]},
         "table": {"head": ["criterion", "value"], "rows": [["<i>depth</i>", "1 mm"]]},
         "members": [{"label": "b", "from": 0, "to": 9, "text": "clock +1 ms"}],
-        "facts": [["rig", "sim:"]],
+        "facts": [["rig", "sim:"], ["scene", "/a" + "long" * 60 + ".scene"]],
         "export": "incise export 'a b.rec' --range {from}s..{to}s -o part.csv",
         "note": "reduced",
     },
@@ -427,12 +427,20 @@ def stream(browser):
     near(page, "view", now + 0.099 - 10, now + 0.099)
     page.key(" ")
     near(page, "view", now + 0.199 - 10, now + 0.199)
+    # whatever moves the cursor freezes as well
+    page.key("ArrowLeft")
+    near(page, "cursor", now + 0.199 - 10 / 200)
+    page.evaluate(f"pour({now} + 0.2, 10, 0.001)")
+    drawn(page)
+    near(page, "view", now + 0.199 - 10, now + 0.199)
+    page.key(" ")
+    near(page, "view", now + 0.299 - 10, now + 0.299)
     # a track that a message leaves out stays as it was; events come with their marks
     counts = page.evaluate(
         f"""sockets.at(-1).say({{live: {{t: [{now} + 1], tracks: [[1], null, [], [null]]}}}}),
         sockets.at(-1).say({{event: [{now}, "marker", "here"]}}), series.map(s => s.count)"""
     )
-    assert counts == [1201, 1200, 1200, 1201], counts
+    assert counts == [1301, 1300, 1300, 1301], counts
     assert page.evaluate("head.events.length") == 1
     page.evaluate(
         """(() => { const frame = new ArrayBuffer(24 + 6), view = new DataView(frame);

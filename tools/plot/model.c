@@ -163,14 +163,19 @@ static void put_residuals(struct model_grid *grid, const struct model_surface *s
 {
 	/* Three digits of the RMSE. */
 	int decimals = r->rms > 0 ? (int)fmin(fmax(2 - floor(log10(r->rms)), 0), 12) : 0;
+	size_t n;
+	const char *unit = plot_unit_of(surface->output.name, &n),
+		   *gap = *unit ? " " : "";
 
 	place_model_plot(grid, 0, 2, RESIDUALS_HEIGHT);
 	fprintf(grid->script,
 		"set key outside bottom center horizontal\nset xrange [*:*]\nset yrange [*:*]\n"
-		"set title '%zu rows: measured - model, RMSE %.*f, mean %.*f'\n"
+		"set title '%zu rows: measured - model, RMSE %.*f%s%s, mean "
+		"%.*f%s%s'\n"
 		"set xlabel ",
-		r->n, decimals, r->rms, decimals,
-		round(r->mean * pow(10, decimals)) / pow(10, decimals) + 0.0); /* no -0 */
+		r->n, decimals, r->rms, gap, unit, decimals,
+		round(r->mean * pow(10, decimals)) / pow(10, decimals) + 0.0, /* no -0 */
+		gap, unit);
 	plot_put_label(grid->script, surface->input[0].name);
 	fputc('\n', grid->script);
 	put_residual_label(grid->script, surface);
@@ -246,10 +251,15 @@ static void put_band(struct model_grid *grid, const struct model_surface *surfac
 				      : "");
 	if (surface->n_inputs == 2) {
 		const struct incise_variable *other = &surface->input[!input];
+		double middle = (other->min + other->max) / 2;
+		size_t n;
+		const char *unit = plot_unit_of(other->name, &n);
+		char *at = *unit ? cli_text(" at %.3g %s", middle, unit)
+				 : cli_text(" at %s = %.3g", other->name, middle);
 
-		fputs(".' at '.", grid->script);
-		plot_put_label(grid->script, other->name);
-		fprintf(grid->script, ".' = %.3g'", (other->min + other->max) / 2);
+		putc('.', grid->script);
+		plot_put_text(grid->script, at);
+		free(at);
 	}
 	fputs("\nset xlabel ", grid->script);
 	plot_put_label(grid->script, surface->input[input].name);

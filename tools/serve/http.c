@@ -21,6 +21,10 @@
 #include "http_server.h"
 #include "serve.h"
 
+/* Flags of a tick that are no warnings. */
+#define EVERYDAY                                                           \
+	(INCISE_TICK_CONTACT | INCISE_TICK_IN_CUT | INCISE_TICK_MEMBRANE | \
+	 INCISE_TICK_LUMEN)
 #define ROWS 1024 /* of a message: more are left out, counted */
 #define GATHER_NS 30000000LL
 #define STATE_NS 190000000LL
@@ -121,7 +125,7 @@ static void send_loop(struct http *http, const struct incise_state_now *now)
 	json_t *warnings = json_array(), *more;
 
 	for (int i = 0; i < INCISE_TICK_FLAGS; i++)
-		if (now->tick.flags >> i & 1 && loop_flag_names[i])
+		if ((now->tick.flags & ~EVERYDAY) >> i & 1 && loop_flag_names[i])
 			json_array_append_new(warnings, json_text(loop_flag_names[i]));
 	if (now->skipped)
 		json_array_append_new(
@@ -276,7 +280,7 @@ static void http_work(struct serve_sink *sink)
 
 		snprintf(reply, sizeof(reply), "%s has no such order: %s",
 			 http->info->name, order.what);
-		if (http->source->ops->order)
+		if (http->source && http->source->ops->order)
 			failed = http->source->ops->order(http->source, order.what,
 							  order.text, reply,
 							  sizeof(reply));

@@ -147,7 +147,7 @@ struct serve_http_options {
 	char capture[80];    /* name of the recording that is made; "" none */
 };
 
-/* Listen; fails the program if it cannot. @options, @info and @source live longer. */
+/* Listen; fails the program if it cannot. @options, @info and @source, which may be NULL, live longer. */
 struct serve_sink *serve_http_new(const struct serve_http_options *options,
 				  const struct serve_info *info,
 				  struct serve_source *source);
@@ -192,9 +192,6 @@ struct serve_source_options {
 	bool endless; /* start a recording again at its end */
 };
 
-/* No source at all: a file is shown in a page. */
-struct serve_source *serve_view_open(const struct serve_source_options *options,
-				     struct serve_info *info);
 struct serve_source *serve_loop_open(const struct serve_source_options *options,
 				     struct serve_info *info);
 struct serve_source *serve_rig_open(const struct serve_source_options *options,

@@ -230,6 +230,14 @@ static bool has_frames(const struct web_recording *w)
 	return false;
 }
 
+static bool has_values(const struct web_series *series)
+{
+	for (int i = 0; i < series->n; i++)
+		if (series->low[i] <= series->high[i])
+			return true;
+	return false;
+}
+
 static void put_facts(const struct web_recording *w, json_t *head)
 {
 	const struct incise_recording_info *info = &w->info;
@@ -272,8 +280,9 @@ static void put_members(const struct web_recording *w, json_t *head)
 		const struct incise_session_info *member = &members[i];
 
 		snprintf(text, sizeof(text),
-			 i ? "%s; clock %+.6f ms, %+.4f ppm, within %.3g ms, by %s"
-			   : "%s; the clock of all",
+			 !i || !strcmp(member->method, "same")
+				 ? "%s; the clock of all"
+				 : "%s; clock %+.6f ms, %+.4f ppm, within %.3g ms, by %s",
 			 member->streams, (double)member->offset_ns * 1e-6,
 			 member->rate_ppm, member->uncertainty_ns * 1e-6, member->method);
 		json_array_append_new(
@@ -297,12 +306,14 @@ static json_t *web_recording_head(struct web_file *file)
 	web_head_panel(head, "force", "N", "force");
 	web_head_panel(head, "depth", "mm", "depth");
 	web_head_panel(head, "speed", "mm/s", "speed");
-	if (has_frames(w))
-		web_head_panel(head, "depth by camera", "mm", "camera");
-	else
-		web_head_panel(head, NULL, NULL, "camera");
-	web_head_panel(head, "position", "mm", "x|y|z");
 	pthread_mutex_lock(&w->lock);
+	/* Frames need not show a depth. */
+	web_head_panel(head,
+		       has_frames(w) && (w->done < 1 || has_values(&w->series[CAMERA]))
+			       ? "depth by camera"
+			       : NULL,
+		       "mm", "camera");
+	web_head_panel(head, "position", "mm", "x|y|z");
 	for (int i = 0; i < w->cuts.n; i++) {
 		const struct recording_cut *cut = &w->cuts.cut[i];
 

@@ -126,8 +126,8 @@ INCISE_API void incise_uncertainty_parts(const struct incise_uncertainty *uncert
 					 struct incise_uncertainty_parts *parts);
 
 /**
- * The same for many points: parts[k] of the n_inputs values at x + k·n_inputs; NaN outside the ranges,
- * where nothing bounds the error. Real-time safe.
+ * The same for many points: parts[k] of the n_inputs values at x + k·n_inputs; NaN outside the ranges or where
+ * no rule fires: nothing bounds the error there. Real-time safe.
  */
 INCISE_API void incise_uncertainty_parts_many(
 	const struct incise_uncertainty *uncertainty, const struct incise_model *model,
@@ -164,7 +164,7 @@ INCISE_API int incise_uncertainty_solve(const struct incise_uncertainty *uncerta
 					double *v);
 
 /**
- * The same for many points: sd[k] of the n_inputs values at x + k·n_inputs; NaN outside the ranges.
+ * The same for many points: sd[k] of the n_inputs values at x + k·n_inputs; NaN as above.
  * Real-time safe.
  */
 INCISE_API void incise_uncertainty_sd_many(const struct incise_uncertainty *uncertainty,
