@@ -485,5 +485,7 @@ in_order() {
 	[ -n "${plot[*]}" ] || skip "gnuplot is not installed, it draws the chart"
 	[ "$(head -c 8 "a folder/w-map.png" | od -An -tx1 | tr -d ' \n')" = 89504e470d0a1a0a ]
 	grep -q 'delay of 2 ticks' "a folder/w-map.svg"
+	# two panels of 340 px are less than the least width
+	grep -q 'width="900"' "a folder/w-map.svg" || complain "$(grep -m1 -o ' width="[^"]*"' "a folder/w-map.svg")"
 }
 

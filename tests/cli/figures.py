@@ -161,6 +161,9 @@ class Figure:
         for segment, behind in zip(self.segments, self.segments[1:] + [last]):
             while behind and not behind[0].enhanced:
                 segment.append(behind.pop(0))
+        # A map has all of its axes behind its series.
+        if self.segments and not any(t.enhanced for t in self.segments[-1]):
+            self.segments[-1] += last
 
     def walk(self, element, colour, series):
         colour = colour_of(element, colour)
