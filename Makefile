@@ -5,7 +5,7 @@
 #   prefix, DESTDIR, bindir, libdir, includedir, mandir …   as usual
 #   CFLAGS, CXXFLAGS, LDFLAGS, CPPFLAGS   yours; the project's own flags are kept apart
 #   V=1            show whole commands
-#   CROSS_COMPILE=aarch64-linux-gnu-   builds for another machine, with its compilers, ar and pkg-config
+#   CROSS_COMPILE=aarch64-linux-gnu-   builds for another machine, with its compilers, ar, nm and pkg-config
 #   RUN=COMMAND    runs a program that a cross compiler made, as qemu-aarch64-static does
 #   DEPS=no        let `make demo` and `make check` install no packages
 
@@ -58,10 +58,12 @@ ifneq ($(CROSS_COMPILE),)
 CC = $(CROSS_COMPILE)gcc
 CXX = $(CROSS_COMPILE)g++
 AR = $(CROSS_COMPILE)ar
+NM = $(CROSS_COMPILE)nm
 PKG_CONFIG ?= $(if $(call there,$(CROSS_COMPILE)pkg-config),$(CROSS_COMPILE)pkg-config,\
 	env PKG_CONFIG_LIBDIR=/usr/lib/$(CROSS_COMPILE:%-=%)/pkgconfig:/usr/share/pkgconfig pkg-config)
 endif
 PKG_CONFIG ?= pkg-config
+NM ?= nm
 missing :=
 ifeq ($(call there,$(PKG_CONFIG)),)
 missing := $(firstword $(PKG_CONFIG))

@@ -37,7 +37,7 @@ unit_apart := $(patsubst tests/%.c,$(O)/tests/%,$(filter $(addprefix tests/unit/
 unit_layers := $(sort $(patsubst tests/unit/%/,%,$(dir $(unit_sources))))
 unit_together := $(filter-out $(unit_apart),$(unit_programs))
 unit_objects = $(patsubst $(O)/tests/%,$(O)/obj/tests/%.o,$(filter $(O)/tests/unit/$1/%,$(unit_together)))
-wraps = $$(nm $(filter %/$*.o,$^) | sed -n 's/.* T __wrap_\(.*\)/-Wl,--wrap=\1/p')
+wraps = $$($(NM) $(filter %/$*.o,$^) | sed -n 's/.* T __wrap_\(.*\)/-Wl,--wrap=\1/p')
 $(unit_together:$(O)/tests/%=$(O)/obj/tests/%.o): test_main = -Dmain=unit_$(*F)
 
 # Parts that only some layers use, ahead of the archive: modules that only their own tests link, as

@@ -42,9 +42,12 @@ state() {
 
 # bats test_tags=check
 @test "no command that reads a recording changes it, or what it names" {
+	local n=0
 	state >before
 	while read -r command; do
 		for of in closed killed bare journal hostile; do
+			# each half of the whole ones, or all with CASES=all
+			[[ "$of" == killed || "$of" == hostile ]] || ((n++ % 2 == 0)) || [ "${CASES:-}" = all ] || continue
 			incise ${command//REC/$of.rec} >out/stdout 2>out/stderr || [ $? = 1 ] ||
 				complain "${command//REC/$of.rec}: $(cat out/stderr)"
 			[ $of != hostile ] || grep -q "hostile.rec: its recording.db-journal names another file" out/stderr ||

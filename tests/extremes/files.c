@@ -561,7 +561,7 @@ static void copy_in(const struct mutants *m, const char *name)
 {
 	struct incise_error err = {0};
 	char *bytes = malloc(SIZE_MAX_BYTES), path[PATH_MAX];
-	size_t n;
+	size_t n = 0;
 
 	if (!bytes)
 		cli_fail("no memory");

@@ -128,10 +128,11 @@ TEST(test_self_contained)
 					"grep -q ' liver: .* 20 rules' m.c"),
 				 0);
 		assert_int_equal(system(COMPILE "-ffreestanding -c -o m.o m.c && "
-						"test -z \"$(nm -u m.o)\""),
+						"test -z \"$(${NM:-nm} -u m.o)\""),
 				 0);
 		assert_int_equal(
-			system("test \"$(nm -g --defined-only m.o | wc -l)\" = 1"), 0);
+			system("test \"$(${NM:-nm} -g --defined-only m.o | wc -l)\" = 1"),
+			0);
 		unlink("m.c");
 		unlink("m.o");
 		incise_fixed_free(fx);
