@@ -35,11 +35,13 @@ bench-all: all $(bench_programs) ## build the benchmarks for developers, build/t
 check-cli: $(bench_programs)
 
 # A page shows half the pixels of a figure.
-doc-pictures: all ## doc/force-surface.png and doc/neck.png, as the demo and incise view draw them today
+doc-pictures: all ## force-surface.png, neck.png and lesson.png of doc/, as the demo and incise view draw them today
 	rm -rf $(O)/pictures
 	$(O)/bin/incise demo -o $(O)/pictures >/dev/null
 	cd $(O)/pictures/plot && sed -i '/pngcairo/,/pointscale/{s/2 [*] figure_/figure_/g;s/1[.]5/0.75/;s/2[.]4/1.2/;s/2[.]6/1.3/}' style.gp && \
 		gnuplot fig3b-surface.gp && cp ../fig3b-surface.png $(abspath doc)/force-surface.png
 	$(O)/bin/incise view neck --procedure -o doc/neck.png --at 2.5s,8s,13s,21s --size 480x360 --overwrite >/dev/null
+	$(O)/bin/incise view neck --procedure -o doc/lesson.png --at 0.1s --duration 0.15s --size 480x300 --no-panel \
+		--viewpoint "$$(sed -n 's/.*--viewpoint \([^ ]*\) .*/\1/p' doc/lesson.md)" --overwrite >/dev/null
 
 .PHONY: bench-all doc-pictures

@@ -3,7 +3,7 @@
 
 headers := $(wildcard lib/include/incise/*.h)
 scenes := $(wildcard scenes/*.scene scenes/*.fis scenes/*.tex)
-report_files := $(addprefix tools/report/,report.py tables.py compare.py measure.py bench.j2 assess.j2 document.css)
+report_files := $(addprefix tools/report/,report.py tables.py compare.py measure.py bench.j2 assess.j2 demo.j2 document.css)
 examples := $(wildcard doc/*.example)
 unit_scripts := udev/stepper-setup
 # All but the main page of the headers' reference, which is in that.

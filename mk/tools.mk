@@ -22,13 +22,18 @@ $(O)/obj/tools/cli/machine.o: cppflags += -DBUILD_FLAGS='"$(subst ',,$(subst ",,
 
 # Frames that incise serve decodes.
 has_jpeg := $(shell $(CC) -E -x c -include stdio.h -include jpeglib.h /dev/null >/dev/null 2>&1 && echo yes)
-$(O)/obj/tools/serve/pixels.o: cppflags += $(if $(has_jpeg),-DHAVE_JPEG)
+$(O)/obj/tools/cli/pixels.o: cppflags += $(if $(has_jpeg),-DHAVE_JPEG)
+
+# Pages of incise serve --http.
+has_websockets := $(shell $(PKG_CONFIG) --exists libwebsockets && echo yes)
+$(O)/obj/tools/incise-serve.o: cppflags += $(if $(has_websockets),-DHAVE_WEBSOCKETS)
+$(O)/bin/incise-serve: tool_more_libs += $(if $(has_websockets),$(shell $(PKG_CONFIG) --libs libwebsockets))
 
 # Image files: those that depth is calibrated from, and frames of a view.
 has_png := $(shell $(CC) -E -x c -include png.h /dev/null >/dev/null 2>&1 && echo yes)
 $(O)/obj/tools/cli/image.o: cppflags += $(if $(has_png),-DHAVE_PNG)
 
-left_out_of_tools := $(if $(has_jpeg),,JPEG) $(if $(has_png),,PNG)
+left_out_of_tools := $(if $(has_jpeg),,JPEG) $(if $(has_websockets),,pages) $(if $(has_png),,PNG)
 
 # make's last line, incise --version and doctor print what this build leaves out: "PNG (libpng-dev), …".
 left_out_all := $(sort $(left_out) $(left_out_of_tools) $(left_out_commands:%=incise-%))
@@ -48,19 +53,19 @@ $(O)/obj/tools/cli/features.o: cppflags += -DLEFT_OUT='"$(left_out_names)"'
 # The parts of all programs. The linker takes of them, and of the libraries, what a program
 # uses: a new part, command or benchmark is found by its place.
 tool_parts := $(O)/obj/tools/parts.a
-tool_texts := $(wildcard tools/cli/*.gp tools/bench/plots/*.gp)
-$(tool_parts): $(patsubst %.c,$(O)/obj/%.o,$(filter-out $(if $(filter serve,$(commands)),,tools/serve/igtl.c),$(wildcard tools/*/*.c))) $(tool_texts:%=$(O)/obj/%.o)
+tool_texts := $(wildcard tools/cli/*.gp tools/bench/plots/*.gp tools/web/viewer.*)
+$(tool_parts): $(patsubst %.c,$(O)/obj/%.o,$(filter-out $(if $(filter serve,$(commands)),,tools/serve/igtl.c) $(if $(has_websockets),,tools/serve/http%.c),$(wildcard tools/*/*.c))) $(tool_texts:%=$(O)/obj/%.o)
 	@rm -f $@
 	$(call step,AR)
 	$(Q)$(AR) rcs $@ $^
 
-# A script of gnuplot: scenes.gp becomes the string text_scenes_gp.
+# A script of gnuplot, or of a browser: scenes.gp becomes the string text_scenes_gp.
 $(tool_texts:%=$(O)/obj/%.o): $(O)/obj/%.o: %
 	@mkdir -p $(@D)
 	$(call step,CC)
 	$(Q){ echo 'extern const char text_$(subst .,_,$(notdir $<))[];'; \
 		echo 'const char text_$(subst .,_,$(notdir $<))[] ='; \
-		sed 's/[\\"]/\\&/g; s/.*/"&\\n"/' $<; echo ';'; } | \
+		sed 's/[\\"?]/\\&/g; s/.*/"&\\n"/' $<; echo ';'; } | \
 		$(CC) $(cflags) $(CFLAGS) -x c -c -o $@ -
 
 # Another project's evaluator beside ours in incise bench: a shared object of its own,
@@ -163,7 +168,7 @@ deps: ## install the packages that building, testing and the demo need
 	@mk/deps build check demo
 
 # The second make sees the packages that the first step brought.
-demo: ## walk paper 1 on the virtual rig; pictures and summary in demo.out/
+demo: ## walk paper 1 on the virtual rig; results in demo.out/index.html
 	@mk/deps demo
 	+@$(MAKE) --no-print-directory all
 	$(O)/bin/incise demo -o $(DEMO) --overwrite

@@ -227,19 +227,20 @@ static struct assess_line line_of(const struct assessed *a,
 }
 #define LINES (INCISE_CRITERIA + METRICS)
 
-static const char *ended(const struct session *s)
-{
-	if (!strcmp(s->end.kind, "asked"))
-		return "ended as requested";
-	return !strcmp(s->end.kind, "fault") ? "ended by a fault" : "ended by a signal";
-}
-
-/* Reasons why a session may not be all that happened. */
+/* Reasons why a session may not be all that happened, or has no force. */
 static void put_doubts(FILE *out, const struct session *s, const char *before,
 		       const char *behind)
 {
 	if (!strcmp(s->end.kind, "fault"))
-		fprintf(out, "%s%s%s", before, s->end.why, behind);
+		fprintf(out, "%sended by a fault: %s%s", before, s->end.why, behind);
+	if (isnan(s->first_s))
+		fprintf(out, "%sno tool touched the tissue, so there was no force%s",
+			before, behind);
+	else if (!(s->force.largest_N > 0))
+		fprintf(out,
+			"%sno force, although a tool was in the tissue: 'incise haptic' "
+			"prints the reason at its end%s",
+			before, behind);
 	if (s->lost > 0)
 		fprintf(out,
 			"%s%.0f of %.0f ticks were lost; events in them are not "
@@ -289,13 +290,13 @@ static struct cut_text cut_text(const struct session_cut *cut)
 
 static void print_lines(const struct assessed *a, const struct assessed *reference)
 {
-	printf("\n%-34s %8s %-3s %-12s met", "", "value", "", "asked");
+	printf("\n%-34s %8s %-3s %-12s met", "", "value", "", "required");
 	printf(reference ? "  %10s %10s\n" : "\n", "reference", "difference");
 	for (int i = 0; i < LINES; i++) {
 		struct assess_line line = line_of(a, reference, i);
 
-		printf("%-34s %8s %-3s %-12s %-3s", line.label, line.value, line.unit,
-		       line.asked, line.met);
+		printf("%-34s %8s %-3s %-12s %*s", line.label, line.value, line.unit,
+		       line.asked, reference ? -3 : 0, line.met);
 		printf(reference ? "  %10s %10s\n" : "\n", line.reference,
 		       line.difference);
 	}
@@ -329,8 +330,7 @@ static void print_one(const struct assessed *a, const struct assessed *reference
 {
 	const struct session *s = a->session;
 
-	printf("%s: %s%s%s, %.1f s, %.0f ticks, %s", a->path, s->scene.path,
-	       *s->code ? ", code " : "", s->code, s->duration_s, s->ticks, ended(s));
+	printf("%s: %s%s%s", a->path, s->scene.path, *s->code ? ", code " : "", s->code);
 	put_doubts(stdout, s, "\n  ", "");
 	putchar('\n');
 	print_lines(a, reference);
@@ -351,9 +351,26 @@ static void cell_text(const struct assessed *a, int criterion, char *text, size_
 		snprintf(text + n, size - n, "!");
 }
 
+/* "3 of 4" sessions that do not meet a criterion, of those that are judged by it; how many. */
+static int count_failed(const struct assess_job *job, int criterion, char *text,
+			size_t size)
+{
+	int failed = 0, judged = 0;
+
+	for (int i = 0; i < job->n; i++) {
+		const struct session_verdict *verdict =
+			&job->session[i].verdict[criterion];
+
+		judged += verdict->judged;
+		failed += verdict->judged && !verdict->met;
+	}
+	snprintf(text, size, judged ? "%d of %d" : "-", failed, judged);
+	return failed;
+}
+
 static void print_table(const struct assess_job *job)
 {
-	int width = (int)strlen("session");
+	int width = (int)strlen("not met");
 	char text[40];
 
 	for (int i = 0; i < rows(job); i++)
@@ -374,7 +391,12 @@ static void print_table(const struct assess_job *job)
 		printf(" %2d of %d%s\n", a->met, a->judged,
 		       a == job->reference ? ", reference" : "");
 	}
-	puts("'!' marks a criterion that is not met.");
+	printf("%-*s %-16s", width, "not met", "");
+	for (int k = 0; k < INCISE_CRITERIA; k++) {
+		count_failed(job, k, text, sizeof(text));
+		printf(" %9s", text);
+	}
+	puts("\n'!' marks a criterion that is not met.");
 	for (int i = 0; i < rows(job); i++) {
 		char before[300];
 
@@ -539,6 +561,21 @@ static void draw_force(const struct session *s, const struct session *reference,
 
 /* --- the page -------------------------------------------------------------------------- */
 
+/* The last row of the class. */
+static json_t *failed_json(const struct assess_job *job)
+{
+	json_t *list = json_array();
+	char text[40];
+
+	for (int k = 0; k < INCISE_CRITERIA; k++) {
+		bool bad = count_failed(job, k, text, sizeof(text)) > 0;
+
+		json_array_append_new(list,
+				      json_pack("{ss sb}", "value", text, "bad", bad));
+	}
+	return list;
+}
+
 /* Values, and what was asked where it is not met. */
 static json_t *cells_json(const struct assessed *a)
 {
@@ -552,11 +589,12 @@ static json_t *cells_json(const struct assessed *a)
 		session_criterion_value(k, verdict->value, text, sizeof(text));
 		session_criterion_asked(k, &a->session->criteria[k], asked,
 					sizeof(asked));
-		json_array_append_new(list,
-				      json_pack("{so sb}", "value",
-						bad ? json_sprintf("%s (%s)", text, asked)
-						    : json_string(text),
-						"bad", bad));
+		json_array_append_new(
+			list,
+			json_pack("{so sb}", "value",
+				  bad ? json_sprintf("%s (should be %s)", text, asked)
+				      : json_string(text),
+				  "bad", bad));
 	}
 	return list;
 }
@@ -616,7 +654,7 @@ static json_t *phases_json(const struct session *s)
 	return list;
 }
 
-/* Its scene, its length, how it ended, and what may be wrong. */
+/* Its scene and code, and what may be wrong. */
 static json_t *about_json(const struct session *s)
 {
 	char *about = NULL;
@@ -626,8 +664,7 @@ static json_t *about_json(const struct session *s)
 
 	if (!line)
 		cli_fail("no memory");
-	fprintf(line, "%s%s%s, %.1f s, %.0f ticks, %s", s->scene.path,
-		*s->code ? ", code " : "", s->code, s->duration_s, s->ticks, ended(s));
+	fprintf(line, "%s%s%s", s->scene.path, *s->code ? ", code " : "", s->code);
 	put_doubts(line, s, "; ", "");
 	fputc('.', line);
 	fclose(line);
@@ -656,8 +693,8 @@ static json_t *shown_json(const struct assess_job *job, const struct assessed *a
 	const struct session *s = a->session;
 	const char *slash = strrchr(a->path, '/');
 
-	return json_pack("{so so sb so so so so so sb so so}", "file", json_text(a->path),
-			 "name", json_text(slash ? slash + 1 : a->path), "reference",
+	return json_pack("{so sb so so so so so sb so so}", "name",
+			 json_text(slash ? slash + 1 : a->path), "reference",
 			 a == job->reference, "code", json_text(s->code), "met",
 			 json_sprintf("%d of %d", a->met, a->judged), "cells",
 			 cells_json(a), "about", about_json(s), "lines",
@@ -692,8 +729,10 @@ static void write_page(const struct assess_job *job)
 						   *session_criterion_unit(k) ? ", " : "",
 						   session_criterion_unit(k)));
 	cli_progress_end();
-	page = json_pack("{ss so so sb}", "title", "Sessions", "heads", heads, "sessions",
-			 sessions, "compared", job->reference != NULL);
+	page = json_pack("{ss so so so sb}", "title", "Sessions", "heads", heads,
+			 "sessions", sessions, "failed",
+			 job->n > 1 ? failed_json(job) : json_null(), "compared",
+			 job->reference != NULL);
 	if (report_script("page", folder, page, out, &err))
 		cli_fail("%s: %s", job->page, err.text);
 	json_decref(page);

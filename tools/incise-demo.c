@@ -21,6 +21,7 @@
 #include "cli/file.h"
 #include "cli/json.h"
 #include "cli/plot.h"
+#include "cli/report_script.h"
 #include "cli/scene_argument.h"
 #include "demo/demo.h"
 
@@ -133,38 +134,44 @@ static void print_command(char *const *argv)
 }
 
 /* Run a command to its end. @out: descriptor of its output. */
-static int run_child(char *const *argv, int out, const char *folder,
+static int run_child(char *const *argv, int out, const struct demo *demo,
 		     struct incise_error *err)
 {
-	char **own = handed_on(argv);
+	struct memory_file said = memory_file_begin("warned");
+	char **own = handed_on(argv), line[1024];
 	int status;
 
 	own[0] = cli_text("%s/incise-%s", cli_folder(), argv[0]);
 	fflush(stdout);
-	status = child_run(own, STDIN_FILENO, out, STDERR_FILENO);
+	status = child_run(own, STDIN_FILENO, out,
+			   demo->silent ? fileno(said.file) : STDERR_FILENO);
 	if (status < 0)
 		cli_fail("%s: %s", own[0], strerror(errno));
 	/* However it ended. */
 	if (cli_stop)
-		demo_interrupted(folder);
+		demo_interrupted(demo->folder);
+	rewind(said.file);
+	while (status && fgets(line, sizeof(line), said.file))
+		fputs(line, stderr);
+	fclose(said.file);
 	if (!status)
 		return 0;
 	return incise_error_set(
 		err, ECANCELED,
 		"'incise %s' failed, see the line above; the folder %s holds "
 		"what was done until then",
-		argv[0], folder);
+		argv[0], demo->folder);
 }
 
 /* Run a command, and read the JSON that it prints; NULL with the error. */
-static json_t *read_report(char *const *argv, const char *folder,
+static json_t *read_report(char *const *argv, const struct demo *demo,
 			   struct incise_error *err)
 {
 	struct memory_file said = memory_file_begin("said");
 	json_error_t why = {.text = "no memory"};
 	json_t *report = NULL;
 
-	if (!run_child(argv, fileno(said.file), folder, err)) {
+	if (!run_child(argv, fileno(said.file), demo, err)) {
 		rewind(said.file);
 		report = json_loadf(said.file, 0, &why);
 		if (!report)
@@ -186,7 +193,7 @@ static json_t *run_command(const struct demo *demo, char *const *argv)
 
 	if (!demo->quiet)
 		print_command(argv);
-	return cli_require(read_report(argv, demo->folder, &err), &err);
+	return cli_require(read_report(argv, demo, &err), &err);
 }
 
 #define RUN(demo, ...) run_command(demo, (char *const[]){__VA_ARGS__, NULL})
@@ -214,9 +221,11 @@ static void write_scene(const struct demo *demo)
 
 /*
  * The check of one split says little: of the paper's, and of others of the same pairs. A list of mean
- * square errors, N².
+ * square errors, N²; @warnings counts those of all. They say that half of the pairs is little, and are
+ * not printed.
  */
-static json_t *other_splits(struct demo *demo, char *pairs, const json_t *first)
+static json_t *other_splits(struct demo *demo, char *pairs, const json_t *first,
+			    size_t *warnings)
 {
 	char *model = demo_path(demo, "split.fis"), *beside = cli_text("%s.sd", model);
 	json_t *errors = json_array();
@@ -226,7 +235,7 @@ static json_t *other_splits(struct demo *demo, char *pairs, const json_t *first)
 		char *seed = cli_text("%ld", demo->seed + i);
 		json_t *report = NULL;
 
-		demo->quiet = true;
+		demo->quiet = demo->silent = true;
 		if (i)
 			report = RUN(demo, "train", pairs, "-o", model, "--overwrite",
 				     "--search", "classic", "--check", "0.5", "--seed",
@@ -235,10 +244,13 @@ static json_t *other_splits(struct demo *demo, char *pairs, const json_t *first)
 			errors,
 			json_object_get(json_object_get(i ? report : first, "check"),
 					"mse_N2"));
+		*warnings +=
+			json_array_size(json_object_get(i ? report : first, "warnings"));
 		json_decref(report);
 		free(seed);
 	}
 	demo->quiet = quiet;
+	demo->silent = false;
 	unlink(model);
 	unlink(beside);
 	free(model);
@@ -271,6 +283,7 @@ static void walk(struct demo *demo, const char *loop_time)
 			      "hand_N_s_mm=" DAMPING,
 			      demo->seed + OTHER_LIVER);
 	char *duration = cli_text("%s", loop_time);
+	size_t warnings = 0;
 
 	print_step(demo,
 		   "Cut the virtual liver: 3, 4, 4 and 3 times at 5, 10, 15 and 20 mm");
@@ -289,6 +302,7 @@ static void walk(struct demo *demo, const char *loop_time)
 			    RUN(demo, "export", rec, "-o", by_cut, "--average",
 				BINS ",by-cut", "--json"));
 	print_step(demo, "Train on random halves as the paper does, then by unseen cuts");
+	demo->silent = true;
 	json_object_set_new(demo->summary, "train_random_halves",
 			    RUN(demo, "train", pairs, "-o", paper, "--search", "classic",
 				"--check", "0.5", "--seed", seed_text, "-o", history,
@@ -296,7 +310,10 @@ static void walk(struct demo *demo, const char *loop_time)
 	json_object_set_new(
 		demo->summary, "check_mse_N2_of_splits",
 		other_splits(demo, pairs,
-			     json_object_get(demo->summary, "train_random_halves")));
+			     json_object_get(demo->summary, "train_random_halves"),
+			     &warnings));
+	json_object_set_new(demo->summary, "warnings_of_splits",
+			    json_integer((json_int_t)warnings));
 	json_object_set_new(demo->summary, "train_unseen_cuts",
 			    RUN(demo, "train", by_cut, "-o", model, "--group", "cut",
 				"--check", "0.3", "--seed", seed_text, "--json"));
@@ -334,17 +351,18 @@ static void walk(struct demo *demo, const char *loop_time)
 /* Near the cut, from the side and above. */
 #define NEAR "18,40,150"
 
-static void run_view(char *const *argv, const char *folder)
+static void run_view(char *const *argv, const struct demo *demo)
 {
 	struct incise_error err = {0};
 
 	print_command(argv);
-	cli_check(run_child(argv, STDOUT_FILENO, folder, &err), &err);
+	cli_check(run_child(argv, STDOUT_FILENO, demo, &err), &err);
 }
 
 /* Leave NAME.mkv and NAME.png in the folder, by incise view. */
-static void film_scene(const char *scene, const char *folder)
+static void film_scene(const char *scene, const struct demo *demo)
 {
+	const char *folder = demo->folder;
 	char *name = scene_argument_name(scene);
 	char *film = cli_text("%s/%s.mkv", folder, name);
 	char *strip = cli_text("%s/%s.png", folder, name);
@@ -352,31 +370,52 @@ static void film_scene(const char *scene, const char *folder)
 	begin_folder(folder);
 	run_view((char *const[]){"view", (char *)scene, "--procedure", "-o", film,
 				 "--rate", "30", NULL},
-		 folder);
+		 demo);
 	run_view((char *const[]){"view", (char *)scene, "--procedure", "-o", strip,
 				 "--at", MOMENTS, "--size", "640x480", "--no-panel",
 				 "--viewpoint", NEAR, "--rate", "10", NULL},
-		 folder);
+		 demo);
 	end_folder(folder);
 	printf("\nwrote %s and %s\n", film, strip);
 	cli_finish();
 	free(name), free(film), free(strip);
 }
 
+/* The page of it all, index.html; false with a warning without jinja2. */
+static bool write_page(const struct demo *demo)
+{
+	json_t *data =
+		json_pack("{ss sO}", "title", "incise: a first walk on the simulated rig",
+			  "summary", demo->summary);
+	char *path = demo_path(demo, "index.html");
+	struct incise_error err = {0};
+	struct incise_outfile *file;
+	const bool can = !report_script("check", NULL, NULL, NULL, &err);
+	FILE *out;
+
+	if (can) {
+		out = whole_file_begin(path, &file);
+		if (report_script("demo", demo->folder, data, out, &err))
+			cli_fail("%s: %s", path, err.text);
+		whole_file_end(file);
+	} else {
+		cli_warn("%s is not made: %s", path, err.text);
+	}
+	json_decref(data);
+	free(path);
+	return can;
+}
+
 /* A loop that gave no force shows nothing: the demo fails, and says why. */
 static void require_force(const struct demo *demo)
 {
 	const json_t *loop = json_object_get(demo->summary, "haptic");
-	const double skipped = json_number_value(json_object_get(loop, "skipped")),
-		     stale = json_number_value(json_object_get(loop, "stale")),
-		     ticks = json_number_value(json_object_get(loop, "ticks"));
+	const char *why = json_string_value(json_object_get(loop, "no_force"));
 
-	if (!(json_number_value(json_object_get(loop, "force_max_N")) > 0))
-		cli_fail(
-			"the haptic loop gave no force: of %.0f ticks %.0f were skipped and "
-			"%.0f had no new pose; run the demo again with --duration 6s or more, "
-			"when less else runs",
-			ticks + skipped, skipped, stale);
+	if (why)
+		cli_fail("the haptic loop gave no force: %s; run the demo again with "
+			 "--duration 6s or more, when less else runs",
+			 why);
 }
 
 int main(int argc, char **argv)
@@ -385,6 +424,7 @@ int main(int argc, char **argv)
 				       .loop_time = "10s"};
 	struct demo *demo = &options.demo;
 	struct incise_model *model;
+	bool page;
 	char *plot;
 	int64_t begin_ns;
 	double seconds;
@@ -396,7 +436,7 @@ int main(int argc, char **argv)
 		cli_usage("--scene makes pictures, and has nothing to say as JSON");
 	cli_catch_signals();
 	if (options.scene) {
-		film_scene(options.scene, demo->folder);
+		film_scene(options.scene, demo);
 		return 0;
 	}
 	plot_require();
@@ -416,6 +456,7 @@ int main(int argc, char **argv)
 	seconds = (double)(cli_now_ns() - begin_ns) * 1e-9;
 	json_set_number(demo->summary, "seconds", seconds);
 	demo_summary_save(demo, seconds);
+	page = write_page(demo);
 	end_folder(demo->folder);
 	if (demo->quiet) {
 		json_print(json_incref(demo->summary));
@@ -425,6 +466,8 @@ int main(int argc, char **argv)
 		printf("results in         %s: summary.json, plots (*.png, *.svg), "
 		       "data, models\n",
 		       demo->folder);
+		if (page)
+			printf("open %s/index.html\n", demo->folder);
 	}
 	cli_finish();
 	require_force(demo);

@@ -215,7 +215,8 @@ static void check_modules(struct doctor *doctor)
 	features_each(count_module, &n);
 	add(doctor, "modules", "loadable", n ? OK : WARNING,
 	    "make && sudo make install    # or the package libincise2",
-	    "%d modules of devices and file formats", n);
+	    "%d modules of devices and file formats%s", n,
+	    *features_left_out ? "" : "; the build left none out");
 	features_each(add_module, doctor);
 	if (*features_left_out)
 		add(doctor, "modules", "left out", OK, NULL,
@@ -411,6 +412,10 @@ static void check_device(struct doctor *doctor, const char *rig, const char *nam
 		    err.code == EACCES
 			    ? "sudo usermod -aG incise $USER    # takes effect at "
 			      "the next login"
+		    : strstr(err.text, "/etc/incise/stepper.conf")
+			    ? "sudo cp /usr/share/incise/stepper.conf.example "
+			      "/etc/incise/stepper.conf    # edit it, then sudo systemctl "
+			      "enable --now incise-stepper"
 			    : "incise info devices    # lists what is attached",
 		    "%s", err.text);
 	incise_rig_close(open);

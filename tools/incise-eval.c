@@ -60,17 +60,25 @@ struct evaluator {
 	int n_inputs;
 	struct incise_variable input[INCISE_MODEL_INPUTS_MAX];
 	const char *output;
-	unsigned long outside; /* of the support */
-	unsigned long unfired; /* inside, where no rule fires */
-	json_t *rows;	       /* NULL: text */
-	bool parts;	       /* of the uncertainty */
+	unsigned long outside;	   /* of the support */
+	unsigned long line, first; /* of the file; of the first point outside, 0: none */
+	unsigned long unfired;	   /* inside, where no rule fires */
+	json_t *rows;		   /* NULL: text */
+	bool parts;		   /* of the uncertainty */
 };
 
 /* Parts of the standard deviation, in the order in which they are printed, and that of the mean. */
 #define SD_PARTS 4
 static const char *const part_names[SD_PARTS] = {"data", "model", "calibration", "mean"};
 
-static void find_parts(const struct evaluator *e, const double *x, double parts[SD_PARTS])
+/* The standard deviation and its parts are NaN outside the data, where nothing bounds the error. */
+static double find_sd(const struct evaluator *e, const double *x, bool outside)
+{
+	return outside ? NAN : incise_uncertainty_sd(e->uncertainty, e->model, x);
+}
+
+static void find_parts(const struct evaluator *e, const double *x, bool outside,
+		       double parts[SD_PARTS])
 {
 	struct incise_uncertainty_parts all;
 
@@ -80,6 +88,8 @@ static void find_parts(const struct evaluator *e, const double *x, double parts[
 	/* The rigs that trained, and the rig that measures. */
 	parts[2] = hypot(all.calibration, all.rig);
 	parts[3] = all.mean;
+	for (int i = 0; i < SD_PARTS && outside; i++)
+		parts[i] = NAN;
 }
 
 static void add_eval_row(struct evaluator *e, const double *x, double y, bool outside)
@@ -94,11 +104,9 @@ static void add_eval_row(struct evaluator *e, const double *x, double y, bool ou
 		json_object_set_new(row, e->input[i].name, json_number(x[i]));
 	json_object_set_new(row, e->output, json_number(y));
 	if (e->uncertainty)
-		json_object_set_new(
-			row, key,
-			json_number(incise_uncertainty_sd(e->uncertainty, e->model, x)));
+		json_object_set_new(row, key, json_number(find_sd(e, x, outside)));
 	if (e->parts)
-		find_parts(e, x, parts);
+		find_parts(e, x, outside, parts);
 	for (int i = 0; e->parts && i < SD_PARTS; i++) {
 		snprintf(key, sizeof(key), "sd_%s%s", part_names[i], unit ? unit : "");
 		json_set_number(row, key, parts[i]);
@@ -116,6 +124,8 @@ static void evaluate(struct evaluator *e, const double *x, size_t outside, bool 
 	y = e->model ? incise_model_eval(e->model, x, &flags) : 0;
 	if (e->fixed)
 		y = incise_fixed_eval_double(e->fixed, x);
+	if (outside && !e->first)
+		e->first = e->line;
 	e->outside += outside;
 	e->unfired += !outside && flags & INCISE_MODEL_EXTRAPOLATED;
 	outside |= flags & INCISE_MODEL_EXTRAPOLATED;
@@ -127,9 +137,9 @@ static void evaluate(struct evaluator *e, const double *x, size_t outside, bool 
 		printf("%.10g ", x[i]);
 	printf("%.10g", y);
 	if (e->uncertainty)
-		printf(" %.10g", incise_uncertainty_sd(e->uncertainty, e->model, x));
+		printf(" %.10g", find_sd(e, x, outside));
 	if (e->parts)
-		find_parts(e, x, parts);
+		find_parts(e, x, outside, parts);
 	for (int i = 0; e->parts && i < SD_PARTS; i++)
 		printf(" %.10g", parts[i]);
 	putchar('\n');
@@ -279,7 +289,6 @@ static void eval_file(struct evaluator *e, const char *path)
 	double x[INCISE_MODEL_INPUTS_MAX];
 	struct incise_error err = {0};
 	struct incise_infile *in;
-	unsigned long line = 0;
 	size_t outside;
 	char *text;
 	int rc;
@@ -287,14 +296,14 @@ static void eval_file(struct evaluator *e, const char *path)
 	file_expect(path, FILE_TABLE | FILE_SEMICOLONS | FILE_TABS);
 	in = cli_require(incise_infile_open(path, &points, &err), &err);
 	while ((rc = incise_infile_line(in, &text, &err)) > 0) {
-		line++;
+		e->line++;
 		for (size_t n = strlen(text); n && text[n - 1] == '\r';)
 			text[--n] = 0;
 		if (!text[strspn(text, " \t")] || *text == '#')
 			continue;
-		parse_line(e, name, line, text, x);
+		parse_line(e, name, e->line, text, x);
 		if (incise_inputs_check(e->input, e->n_inputs, x, 1, &outside, &err))
-			cli_fail("%s:%lu: %s", name, line, err.text);
+			cli_fail("%s:%lu: %s", name, e->line, err.text);
 		evaluate(e, x, outside, false);
 	}
 	cli_check(rc, &err);
@@ -327,8 +336,9 @@ static void warn_outside(const struct evaluator *e, bool no_clamp)
 		n += snprintf(support + n, sizeof(support) - (size_t)n,
 			      "%s%.40s %.4g to %.4g", i ? ", " : "", e->input[i].name,
 			      e->input[i].min, e->input[i].max);
-	cli_warn("%s out of the training range (%s): %s", cli_count(e->outside, "input"),
-		 support, no_clamp ? "extrapolated" : "clamped to it");
+	cli_warn("%s out of the training range (%s): %s; the first is in line %lu",
+		 cli_count(e->outside, "input"), support,
+		 no_clamp ? "extrapolated" : "clamped to it", e->first);
 }
 
 int main(int argc, char **argv)

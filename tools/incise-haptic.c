@@ -80,7 +80,8 @@ static const struct cli_command command = {
 	.notes =
 		"SCENE is a file, or a name such as liver: ./liver.scene, else the one in "
 		"/etc/incise/scenes, else the installed one.",
-	.examples = "incise haptic scenes/liver.scene --rig sim: --duration 10s",
+	.more = scene_argument_installed,
+	.examples = "incise haptic liver --rig sim: --duration 10s",
 	.success = "ended as requested",
 };
 
@@ -138,8 +139,11 @@ static void parse_haptic(struct haptic_job *job, int argc, char **argv)
 		cli_be_verbose();
 	scene_argument_operand(&job->haptic.argument, argc, argv, optind);
 	if (job->scripted && (job->rig || job->haptic.tool != INCISE_TOOL_AUTO))
-		cli_usage("--procedure has its own rig and tools: leave out %s",
-			  job->rig ? "--rig" : "--tool");
+		cli_usage(
+			"--procedure has its own rig and tools: leave out %s; for another "
+			"hand leave out --procedure: section 4 of the page that 'incise "
+			"help lesson' names",
+			job->rig ? "--rig" : "--tool");
 	if (job->scripted && !job->duration)
 		job->duration = PROCEDURE_S;
 	if (job->in_kernel)

@@ -27,6 +27,7 @@
 #include "cli/plan_report.h"
 #include "cli/proof_report.h"
 #include "cli/recording.h"
+#include "cli/scene_argument.h"
 #include "cli/stream_report.h"
 #include "cli/texture_report.h"
 #include "cli/wall_report.h"
@@ -811,10 +812,10 @@ static void check_exists(const char *path)
 
 	if (strcmp(path, "-") && stat(path, &st))
 		cli_fail(
-			"%s: %s; give a model (.fis, .fx), a texture (.tex), a compiled "
-			"scene (.plan), a recording (NAME.rec), stepper, devices or a bus such as "
-			"can:can0",
-			path, strerror(errno));
+			"%s: %s; give a scene or its name, a model (.fis, .fx), a texture (.tex), "
+			"a compiled scene (.plan), a recording (NAME.rec), rig, stepper, devices or "
+			"a bus such as can:can0; %s",
+			path, strerror(errno), scene_argument_installed());
 }
 
 /* A factor, which incise merge makes models of. */

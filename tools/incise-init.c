@@ -21,6 +21,7 @@
 #include "cli/calibration.h"
 #include "cli/child.h"
 #include "cli/cli.h"
+#include "cli/json.h"
 
 #define RIG "rig.conf"
 #define CALIBRATION "calibration.conf"
@@ -58,7 +59,9 @@ struct init {
 	const char *folder, *device[DEVICES];
 	double mechanic[MECHANICS]; /* 0: asked for */
 	enum preset { UNSET, SIM, PAPER, HAPLY } preset;
-	bool yes, no_calibration;
+	bool yes, no_calibration, json;
+	FILE *out; /* of all text: with --json standard error */
+	json_t *calibrations, *next;
 };
 
 /* Devices that are not asked for: "" for none. NULL: asked for. */
@@ -122,6 +125,8 @@ static const struct cli_option options[] = {
 	 CLI_FLAG(struct init, no_calibration)},
 	{'y', "yes", NULL, "take the default of each question; calibrate a simulated rig",
 	 CLI_FLAG(struct init, yes)},
+	{0, "json", NULL, "report as JSON; all else goes to standard error",
+	 CLI_FLAG(struct init, json)},
 	{0}};
 
 static const struct cli_command command = {
@@ -147,17 +152,12 @@ static bool on_terminal(void)
 /* An answer, or the default for an empty one and with --yes. */
 static char *ask_for(const struct init *init, const char *question, const char *usual)
 {
-	char line[300] = "\n", *end;
+	char line[300] = "", *text = cli_text("%s [%s] ", question, usual);
 
-	if (!init->yes) {
-		fprintf(stderr, "%s [%s] ", question, usual);
-		if (!fgets(line, sizeof(line), stdin) || cli_stop)
-			cli_fail(
-				"stopped; nothing more was written, and 'incise init' goes "
-				"on here");
-	}
-	end = line + strcspn(line, "\n");
-	*end = '\0';
+	if (!init->yes && !cli_ask(text, line, sizeof(line)))
+		cli_fail(
+			"stopped; nothing more was written, and 'incise init' goes on here");
+	free(text);
 	return cli_text("%s", *line ? line : usual);
 }
 
@@ -247,7 +247,7 @@ static void put_device(FILE *draft, const char *key, const char *spec)
 static void put_draft(const struct init *init, FILE *draft)
 {
 	enum preset preset = choose_preset(init);
-	bool stepper = false;
+	bool stepper = false, any = false;
 
 	fprintf(draft, "clock = \"%s\";\n", presets[preset].clock);
 	for (int i = 0; i < DEVICES; i++) {
@@ -259,10 +259,19 @@ static void put_draft(const struct init *init, FILE *draft)
 
 		if (*spec && strcmp(spec, "none")) {
 			put_device(draft, devices[i].key, spec);
+			any = true;
 			stepper |= i == STEPPER && strncmp(spec, "sim:", 4);
+		} else if (init->yes && *spec && !init->device[i]) {
+			fprintf(init->out, "%s: none is attached; name it in %s later\n",
+				devices[i].key, RIG);
 		}
 		free(usual), free(spec);
 	}
+	if (!any)
+		cli_fail(
+			"%s: the rig has no device, as none is attached; name what will be, "
+			"for example --tracker tty:/dev/ttyUSB0, or give --preset sim",
+			RIG);
 	if (stepper)
 		fputs("actuator = {\n", draft);
 	for (int i = 0; i < MECHANICS && stepper; i++) {
@@ -328,7 +337,7 @@ static void write_rig(const struct init *init)
 		cli_fail("%s: %s", RIG, strerror(code));
 	}
 	free(text);
-	printf("wrote %s\n", RIG);
+	fprintf(init->out, "wrote %s\n", RIG);
 }
 
 /* --- calibrations ------------------------------------------------------------------------ */
@@ -354,7 +363,8 @@ static bool has_passed(const char *kind)
 #define WORDS_MAX 16
 
 /* Run it in the foreground. Returns whether it passed. */
-static bool run_calibration(const struct calibration *c, const char *given)
+static bool run_calibration(const struct init *init, const struct calibration *c,
+			    const char *given)
 {
 	char *program = cli_text("%s/incise-calibrate-%s", cli_folder(), c->kind);
 	char *words = cli_text("%s", given), *argv[WORDS_MAX] = {program}, *rest = NULL;
@@ -365,43 +375,36 @@ static bool run_calibration(const struct calibration *c, const char *given)
 		argv[n++] = word;
 	argv[n++] = "-c";
 	argv[n++] = CALIBRATION;
-	fflush(stdout);
-	status = child_run(argv, STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO);
+	fflush(init->out);
+	status = child_run(argv, STDIN_FILENO, fileno(init->out), STDERR_FILENO);
 	if (status < 0)
 		cli_fail("%s: %s", program, strerror(errno));
 	free(words), free(program);
 	return WIFEXITED(status) && !WEXITSTATUS(status);
 }
 
-/* Lead through one; returns false where it is left for later. */
+/* Lead through one, which is the command @line; returns false where it is left for later. */
 static bool calibrate(const struct init *init, const struct calibration *c,
-		      bool simulated)
+		      bool simulated, const char *line)
 {
 	const char *given = simulated ? c->simulated : c->real;
-	char *line =
-		cli_text("incise calibrate %s%s%s", c->kind, given && *given ? " " : "",
-			 given ? given : " --point X,Y,Z …");
 	char *answer;
-	bool go, passed;
+	bool go;
 
-	printf("\n%s: %s\n", c->kind, c->what);
+	fprintf(init->out, "\n%s: %s\n", c->kind, c->what);
 	if (!simulated)
-		printf("  %s\n", c->posture);
-	printf("  %s\n", line);
-	fflush(stdout);
-	free(line);
+		fprintf(init->out, "  %s\n", c->posture);
+	fprintf(init->out, "  %s\n", line);
+	fflush(init->out);
 	if (!given || (init->yes && !simulated))
 		return false;
 	answer = ask_for(init, "Run it now: yes, later?", "yes");
 	go = *answer == 'y';
 	free(answer);
-	if (!go)
-		return false;
-	passed = run_calibration(c, given);
-	if (cli_stop || !passed)
+	if (go && (!run_calibration(init, c, given) || cli_stop))
 		cli_fail("calibrate %s %s; 'incise init' goes on here", c->kind,
 			 cli_stop ? "was stopped" : "did not pass");
-	return true;
+	return go;
 }
 
 /* Returns the number of those that are left. */
@@ -411,13 +414,25 @@ static int calibrate_all(const struct init *init, unsigned int has)
 
 	for (int i = 0; i < CALIBRATIONS; i++) {
 		const struct calibration *c = &calibrations[i];
+		bool simulated = has & CALIBRATION_SIMULATED, passed;
+		const char *given = simulated ? c->simulated : c->real;
+		char *line;
 
 		if (!calibration_needed(c->kind, has))
 			continue;
-		if (has_passed(c->kind))
-			printf("%s: passed\n", c->kind);
-		else
-			left += !calibrate(init, c, has & CALIBRATION_SIMULATED);
+		line = cli_text("incise calibrate %s%s%s", c->kind,
+				given && *given ? " " : "",
+				given ? given : " --point X,Y,Z …");
+		passed = has_passed(c->kind);
+		if (passed)
+			fprintf(init->out, "%s: passed\n", c->kind);
+		else if (!init->no_calibration)
+			passed = calibrate(init, c, simulated, line);
+		left += !passed;
+		json_array_append_new(init->calibrations,
+				      json_pack("{ss ss sb}", "kind", c->kind, "command",
+						line, "passed", passed));
+		free(line);
 	}
 	return left;
 }
@@ -449,17 +464,49 @@ static void check_init(const struct init *init)
 			RIG);
 }
 
+/* A command to type next, and what it is for or "". */
+static void put_next(const struct init *init, const char *line, const char *what)
+{
+	json_array_append_new(init->next, json_string(line));
+	fprintf(init->out, "  %s%s%s\n", line, *what ? "    # " : "", what);
+}
+
+static void name_next(const struct init *init, unsigned int has, int left)
+{
+	char *enter = cli_text("cd %s", init->folder ? init->folder : ""),
+	     *what = cli_text("%s left", cli_count(left, "calibration"));
+
+	fputs("\nNext:\n", init->out);
+	if (init->folder)
+		put_next(init, enter, "");
+	if (left)
+		put_next(init, "incise init", what);
+	put_next(init, "incise doctor", "what this machine still lacks");
+	if (has & INCISE_RIG_TRACKER && has & INCISE_RIG_FORCE) {
+		put_next(init, "incise capture -o first.rec", "");
+		put_next(init, "incise train first.rec", "");
+		put_next(init, "incise haptic liver --model first.fis --duration 10s",
+			 "");
+	} else {
+		put_next(init, "incise haptic liver", "");
+	}
+	free(enter), free(what);
+}
+
 int main(int argc, char **argv)
 {
 	static struct init init;
 	unsigned int has;
 	struct incise_error err = {0};
-	int left = 0;
+	bool there;
 
 	cli_parse(&command, argc, argv, &init);
 	if (argc - optind > 1)
 		cli_usage("%s: give one folder", argv[optind + 1]);
 	init.folder = argv[optind];
+	init.out = init.json ? stderr : stdout;
+	init.calibrations = json_array();
+	init.next = json_array();
 	if (!init.yes && !on_terminal())
 		cli_fail(
 			"there is no terminal for its questions; give --yes, and --preset or "
@@ -467,26 +514,17 @@ int main(int argc, char **argv)
 	cli_catch_signals();
 	enter_folder(&init);
 	check_init(&init);
-	if (access(RIG, F_OK))
-		write_rig(&init);
+	there = !access(RIG, F_OK);
+	if (there)
+		fprintf(init.out, "%s is there\n", RIG);
 	else
-		printf("%s is there\n", RIG);
+		write_rig(&init);
 	has = calibration_devices(RIG, &err);
 	cli_check(!has, &err);
-	if (!init.no_calibration)
-		left = calibrate_all(&init, has);
-	puts("\nNext:");
-	if (init.folder)
-		printf("  cd %s\n", init.folder);
-	if (left)
-		printf("  incise init    # %s left\n", cli_count(left, "calibration"));
-	puts("  incise doctor    # what this machine still lacks");
-	if (has & INCISE_RIG_TRACKER && has & INCISE_RIG_FORCE)
-		puts("  incise capture -o first.rec\n"
-		     "  incise train first.rec\n"
-		     "  incise haptic liver --model first.fis --duration 10s");
-	else
-		puts("  incise haptic liver");
+	name_next(&init, has, calibrate_all(&init, has));
+	if (init.json)
+		json_print(json_pack("{sb so so}", "written", !there, "calibrations",
+				     init.calibrations, "next", init.next));
 	cli_finish();
 	return 0;
 }

@@ -99,8 +99,10 @@ static void print_merge_report(const struct merge_options *options,
 		printf("%d of %d parts: the factors have small ones joined\n",
 		       info->parts, INCISE_FACTOR_FOLDS);
 	if (!isnan(report->train_rmse))
-		printf("RMSE %.5g, R² %.5g, ridge %g\n", report->train_rmse,
-		       report->train_r2, report->ridge);
+		printf("RMSE %.5g, of the mean %.5g, R² %.5g, ridge %g\n",
+		       report->train_rmse,
+		       report->train_rmse / sqrt(1 - report->train_r2), report->train_r2,
+		       report->ridge);
 	if (!isnan(report->crossval_rmse))
 		printf("RMSE of parts that were held out %.5g\n", report->crossval_rmse);
 	cli_written();

@@ -8,6 +8,7 @@
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 #include <incise/plan.h>
 #include "plan/tick_cost.h"
 #include "cli/cli.h"
@@ -466,7 +467,9 @@ static void report_plan_text(const struct plan_job *job, const struct incise_pla
 	if (*size)
 		printf("surface     %s\n", size);
 	printf("devices     %s; not touched: %s\n",
-	       !job->rig		? "none without --rig"
+	       !job->rig && !access("rig.conf", F_OK)
+		       ? "none: --rig rig.conf takes the rig of this folder"
+	       : !job->rig		? "none without --rig"
 	       : incise_rig_haptic(rig) ? "haptic"
 					: "tracker, stepper",
 	       job->rig ? "force, camera" : "tracker, stepper, force, camera");
@@ -489,6 +492,7 @@ static void report_plan_text(const struct plan_job *job, const struct incise_pla
 	print_stability(job, plan);
 	if (rig)
 		print_axes(rig, &stability);
+	printf("accepted    %s\n", job->scene.path);
 }
 
 /* Only watch the actuator if it can be watched: a loop may run on it. */

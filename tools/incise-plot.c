@@ -9,12 +9,14 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <incise/outfile.h>
 #include "cli/cli.h"
 #include "cli/file_kind.h"
 #include "cli/folder.h"
 #include "cli/plot.h"
 #include "origin/origins.h"
 #include "plot/figure.h"
+#include "web/web.h"
 
 struct plot_job {
 	struct figure figure;
@@ -33,8 +35,9 @@ static void parse_part(void *whole, char *text)
 
 static const struct cli_option options[] = {
 	{'o', "output", "FILE",
-	 "the file to write: NAME.png, .svg or .pdf (default: a window)",
-	 CLI_OUTPUT(struct plot_job, output), .extensions = ".png .svg .pdf"},
+	 "the file to write: NAME.png, .svg or .pdf; of a recording, a session or a .fis also NAME.html, "
+	 "a page for a browser, with zoom and without a network (default: a window)",
+	 CLI_OUTPUT(struct plot_job, output), .extensions = ".png .svg .pdf .html"},
 	{0, "range", "TIME..TIME",
 	 "of a recording: the part to draw, such as 2s..4.5s, 90s.. or ..1min; "
 	 "from its first force sample (default: all)",
@@ -108,8 +111,8 @@ static const char *form_of(const char *output)
 	for (size_t i = 0; i < sizeof(forms) / sizeof(*forms) && dot; i++)
 		if (!strcmp(dot + 1, forms[i]))
 			return forms[i];
-	cli_usage("-o: '%s' has no extension of a figure; give NAME.png, NAME.svg or "
-		  "NAME.pdf",
+	cli_usage("-o: '%s' has no extension of a figure; give NAME.png, NAME.svg, "
+		  "NAME.pdf or NAME.html",
 		  output);
 }
 
@@ -127,6 +130,34 @@ static const char *window_form(void)
 			"this gnuplot opens no windows; give -o NAME.png, .svg or .pdf, or "
 			"apt-get install gnuplot-qt");
 	return form;
+}
+
+/* The viewer with what it shows, in one file. */
+static void write_page(const struct plot_job *job, const struct drawn *kind)
+{
+	struct incise_error err = {0};
+	struct incise_outfile *out;
+	struct web_file *file;
+	size_t size;
+	char *page;
+
+	if (!(kind->kind & (FILE_RECORDING | FILE_SESSION | FILE_MODEL)))
+		cli_usage(
+			"-o: a page is for a recording, a session or a .fis, and %s is none; "
+			"give NAME.png, NAME.svg or NAME.pdf",
+			job->figure.path);
+	if (job->range || job->figure.data)
+		cli_usage("--%s: a page shows all; leave it out",
+			  job->range ? "range" : "data");
+	file = web_open(job->figure.path);
+	page = web_page(file, &size, &err);
+	if (!page)
+		cli_fail_with(&err);
+	out = cli_require(incise_outfile_open(job->output, &err), &err);
+	fwrite(page, 1, size, incise_outfile_stream(out));
+	cli_check(incise_outfile_commit(out, &err), &err);
+	web_close(file);
+	free(page);
 }
 
 static void parse_plot(struct plot_job *job, int argc, char **argv)
@@ -151,8 +182,17 @@ int main(int argc, char **argv)
 	FILE *script;
 
 	parse_plot(&job, argc, argv);
-	form = job.output ? form_of(job.output) : NULL;
+	form = !job.output			       ? NULL
+	       : cli_extension_in(job.output, ".html") ? "html"
+						       : form_of(job.output);
 	kind = find_drawn(job.figure.path);
+	if (form && !strcmp(form, "html")) {
+		cli_catch_signals();
+		write_page(&job, kind);
+		cli_written();
+		cli_finish();
+		return 0;
+	}
 	if (job.figure.data && !(kind->kind & MODELS))
 		cli_usage("--data is for a model, and %s is none", job.figure.path);
 	if (job.range && kind->kind != FILE_RECORDING)

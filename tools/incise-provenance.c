@@ -8,6 +8,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 #include <incise/factor.h>
+#include <incise/model.h>
 #include <incise/origin.h>
 #include <incise/recalibration.h>
 #include <incise/recording.h>
@@ -194,6 +195,23 @@ static void compare_calibration(struct step *step, const struct step *recording)
 	compare_file(step, path);
 }
 
+/* The command that trained a model, by its notes: free(3). NULL: none is noted. */
+static char *find_command(const char *path)
+{
+	static const char key[] = "options: --";
+	char *notes =
+		file_kind_of(path) == FILE_MODEL ? incise_model_notes(path, NULL) : NULL;
+	char *at = notes ? strstr(notes, key) : NULL, *command = NULL;
+
+	if (at) {
+		at[strcspn(at, "\n")] = 0;
+		control_characters_hide(at);
+		command = cli_text("incise train … --%s", at + strlen(key));
+	}
+	free(notes);
+	return command;
+}
+
 /* --- report ------------------------------------------------------------------------------- */
 
 static void print_step(struct step *step)
@@ -252,10 +270,12 @@ static json_t *step_json(const struct step *step)
 static void report_provenance(const struct provenance_job *job, const char *path,
 			      struct step *steps, int n, bool cut)
 {
+	char *command = find_command(path);
 	json_t *list = json_array();
 
 	if (!job->json)
-		printf("%s was made of\n", path);
+		printf("%s was made%s%s of\n", path, command ? " by " : "",
+		       command ? command : "");
 	for (int i = 0; i < n; i++)
 		if (job->json)
 			json_array_append_new(list, step_json(&steps[i]));
@@ -265,10 +285,12 @@ static void report_provenance(const struct provenance_job *job, const char *path
 		cli_warn("%s: names more than %d files; the others are left out", path,
 			 INCISE_ORIGINS_MAX);
 	if (job->json)
-		json_print(json_pack("{so so sb}", "path", json_text(path), "origins",
-				     list, "cut", cut));
+		json_print(json_pack("{so so sb so}", "path", json_text(path), "origins",
+				     list, "cut", cut, "command",
+				     command ? json_text(command) : json_null()));
 	else
 		json_decref(list);
+	free(command);
 }
 
 /* --- the command -------------------------------------------------------------------------- */
@@ -292,10 +314,21 @@ _Noreturn static void fail_without(const char *path)
 		cli_fail("%s: says nothing of its origin; 'incise export' without "
 			 "--no-lineage writes it into a CSV",
 			 path);
+	case FILE_MODEL:
+		cli_fail(
+			"%s: says nothing of its origin: Python's incise.train() of a table, "
+			"another program or an older incise made it; train it from files",
+			path);
+	case FILE_SESSION:
+		cli_fail(
+			"%s: a session has its origin in keys source and scene; 'incise assess "
+			"%s' reports on it",
+			path, path);
 	default:
-		cli_fail("%s: says nothing of its origin: another program or an older "
-			 "incise made it",
-			 path);
+		cli_fail(
+			"%s: says nothing of its origin: it is a page of sessions, or another "
+			"program or an older incise made it",
+			path);
 	}
 }
 

@@ -100,6 +100,11 @@ int main(int argc, char **argv)
 		       (double)(info.end_ns - info.start_ns) * 1e-9);
 	if (converted && !job.json)
 		print_conversion(path, job.output, &made);
+	if (!info.complete && !job.json)
+		printf("%s: all that was committed; its end is missing, so 'incise verify' "
+		       "still says 'interrupted' and exits with 1: key intact of its --json "
+		       "is true if the rest is as it was written\n",
+		       job.output);
 	if (!job.json)
 		cli_written();
 	cli_finish();

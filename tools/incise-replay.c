@@ -152,6 +152,7 @@ struct sink {
 	bool bar;  /* false: it would run through rows on the same terminal */
 	struct cli_bar progress;
 	const char *name;
+	double normal_max_N;
 	struct plot plot;
 };
 
@@ -161,6 +162,7 @@ static int put_tick(void *context, const struct incise_replay_tick *tick,
 	char flags[INCISE_TICK_FLAGS + 1];
 	struct sink *sink = context;
 
+	sink->normal_max_N = fmax(sink->normal_max_N, fabs(tick->predicted_N));
 	if (sink->bar)
 		cli_progress_bar(sink->name, tick->done, &sink->progress);
 	if (sink->plot.data)
@@ -242,8 +244,9 @@ static void held_line(const struct incise_loop_stats *stats,
 		putchar('\n');
 }
 
-static void report_replay_text(const struct replay_job *job, double rate_hz,
-			       const struct incise_loop_stats *stats,
+static void report_replay_text(const struct replay_job *job,
+			       const struct incise_scene *scene, double normal_max_N,
+			       double rate_hz, const struct incise_loop_stats *stats,
 			       const struct incise_replay_report *r)
 {
 	printf("%s: %.1f s, %s at %g Hz, %s, %s\n", job->recording, r->seconds,
@@ -258,14 +261,16 @@ static void report_replay_text(const struct replay_job *job, double rate_hz,
 	} else {
 		printf("predicted  no cut in this recording: nothing to compare\n");
 	}
-	printf("force      largest %.3f N, %llu ticks in contact, %llu outside the model's "
-	       "support\n",
+	printf("force      largest %.3f N%s, along the normal %.3f N, %llu ticks in contact, "
+	       "%llu outside the model's support\n",
 	       stats->force_max_N,
+	       stats->flagged[__builtin_ctz(INCISE_TICK_CLAMPED)] ? " (limit)" : "",
+	       normal_max_N,
 	       (unsigned long long)stats->flagged[__builtin_ctz(INCISE_TICK_CONTACT)],
 	       (unsigned long long)
 		       stats->flagged[__builtin_ctz(INCISE_TICK_EXTRAPOLATED)]);
 	held_line(stats, r);
-	loop_texture_line(stats);
+	loop_texture_line(stats, scene);
 	if (job->how.real_time) {
 		loop_lateness_line(stats);
 		printf("late       %llu ticks by a period or more\n",
@@ -325,7 +330,8 @@ int main(int argc, char **argv)
 	if (job.json) {
 		report_replay_json(&job, rate_hz, &stats, &report);
 	} else if (sink.bar) {
-		report_replay_text(&job, rate_hz, &stats, &report);
+		report_replay_text(&job, scene, sink.normal_max_N, rate_hz, &stats,
+				   &report);
 		cli_written();
 	}
 	cli_finish();

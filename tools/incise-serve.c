@@ -28,6 +28,7 @@ struct serve_job {
 	const char *rig, *calibration;
 	struct serve_outlets_options lsl, ros2;
 	struct serve_igtl_options igtl;
+	struct serve_http_options http;
 	struct serve_source_options source;
 	enum camera camera;
 	double duration_s;
@@ -53,10 +54,22 @@ static const struct cli_option options[] = {
 	 CLI_INPUT(struct serve_job, rig)},
 	CALIBRATION_OPTION(struct serve_job, calibration),
 	{0, "igtl", "[ADDR:]PORT[/VERSION]",
-	 "serve OpenIGTLink there (default: 127.0.0.1:18944); without ADDR to this "
-	 "machine only; there is no authentication; headers of version 1 or 2 "
+	 "serve OpenIGTLink there (default: 127.0.0.1:18944, with --http none); without ADDR to "
+	 "this machine only; there is no authentication; headers of version 1 or 2 "
 	 "(default: 1 until a client sends 2)",
 	 CLI_PARSED(struct serve_job, igtl, parse_igtl)},
+	{0, "http", "[ADDR:]PORT",
+	 "serve a page for browsers there: live, or of a recording, a session or a .fis the viewer; "
+	 "without ADDR to this machine only; its address with a token is printed on the terminal",
+	 CLI_TEXT(struct serve_job, http.address)},
+	{0, "url", "FILE",
+	 "of --http: write the page's address, a secret, into this file; over one that is there, with "
+	 "--overwrite, its tokens stay, so that open pages come back",
+	 CLI_OUTPUT(struct serve_job, http.url)},
+	{0, "control", NULL,
+	 "of --http: a second token lets a page start and stop a capture, mark an event and set the "
+	 "tool; a page never enables a force",
+	 CLI_FLAG(struct serve_job, http.control)},
 	{0, "lsl", "PREFIX",
 	 "offer streams of the Lab Streaming Layer, too: PREFIX-pose, "
 	 "PREFIX-force, PREFIX-events; to the whole network",
@@ -89,21 +102,32 @@ static const struct cli_command command = {
 	.synopsis = "[NAME|FILE|NAME.rec] [OPTIONS]",
 	.summary =
 		"Send poses, forces and frames live to other programs, for example 3D "
-		"Slicer: of the haptic loop NAME, of a rig with --rig, or of a recording. "
-		"The default is the loop that runs.",
+		"Slicer, or to a page in a browser: of the haptic loop NAME, of a rig with --rig, or of "
+		"a recording. The default is the loop that runs.",
 	.options = options,
-	.examples = "incise serve neck --igtl 18944",
+	.examples = "incise serve neck --igtl 18944\n"
+		    "incise serve liver.rec --http 8080",
 	.success = "ended as requested, or at the end of the recording",
 };
 
 struct serve_run {
-	struct serve_source *source;
+	struct serve_source *source; /* NULL: a file is shown in the viewer alone */
 	struct serve_info info;
 	struct serve_stream *stream;
 	struct serve_sink *sink[SERVE_SINKS];
 	int sinks, epoll, timer;
 	double seconds;
 };
+
+/* Whether a file is shown in the viewer and nothing is played. */
+static bool is_viewed(const struct serve_job *job)
+{
+	const char *operand = job->source.operand;
+
+	return job->http.address && operand && !job->rig &&
+	       file_kind_of(operand) & (FILE_RECORDING | FILE_SESSION | FILE_MODEL) &&
+	       !job->igtl.address && !job->lsl.prefix && !job->ros2.prefix;
+}
 
 static bool is_recording(const char *operand)
 {
@@ -117,14 +141,20 @@ static void open_source(struct serve_run *run, struct serve_job *job)
 	const char *operand = job->source.operand;
 	bool recording = !job->rig && operand && is_recording(operand);
 	enum file_kind kind = operand ? file_kind_of(operand) : FILE_UNKNOWN;
+	bool viewed = is_viewed(job);
 
 	job->source.rig = job->rig;
+	job->source.capture = job->http.capture;
+	job->http.view = job->http.address && (viewed || recording) ? operand : NULL;
+	if (!job->http.address && (job->http.url || job->http.control))
+		cli_usage("--%s is of --http: give it, too",
+			  job->http.url ? "url" : "control");
 	job->source.camera = job->camera != CAMERA_OFF;
 	job->source.camera_needed = job->camera == CAMERA_FRAMES;
 	if (job->rig && operand)
 		cli_usage("--rig: '%s' is a source, too; give one of them", operand);
 	/* A loop is named by itself, its scene, or its status file. */
-	if (kind != FILE_UNKNOWN)
+	if (kind != FILE_UNKNOWN && !viewed)
 		file_expect(operand, FILE_RECORDING | FILE_STATE | FILE_SCENE);
 	if (!job->rig && job->calibration)
 		cli_usage(
@@ -137,13 +167,17 @@ static void open_source(struct serve_run *run, struct serve_job *job)
 	if (job->rig) {
 		calibration_use(&calibration, job->calibration, NULL);
 		job->source.calibration = calibration.values;
+		job->source.calibration_path = calibration.path;
 		cli_note("calibration: %s", calibration_text(&calibration));
 	}
 	run->info.rate_hz = job->source.rate_hz;
 	run->info.kinds[SERVE_STATUS] = true;
-	run->source = job->rig	  ? serve_rig_open(&job->source, &run->info)
-		      : recording ? serve_recording_open(&job->source, &run->info)
-				  : serve_loop_open(&job->source, &run->info);
+	if (viewed)
+		run->info.name = cli_text("viewer of %s", operand);
+	else
+		run->source = job->rig	  ? serve_rig_open(&job->source, &run->info)
+			      : recording ? serve_recording_open(&job->source, &run->info)
+					  : serve_loop_open(&job->source, &run->info);
 	/* Faults of the rig are said first. */
 	if (job->rig && !calibration.path)
 		calibration_use(&calibration, job->calibration, job->rig);
@@ -161,6 +195,20 @@ static void add_sink(struct serve_run *run, struct serve_sink *sink)
 		cli_fail("epoll: %s", strerror(errno));
 }
 
+#ifndef HAVE_WEBSOCKETS
+struct serve_sink *serve_http_new(const struct serve_http_options *options,
+				  const struct serve_info *info,
+				  struct serve_source *source)
+{
+	(void)options;
+	(void)info;
+	(void)source;
+	cli_fail(
+		"--http: this build has no pages (apt-get install libwebsockets-dev, and build "
+		"again)");
+}
+#endif
+
 static void open_sinks(struct serve_run *run, const struct serve_job *job)
 {
 	struct epoll_event event = {.events = EPOLLIN};
@@ -170,7 +218,10 @@ static void open_sinks(struct serve_run *run, const struct serve_job *job)
 	if (run->epoll < 0 || run->timer < 0 ||
 	    epoll_ctl(run->epoll, EPOLL_CTL_ADD, run->timer, &event))
 		cli_fail("epoll: %s", strerror(errno));
-	add_sink(run, serve_igtl_new(&job->igtl, &run->info));
+	if (job->igtl.address)
+		add_sink(run, serve_igtl_new(&job->igtl, &run->info));
+	if (job->http.address)
+		add_sink(run, serve_http_new(&job->http, &run->info, run->source));
 	if (job->lsl.prefix)
 		add_sink(run, serve_outlets_new(&job->lsl, &run->info));
 	if (job->ros2.prefix)
@@ -228,7 +279,7 @@ static void serve(struct serve_run *run, const struct serve_job *job)
 	bool ended = false;
 
 	while (!cli_stop && now < end && !ended) {
-		if (now >= next)
+		if (run->source && now >= next)
 			ended = run->source->ops->read(run->source, run->stream, now,
 						       &next);
 		if (now >= tick) {
@@ -236,7 +287,7 @@ static void serve(struct serve_run *run, const struct serve_job *job)
 			show_serve(run, (now - start) / 1e9);
 			tick = now + TICK_NS;
 		}
-		wait_until(run, next < tick ? next : tick);
+		wait_until(run, run->source && next < tick ? next : tick);
 		now = cli_now_ns();
 	}
 	run->seconds = (now - start) / 1e9;
@@ -286,7 +337,7 @@ static void report_serve(const struct serve_run *run, const struct serve_job *jo
 
 int main(int argc, char **argv)
 {
-	struct serve_job job = {.igtl = {.address = "127.0.0.1:18944", .idle_s = 30},
+	struct serve_job job = {.igtl.idle_s = 30,
 				.ros2.protocol = INCISE_OUTLET_ROS2,
 				.source = {.rate_hz = 100, .speed = 1}};
 	struct serve_run run = {0};
@@ -295,6 +346,8 @@ int main(int argc, char **argv)
 	if (argc - optind > 1)
 		cli_usage("unexpected argument '%s'; give one source", argv[optind + 1]);
 	job.source.operand = argv[optind];
+	if (!job.http.address && !job.igtl.address)
+		job.igtl.address = "127.0.0.1:18944";
 	if (job.verbose)
 		cli_be_verbose();
 	cli_catch_signals();
@@ -307,7 +360,8 @@ int main(int argc, char **argv)
 	for (int i = 0; i < run.sinks; i++)
 		run.sink[i]->ops->free(run.sink[i]);
 	serve_stream_free(run.stream);
-	run.source->ops->free(run.source);
+	if (run.source)
+		run.source->ops->free(run.source);
 	cli_finish();
 	return 0;
 }

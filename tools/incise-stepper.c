@@ -154,6 +154,8 @@ static void run_status(const struct stepper_job *job, struct stepper_drive *driv
 		put_json(report(job, drive), JSON_INDENT(2));
 	else
 		stepper_status_text(drive->stepper, &drive->info, &drive->status);
+	if (!job->json && !job->follow && !strncmp(drive->info.name, "simulated", 9))
+		puts("simulated  each command starts at 0: no other one moved this rig");
 }
 
 static void run_disable(const struct stepper_job *job, struct stepper_drive *drive)

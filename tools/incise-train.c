@@ -579,12 +579,68 @@ static void choose_further(struct train_options *options)
 /* Pairs per parameter below which a model follows noise rather than tissue. */
 #define PAIRS_PER_PARAMETER 3
 
+/* Groups up to which Student's t makes an interval more than half as wide again. */
+#define WIDE 4
+
+/* Groups held out up to which the text has the error of each. */
+#define NAMED 12
+
 /* The unit of a column, from its name: force_N is in N. */
 static const char *unit_of_train(const char *column)
 {
 	const char *score = strrchr(column, '_');
 
 	return score ? score + 1 : "";
+}
+
+/* The root-mean-square error on the pairs of a group that are in the sample held out. */
+static double group_rmse(const struct incise_trained *trained, int number)
+{
+	const struct incise_train_side *held =
+		&incise_corpus_side(trained->corpus, true)->sample;
+	size_t width = (size_t)held->pairs.n_inputs + 1;
+	double sum = 0, n = 0;
+
+	for (size_t i = 0; i < held->pairs.n; i++) {
+		const double *x = held->pairs.rows + i * width;
+
+		if (held->groups[i] != number)
+			continue;
+		sum += pow(incise_model_eval(trained->model, x, NULL) - x[width - 1], 2);
+		n++;
+	}
+	return sqrt(sum / n);
+}
+
+/* The names of the groups that are held out, in the order of the sources, and the errors on them. */
+static void find_held(const struct incise_trained *trained, json_t *names, json_t *errors)
+{
+	int n = incise_corpus_sources(trained->corpus), last = -1;
+	const char *of = trained->group ? trained->group : "";
+
+	for (int i = 0; i < n; i++) {
+		const struct incise_corpus_survey *survey =
+			incise_corpus_source(trained->corpus, i);
+		bool cut = n > 1 && !strcmp(of, "cut");
+
+		for (int g = 0; g < survey->n_groups; g++) {
+			const struct incise_corpus_group *group = &survey->groups[g];
+			bool whole = !strcmp(of, "recording"); /* its text is a hash */
+			char *name;
+
+			/* Namesakes in other sources have the number of the first one. */
+			if (!group->check || group->number <= last)
+				continue;
+			last = group->number;
+			name = cli_text("%s %s%s%s", of,
+					whole ? survey->name : group->name,
+					cut ? " of " : "", cut ? survey->name : "");
+			json_array_append_new(names, json_text(name));
+			json_array_append_new(errors,
+					      json_number(group_rmse(trained, last)));
+			free(name);
+		}
+	}
 }
 
 /* A number in the unit of the target, which ends its key. */
@@ -717,7 +773,12 @@ static void report_train_json(const struct train_options *options,
 	const struct incise_train_report *report = &trained->report;
 	const struct incise_baselines *baselines = &trained->baselines;
 	json_t *object = json_object(), *unfired = json_array(), *mfs = json_array();
+	json_t *names = json_array(), *errors = json_array();
+	const char *unit = unit_of_train(options->target);
+	char key[80];
 
+	snprintf(key, sizeof(key), "check_names_rms_error%s%.50s", *unit ? "_" : "",
+		 unit);
 	json_set_integer(object, "pairs", trained->pairs + trained->check_pairs);
 	json_set_integer(object, "left_out", trained->left_out);
 	json_set_integer(object, "repeated", trained->repeated);
@@ -742,6 +803,9 @@ static void report_train_json(const struct train_options *options,
 			 incise_corpus_side(trained->corpus, false)->n_groups);
 	json_set_integer(object, "check_groups",
 			 incise_corpus_side(trained->corpus, true)->n_groups);
+	find_held(trained, names, errors);
+	json_object_set_new(object, "check_names", names);
+	json_object_set_new(object, key, errors);
 	json_set_integer(object, "rules", incise_model_info(model)->n_rules);
 	json_set_integer(object, "parameters", report->parameters);
 	json_set_integer(object, "epochs", report->epochs);
@@ -793,6 +857,21 @@ static void print_row(const char *name, double train, double check)
 	printf("  %-22s", name);
 	isnan(train) ? printf("%12s", "") : printf("%12.5g", train);
 	isnan(check) ? printf("\n") : printf("%14.5g\n", check);
+}
+
+/* The error of each group that is held out, unless they are many. */
+static void print_held(const struct incise_trained *trained, const char *unit)
+{
+	json_t *names = json_array(), *errors = json_array(), *name;
+	size_t i;
+
+	find_held(trained, names, errors);
+	json_array_foreach(names, i, name) if (json_array_size(names) <= NAMED &&
+					       json_is_real(json_array_get(errors, i)))
+		printf("  %-36s%12.5g %s\n", json_string_value(name),
+		       json_number_value(json_array_get(errors, i)), unit);
+	json_decref(names);
+	json_decref(errors);
 }
 
 /* The law that the model is, or the kind of its penalty. */
@@ -857,7 +936,8 @@ static void report_train_text(const struct train_options *options,
 			     : cuts			? "unseen cuts"
 			     : trained->group		? "unseen groups"
 							: "unseen pairs";
-	char knn[40];
+	const char *unit = unit_of_train(options->target);
+	char knn[40], head[30];
 
 	printf("%s: %s to train", options->data, cli_count(trained->pairs, "pair"));
 	if (trained->group)
@@ -885,17 +965,9 @@ static void report_train_text(const struct train_options *options,
 	if (isfinite(report->condition))
 		printf(", condition %.2g", report->condition);
 	printf("\n");
-	printf("  %-22s%12s%14s\n", "RMSE", "training", check ? unseen : "");
+	snprintf(head, sizeof(head), "RMSE%s%.20s", *unit ? ", " : "", unit);
+	printf("  %-22s%12s%14s\n", head, "training", check ? unseen : "");
 	print_row("this model", report->train_rmse, report->check_rmse);
-	if (isfinite(report->crossval_rmse))
-		printf("  cross-validated: %.5g", report->crossval_rmse);
-	if (isfinite(report->crossval_quadratic))
-		printf(", quadratic %.5g", report->crossval_quadratic);
-	if (isfinite(report->crossval_plane))
-		printf(", plane %.5g, mean %.5g", report->crossval_plane,
-		       report->crossval_mean);
-	if (isfinite(report->crossval_rmse))
-		printf("\n");
 	snprintf(knn, sizeof(knn), "%d nearest", baselines->k);
 	print_row("mean", check ? NAN : baselines->mean, check ? baselines->mean : NAN);
 	print_row("linear regression", check ? NAN : baselines->linear,
@@ -904,8 +976,19 @@ static void report_train_text(const struct train_options *options,
 	print_row("MSE of this model", pow(report->train_rmse, 2),
 		  pow(report->check_rmse, 2));
 	print_row("R² of this model", report->train_r2, report->check_r2);
-	printf("  95 %% interval: noise %.4g %s", trained->noise,
-	       unit_of_train(options->target));
+	print_held(trained, unit);
+	if (isfinite(report->crossval_rmse))
+		printf("  cross-validated: %.5g", report->crossval_rmse);
+	if (isfinite(report->crossval_quadratic))
+		printf(", quadratic %.5g", report->crossval_quadratic);
+	if (isfinite(report->crossval_plane))
+		printf(", linear %.5g, mean %.5g", report->crossval_plane,
+		       report->crossval_mean);
+	if (isfinite(report->crossval_rmse))
+		printf("%s%s\n", *unit ? " " : "", unit);
+	printf("  95 %% interval: noise %.4g %s", trained->noise, unit);
+	if (trained->group && fit->n_groups <= WIDE)
+		printf(" (wide: only %s)", cli_count(fit->n_groups, group));
 	if (check)
 		printf(", holds %.1f %% of the %s", 100 * trained->coverage, unseen);
 	if (check && isfinite(third[0] + third[1] + third[2]))

@@ -74,7 +74,7 @@ static const struct cli_option options[] = {
 	{'o', "output", "FILE.mp4|FILE.mkv", "no window: write a film (MP4 or Matroska)",
 	 CLI_OUTPUT(struct view_job, output.film_path), .extensions = ".mp4 .mkv"},
 	{'o', "output", "FILE.png",
-	 "no window: write a few frames side by side, with --at",
+	 "no window: write a few frames in rows of up to four, with their times, by --at",
 	 CLI_OUTPUT(struct view_job, output.strip_path), .extensions = ".png"},
 	SESSION_OPTIONS(struct view_job, session),
 	{0, "at", "TIMES", "times of the frames of FILE.png, for example 2s,6s,12s,20s",
@@ -106,6 +106,7 @@ static const struct cli_command command = {
 	.notes = "Keys: h lists all; left button presses, right button turns the camera, "
 		 "the wheel zooms; b blade, n handle, t tube, + and - the depth of a "
 		 "press, s saves the image, q ends.",
+	.more = scene_argument_installed,
 	.examples = "incise view neck --rig sim:mouse\n"
 		    "incise view neck --procedure -o neck.mp4",
 };

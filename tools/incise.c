@@ -11,6 +11,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <unistd.h>
 #include <incise/error.h>
 #include <incise/version.h>
@@ -55,7 +56,8 @@ static const struct {
 	{"merge", "make one model of the factors of several laboratories or machines"},
 	{"provenance", "print the way from a figure or model back to its recordings"},
 	{"recalibrate", "give a recording another calibration after the fact"},
-	{"recover", "make a whole recording of an interrupted or an older one"},
+	{"recover",
+	 "save what an interrupted recording has, or convert one of an older format"},
 	{"tool", "set or print the tool in the hand of a running loop"},
 };
 
@@ -179,7 +181,14 @@ static const struct {
 	{"sd", "incise-sd.5"},
 	{"library", "libincise.3"},
 	{"libincise", "libincise.3"},
+	{"tex", "incise-tex.5"},
+	{"fac", "incise-fac.5"},
 	{"service", "incise-haptic@.service.8"},
+	{"haptic@.service", "incise-haptic@.service.8"},
+	{"serve.service", "incise-serve.service.8"},
+	{"lesson", "lesson.md"}, /* a document: its path is printed */
+	{"glossary", "glossary.md"},
+	{"faq", "faq.md"},
 };
 
 #define TOPICS (sizeof(topics) / sizeof(*topics))
@@ -193,7 +202,7 @@ static char *page_of(const char *topic, const char *subcommand)
 	if (!strncmp(topic, "incise-", 7))
 		return page_of(topic + 7, subcommand);
 	for (size_t i = 0; i < TOPICS && !subcommand; i++)
-		if (!strcmp(topic, topics[i].name))
+		if (!strcasecmp(topic, topics[i].name))
 			return strdup(topics[i].page);
 	for (size_t i = 0; i < COMMANDS; i++)
 		if (strlen(commands[i].name) == length &&
@@ -204,6 +213,22 @@ static char *page_of(const char *topic, const char *subcommand)
 				       ? NULL
 				       : page;
 	return NULL;
+}
+
+/* Print the path of a document: of the source, to which the link of the scenes leads, or installed. */
+static int document(const char *name)
+{
+	static const char *const folders[] = {"incise/scenes/../doc", "doc/incise"};
+	char *path, found[PATH_MAX];
+
+	for (size_t i = 0; i < sizeof(folders) / sizeof(*folders); i++) {
+		path = cli_text("%s/../share/%s/%s", cli_folder(), folders[i], name);
+		if (!access(path, R_OK) && realpath(path, found))
+			return printf("%s\n", found) < 0;
+		free(path);
+	}
+	cli_error("help: doc/%s is not installed; it is in the source of incise", name);
+	return 1;
 }
 
 /* The page of the build tree if this runs in one, else the installed one. */
@@ -230,11 +255,13 @@ static int manual(const char *topic, const char *subcommand)
 				  topic);
 		return 2;
 	}
+	dot = strrchr(page, '.');
+	if (!strcmp(dot, ".md"))
+		return document(page);
 	if (asprintf(&path, "%s/../man/%s", cli_folder(), page) < 0)
 		return 1;
 	if (!access(path, R_OK))
 		execlp("man", "man", path, (char *)NULL);
-	dot = strrchr(page, '.');
 	*dot = 0;
 	execlp("man", "man", dot + 1, page, (char *)NULL);
 	cli_error("man: %s; install the package man-db%s%.64s%s", strerror(errno),

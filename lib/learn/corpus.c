@@ -690,10 +690,10 @@ static void count_sides(struct incise_corpus *corpus)
 		struct incise_corpus_survey *survey = &corpus->surveys[i];
 
 		fit->rows += survey->rows;
-		for (int g = 0; g < survey->n_groups && corpus->grouped && corpus->held;
-		     g++) {
+		for (int g = 0; g < survey->n_groups && corpus->grouped; g++) {
 			struct incise_corpus_group *group = &survey->groups[g];
 
+			group->number = find_group(corpus, group->key)->number;
 			group->check = find_group(corpus, group->key)->check;
 			check->rows += group->check ? group->rows : 0;
 		}

@@ -75,28 +75,55 @@ static int name_training(struct training *t, int rc)
 		       : rc;
 }
 
-/* The options that a model depends on, for people: free(3). */
+/* The options of incise train that make this model of its sources: free(3). */
 static char *describe_options(const struct training *t)
 {
 	const struct incise_sources_options *options = t->options;
-	size_t tuned = options->train.tuned;
-	char check[60] = "", sample[60] = "", *text;
+	const struct incise_train_options *train = &options->train;
+	int n = options->n_inputs;
+	char *text = NULL;
+	size_t size;
+	FILE *out = open_memstream(&text, &size);
 
-	if (tuned == SIZE_MAX)
-		strcpy(sample, ", search on all pairs");
-	else if (tuned)
-		snprintf(sample, sizeof(sample), ", search on %zu pairs", tuned);
-	if (options->check > 0)
-		snprintf(check, sizeof(check), ", %g held out with seed %llu",
-			 options->check, (unsigned long long)options->train.seed);
-	if (asprintf(&text, "%sgroups: %s%s%s%s%s%s",
-		     options->train.classic ? "classic, " : "",
-		     t->reading.group ? t->reading.group : "none",
-		     options->all_rows ? ", all rows" : "",
-		     options->averaged ? ", averaged" : "", sample, check,
-		     options->n_parts ? ", weighted by uncertainties" : "") < 0)
+	if (!out)
 		return NULL;
-	return text;
+	fprintf(out, "--group %s%s%s", t->reading.group ? t->reading.group : "none",
+		options->all_rows ? " --all-rows" : "",
+		options->averaged ? " --rate HZ" : "");
+	for (int i = 0; i <= n && !options->premises; i++)
+		fprintf(out, "%s%s",
+			!i	? " --inputs "
+			: i < n ? ","
+				: " --target ",
+			options->columns[i]);
+	if (options->n_parts)
+		fputs(" --uncertainty parts", out);
+	if (options->check > 0)
+		fprintf(out, " --check %g", options->check);
+	if (options->check > 0 || train->seed != 1)
+		fprintf(out, " --seed %llu", (unsigned long long)train->seed);
+	if (options->premises || options->smooth || !options->n_mfs[0])
+		fputs(options->premises ? " --premises MODEL.fis"
+		      : options->smooth ? " --texture"
+					: " --mf auto",
+		      out);
+	else
+		for (int i = 0; i < n; i++)
+			fprintf(out, "%s%d", i ? "," : " --mf ", options->n_mfs[i]);
+	if (options->type != INCISE_MF_GAUSS)
+		fprintf(out, " --search type=%s", incise_mf_type_name(options->type));
+	if (train->tuned)
+		fprintf(out, " --search sample=%zu",
+			train->tuned == SIZE_MAX ? 0 : train->tuned);
+	if (train->classic)
+		fprintf(out, " --search classic,step=%g --epochs %d", train->step,
+			train->epochs);
+	if (!isnan(train->ridge))
+		fprintf(out, " --ridge %g", train->ridge);
+	if (!fclose(out))
+		return text;
+	free(text);
+	return NULL;
 }
 
 static void begin_phase(struct training *t, enum incise_train_phase phase, uint64_t total,

@@ -41,8 +41,28 @@ static void count_loop(uint64_t *histogram, int64_t value)
 	histogram[value < INCISE_LOOP_BINS - 1 ? value : INCISE_LOOP_BINS - 1]++;
 }
 
-static void count_tick(struct incise_loop_stats *stats, const struct incise_tick *tick)
+/* Ticks that explain a run without any force. */
+static void count_forceless(struct loop_run *run, const struct incise_tick *tick)
 {
+	const unsigned int blind =
+		INCISE_TICK_STALE | INCISE_TICK_UNUSABLE | INCISE_TICK_FAULT;
+	struct incise_loop_stats *stats = run->stats;
+	struct incise_touch touch;
+
+	if (tick->flags & INCISE_TICK_CONTACT) {
+		for (int i = 0; i < INCISE_TICK_FLAGS; i++)
+			stats->forceless[i] += tick->flags >> i & 1;
+		stats->forceless_off = incise_plan_off(run->plan);
+	} else if (!stats->flagged[0] && !(tick->flags & blind)) {
+		incise_surface_nearest(incise_plan_surface(run->plan), tick->tool_mm,
+				       &touch);
+		stats->nearest_mm = fmin(stats->nearest_mm, -touch.depth_mm);
+	}
+}
+
+static void count_tick(struct loop_run *run, const struct incise_tick *tick)
+{
+	struct incise_loop_stats *stats = run->stats;
 	double force = 0;
 
 	for (int i = 0; i < 3; i++)
@@ -59,6 +79,8 @@ static void count_tick(struct incise_loop_stats *stats, const struct incise_tick
 	stats->unfelt2 += tick->unfelt_N * tick->unfelt_N;
 	stats->unfelt_max_N = fmax(stats->unfelt_max_N, tick->unfelt_N);
 	stats->force_max_N = fmax(stats->force_max_N, stats->force_N);
+	if (!(stats->force_N > 0))
+		count_forceless(run, tick);
 	stats->ticks++;
 	for (int i = 0; i < INCISE_TICK_FLAGS; i++)
 		stats->flagged[i] += tick->flags >> i & 1;
@@ -116,7 +138,7 @@ static INCISE_REALTIME int run_tick(struct loop_run *run, struct incise_tick *ti
 	if (cost_ns > run->stats->tick_max_ns)
 		run->stats->tick_max_ns = cost_ns;
 	count_loop(run->stats->tick_100ns, cost_ns / 100);
-	count_tick(run->stats, tick);
+	count_tick(run, tick);
 	report_changes(run, tick);
 	incise_state_tick(options->state, tick, run->lag_ns, cost_ns, run->skipped);
 	if (options->control)
@@ -267,6 +289,7 @@ int incise_loop_run(struct incise_plan *plan, struct incise_clock *clock,
 	int rc, released, slack_ns, ended = 0;
 
 	memset(stats, 0, sizeof(*stats));
+	stats->nearest_mm = HUGE_VAL;
 	if (options->duration_ns < 0)
 		return incise_error_set(err, EINVAL, "the loop's duration is negative");
 	if (!(options->rate_hz >= 1 && options->rate_hz <= 20000))

@@ -18,7 +18,7 @@
 #define GRANT "sudo prlimit --pid $$ --rtprio=90 --memlock=unlimited"
 #define GRANT_FOR_GOOD                                                       \
 	"printf '%s - rtprio 90\\n%s - memlock unlimited\\n' $USER $USER | " \
-	"sudo tee /etc/security/limits.d/incise.conf"
+	"sudo tee /etc/security/limits.d/incise.conf # then log in again"
 
 /* Bit of CAP_SYS_NICE in /proc/self/status. */
 #define CAP_SYS_NICE_BIT 23

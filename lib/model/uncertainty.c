@@ -306,13 +306,24 @@ void incise_uncertainty_parts(const struct incise_uncertainty *u,
 	};
 }
 
+static bool is_inside(const struct incise_model *model, const double *x)
+{
+	unsigned int flags = 0;
+
+	incise_model_eval(model, x, &flags);
+	return !(flags & INCISE_MODEL_EXTRAPOLATED);
+}
+
 void incise_uncertainty_parts_many(const struct incise_uncertainty *uncertainty,
 				   const struct incise_model *model, const double *x,
 				   size_t n, struct incise_uncertainty_parts *parts)
 {
-	for (size_t k = 0; k < n; k++)
-		incise_uncertainty_parts(uncertainty, model,
-					 x + k * (size_t)model->info.n_inputs, &parts[k]);
+	for (size_t k = 0; k < n; k++, x += model->info.n_inputs)
+		if (is_inside(model, x))
+			incise_uncertainty_parts(uncertainty, model, x, &parts[k]);
+		else
+			parts[k] = (struct incise_uncertainty_parts){NAN, NAN, NAN,
+								     NAN, NAN, NAN};
 }
 
 double incise_uncertainty_sd(const struct incise_uncertainty *uncertainty,
@@ -453,7 +464,7 @@ void incise_uncertainty_sd_many(const struct incise_uncertainty *uncertainty,
 				const struct incise_model *model, const double *x,
 				size_t n, double *sd)
 {
-	for (size_t k = 0; k < n; k++)
-		sd[k] = incise_uncertainty_sd(uncertainty, model,
-					      x + k * (size_t)model->info.n_inputs);
+	for (size_t k = 0; k < n; k++, x += model->info.n_inputs)
+		sd[k] = is_inside(model, x) ? incise_uncertainty_sd(uncertainty, model, x)
+					    : NAN;
 }

@@ -599,7 +599,7 @@ int incise_export_rows(struct incise_export_pass *pass,
 		rc = incise_export_budgets(pass);
 	/* Behind the budgets, which are of all rows. */
 	for (int i = 0; i < pass->n && !rc; i++)
-		rc = incise_recording_limit(pass->recordings[i], pass->options,
+		rc = incise_recording_limit(pass->recordings[i], pass->options, true,
 					    pass->err);
 	if (!rc)
 		rc = write_rows(pass, &kind, format, out, provenance);

@@ -231,7 +231,7 @@ int incise_messages_limit(struct incise_export_pass *pass)
 {
 	struct incise_recording *recording = pass->recordings[0];
 	struct incise_stream_rows stream;
-	int rc = incise_recording_limit(recording, pass->options, pass->err);
+	int rc = incise_recording_limit(recording, pass->options, false, pass->err);
 
 	if (rc || !recording->range.limited)
 		return rc;

@@ -265,7 +265,7 @@ const struct incise_setting incise_rig_settings[] = {
 	SETTING_WORD(
 		clock, simulated, clocks, "real",
 		"real: the computer's clock; simulated: time that runs as fast as the "
-		"program, from 1 s on"),
+		"program, from 1 s on, so a loop of 10 s ends at once"),
 	SETTING_OWN(tracker, "", "(none)", "tracker, as BACKEND:ARGUMENTS"),
 	SETTING_OWN(force, "", "(none)", "force channel, as BACKEND:ARGUMENTS"),
 	SETTING_OWN(camera, "", "(none)", "camera, as BACKEND:ARGUMENTS"),

@@ -352,10 +352,9 @@ static int cannot(const struct incise_stepper *stepper, const char *what,
 	struct incise_stepper_info info = {0};
 
 	stepper->ops->info(stepper, &info);
-	return incise_error_set(err, EOPNOTSUPP,
-				"%s does not support being %s; name another backend in "
-				"rig.conf",
-				info.name, what);
+	return incise_error_set(
+		err, EOPNOTSUPP, "%s does not support being %s%s", info.name, what,
+		strchr(what, ':') ? "" : "; name another backend in rig.conf");
 }
 
 int incise_stepper_set(struct incise_stepper *stepper, double position_mm)
@@ -401,7 +400,8 @@ int incise_stepper_home(struct incise_stepper *stepper, const volatile int *stop
 	if (ops->home)
 		return ops->home(stepper, stop, edge, err);
 	if (!ops->jog || !ops->homing || !ops->edge || !ops->origin)
-		return cannot(stepper, "homed: its position is absolute", err);
+		return cannot(stepper, "homed, and needs none: its position is absolute",
+			      err);
 	return home_by_edge(stepper, stop, edge, err);
 }
 

@@ -517,8 +517,12 @@ static int load_model(const struct incise_scene *scene, struct incise_scene_mode
 	else
 		cut->model = incise_model_load(path, &why);
 	if (!cut->model && !cut->compiled)
-		return incise_error_set(err, why.code, "%s: its model %s", scene->path,
-					why.text);
+		return incise_error_set(
+			err, why.code, "%s: its model %s%s", scene->path, why.text,
+			why.code == ENOENT
+				? "; a scene's files are looked for in the folder "
+				  "of the scene"
+				: "");
 	return find_inputs(scene, cut, err);
 }
 
@@ -773,6 +777,11 @@ void incise_scene_leave_texture_out(struct incise_scene *scene)
 	free(scene->texture_path);
 	scene->texture = NULL;
 	scene->texture_path = NULL;
+}
+
+const char *incise_scene_texture_left_out(const struct incise_scene *scene)
+{
+	return scene->texture_left_out;
 }
 
 void incise_scene_free(struct incise_scene *scene)

@@ -307,6 +307,33 @@ static void paint_keys(const struct incise_overlay *overlay)
 	cairo_destroy(cr);
 }
 
+int incise_view_caption(uint8_t *rgb, int width, int height, const char *line)
+{
+	bool fits = width > 0 && height > 0 && width <= INCISE_VIEW_SIDE_MAX &&
+		    height <= INCISE_VIEW_SIDE_MAX;
+	cairo_surface_t *surface = fits ? overlay_surface(width, height) : NULL;
+	const uint8_t *pixels;
+	cairo_t *cr;
+
+	if (!surface)
+		return fits ? -ENOMEM : -EINVAL;
+	cr = cairo_create(surface);
+	grey(cr, 1);
+	cairo_paint(cr);
+	grey(cr, 0);
+	cairo_select_font_face(cr, "DejaVu Sans", CAIRO_FONT_SLANT_NORMAL,
+			       CAIRO_FONT_WEIGHT_NORMAL);
+	text(cr, 0.5 * width, 0.75 * height, 0.7 * height, 0.5, line);
+	cairo_destroy(cr);
+	cairo_surface_flush(surface);
+	pixels = cairo_image_surface_get_data(surface);
+	for (size_t i = 0; i < (size_t)width * (size_t)height; i++)
+		for (int k = 0; k < 3; k++)
+			rgb[3 * i + k] = pixels[4 * i + 2 - k];
+	cairo_surface_destroy(surface);
+	return 0;
+}
+
 /* --- The overlay --- */
 
 struct incise_overlay *incise_overlay_new(struct incise_error *err)

@@ -50,7 +50,7 @@ static int open_window(struct incise_window *window, const char *title, int widt
 		return incise_error_set(
 			err, ENODEV,
 			"image: no screen for a window (%s); set DISPLAY or "
-			"WAYLAND_DISPLAY, or draw without a window",
+			"WAYLAND_DISPLAY",
 			window->video ? "SDL finds none" : SDL_GetError());
 	SDL_GL_SetAttribute(SDL_GL_CONTEXT_MAJOR_VERSION, 3);
 	SDL_GL_SetAttribute(SDL_GL_CONTEXT_MINOR_VERSION, 3);

@@ -393,6 +393,7 @@ ExportProgress = ctypes.CFUNCTYPE(c_int, c_void_p, c_double)
         int uncertainty;
         double from_s, to_s;
         int cut;
+        double every_s;
         const char *calibration_path;
         ExportProgress progress;
         void *context;

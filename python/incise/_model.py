@@ -480,7 +480,7 @@ class Model:
 
     model((5, 20)) is one force; model(x) of an array (…, inputs) an array; with sd=True a pair of
     these, the output and its standard deviation for a new cut. A value that is not finite or is masked
-    is an error; points outside the ranges are clamped to them, with a warning.
+    is an error; points outside the ranges are clamped to them, with a warning, and their sd is nan.
     """
 
     def __init__(self, path: PathLike):

@@ -24,11 +24,11 @@ except ImportError:
 
 
 class ForceRegressor(RegressorMixin, BaseEstimator):
-    """A Takagi-Sugeno model of up to eight inputs, learnt as :func:`incise.train` learns it.
+    """A Takagi-Sugeno model of up to eight inputs, learnt by :func:`incise.train`.
 
     Parameters
     ----------
-    mf : "auto": membership functions by cross-validation, or their count for each input
+    mf : "auto" (default): membership functions by cross-validation, or their counts: (5, 4) of incise.train
     mf_type : "gaussmf" or "gbellmf"
     ridge, seed : as of :func:`incise.train`
 

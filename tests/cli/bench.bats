@@ -305,6 +305,13 @@ realism() { jq -e ".rows[] | select(.kind == \"$1\") | .$2" r.json; }
 	# noise of the same spectrum is no saw-tooth: it falls too often, and as it rises
 	holds "$(realism noise event_rate) > 2 && $(realism noise spectrum_dB) < 3"
 	holds "$(realism noise skewness) ^ 2 < 0.3 ^ 2 && $(realism texture skewness) < -2"
+	verdict() {
+		PYTHONPATH=$root/tools/report python3 -B -c \
+			'import json, sys, tables; print(*tables.realism(json.load(sys.stdin)), sep="", end="")'
+	}
+	[[ "$(verdict <r.json | tail -n 1)" == "texture of rig 1: rate of events "*", without it "*"; more alike" ]]
+	swapped='.rows |= map(.kind = {"none": "texture", "texture": "none"}[.kind] // .kind)'
+	[[ "$(jq "$swapped" r.json | verdict | tail -n 1)" == *"; not more alike" ]]
 }
 
 @test "bench realism of data: forces without teeth, and files that have no cuts" {
@@ -478,5 +485,7 @@ in_order() {
 	[ -n "${plot[*]}" ] || skip "gnuplot is not installed, it draws the chart"
 	[ "$(head -c 8 "a folder/w-map.png" | od -An -tx1 | tr -d ' \n')" = 89504e470d0a1a0a ]
 	grep -q 'delay of 2 ticks' "a folder/w-map.svg"
+	# two panels of 340 px are less than the least width
+	grep -q 'width="900"' "a folder/w-map.svg" || complain "$(grep -m1 -o ' width="[^"]*"' "a folder/w-map.svg")"
 }
 

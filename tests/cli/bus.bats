@@ -226,6 +226,7 @@ rig() { # ARGUMENTS
 	[ -z "$(key s.json cause)" ]
 	# a backend that counts nothing
 	run -0 incise stepper status --rig sim:clock=simulated
+	[[ "$output" == *"simulated  each command starts at 0"* ]]
 	[[ "$output" != *counted* ]]
 	incise stepper status --rig sim:clock=simulated --json >s.json
 	[ "$(key s.json counters)" = '{}' ]

@@ -414,18 +414,20 @@ stopped_itself() {
 	[ "$(drive_value velocity)" = 0 ]
 }
 
+drive_moves() {
+	drive_tell state && [ "$(drive_value velocity)" != 0 ]
+}
+
 @test "kill -9: the drive stops by itself" {
 	rig --homed
 	for mode in 'mode = "csp";' 'mode = "csv";'; do
 		write_rig "" "$mode"
 		begin stepper jog 5 --rig rig.conf
-		sleep 0.3
+		await drive_moves
 		kill -9 "$pid"
 		wait "$pid" || :
 		pid=
 		stopped_itself
-		sleep 0.5
-		drive_is "switch-on disabled"
 		# Who comes next finds it so, and a person may go on.
 		run -0 --separate-stderr incise stepper status --rig rig.conf
 		drive_is "switch-on disabled"
@@ -436,30 +438,42 @@ stopped_itself() {
 @test "kill -STOP: the drive stops by itself, and stays so when the program goes on" {
 	rig --homed
 	begin stepper jog 5 --rig rig.conf
-	sleep 0.3
+	await drive_moves
 	kill -STOP "$pid"
 	stopped_itself
-	sleep 0.3
 	kill -CONT "$pid"
 	ended "drive 0x10"
 }
 
-# frozen VERB…: a run that is stopped for longer than the deadman, and goes on; then ended.
+# The drive has had 100 set-points with power.
+drive_runs() {
+	drive_tell report && [ "$(drive_value enabled_rpdos)" -ge 100 ]
+}
+
+# What was sent has arrived: the same count twice.
+drive_is_still() {
+	local syncs
+	drive_tell report
+	syncs=$(drive_value syncs)
+	drive_tell report
+	[ "$(drive_value syncs)" = "$syncs" ]
+}
+
+# frozen VERB…: a run that is stopped for longer than the deadman, and than its --duration, and goes
+# on; then ended.
 frozen() {
 	begin "$@" || return
-	sleep 0.3
+	await drive_runs
 	kill -STOP "$pid"
 	until [[ "$(ps -o stat= -p "$pid")" == T* ]]; do sleep 0.02; done
-	# What it had sent is done by now.
-	sleep 0.3
-	drive_tell state
+	await drive_is_still
 	before=$(drive_value shaft)
-	sleep "${freeze_s:-0.3}"
+	sleep 3.5
 	kill -CONT "$pid"
 }
 
 @test "kill -STOP: a drive that ignores a lost master is not moved on either" {
-	local verb freeze_s=3.5
+	local verb
 	for verb in "move 25" "jog 2" "enable --duration 3s" "enable"; do
 		rig --homed
 		# It shall not be there before it is stopped.
@@ -476,7 +490,7 @@ frozen() {
 }
 
 @test "kill -STOP of haptic beyond its --duration: exit 1 with the reason" {
-	local watch freeze_s=3.5
+	local watch
 	for watch in on off; do
 		rig --homed
 		drive_tell watch $watch
@@ -492,13 +506,15 @@ frozen() {
 	failed_with "not homed"
 	run -0 --separate-stderr incise haptic "$root/scenes/liver.scene" --no-rt --overruns 0 --rig rig.conf --home --duration 3s
 	drive_is "switch-on disabled"
+	drive_tell restart
 	begin haptic "$root/scenes/liver.scene" -c none --overruns 0 --rig rig.conf --duration 1h
-	sleep 0.5
+	await drive_runs
 	drive_tell fault 0x3210
 	ended 3210h
 	run -0 --separate-stderr incise stepper clear --rig rig.conf
+	drive_tell restart
 	begin haptic "$root/scenes/liver.scene" -c none --overruns 0 --rig rig.conf --duration 1h
-	sleep 0.5
+	await drive_runs
 	kill -9 "$pid"
 	wait "$pid" || :
 	pid=

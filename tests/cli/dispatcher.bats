@@ -146,7 +146,11 @@ load cli
 		scene incise-scene.5
 		incise-scene incise-scene.5
 		library libincise.3
+		incise-haptic@.service incise-haptic@.service.8
 	END
+	for page in lesson glossary FAQ; do
+		[ "$(incise help $page)" = "$(realpath "$BATS_TEST_DIRNAME/../../doc/${page,,}.md")" ] || complain "$page"
+	done
 	run -2 --separate-stderr incise help rig.con
 	[ "$stderr" = \
 		"incise: help rig.con: no such command or file format; did you mean 'incise help rig.conf'?" ]

@@ -101,7 +101,7 @@ group() {
 	mkdir python
 	echo 'raise ImportError' >python/jinja2.py
 	run --separate-stderr env PYTHONPATH="$PWD/python" incise doctor --rig sim:
-	[[ "$(finding programs jinja2)" == "  warning "*"no HTML reports"*"→ sudo apt-get install python3-jinja2, or pip install jinja2" ]]
+	[[ "$(finding programs jinja2)" == "  warning "*"no HTML reports"*"→ sudo apt-get install python3-jinja2    # or: pip install jinja2" ]]
 }
 
 @test "doctor lists CAN interfaces and USB devices by name" {
@@ -157,6 +157,7 @@ group() {
 		'actuator = { spring_N_mm = 2; travel_mm = 20; lead_mm = 4; };' >rig.conf
 	run --separate-stderr incise doctor
 	[[ "$(finding kernel module)" == "  warning "*"→ sudo modprobe incise_stepper"* ]]
+	[[ "$(finding devices stepper)" == "  problem "*"→ sudo cp /usr/share/incise/stepper.conf.example /etc/incise/stepper.conf"* ]]
 }
 
 # bats test_tags=check
@@ -224,6 +225,10 @@ group() {
 		assert [s["pass"] for s in steps if s["step"] == "weight"] == [True]
 	END
 	[[ "$(finding devices walls)" == "  ok "*"0, 0, 0, 0 swings a second at 25, 50, 75, 90 % of 1."* ]]
+}
+
+@test "doctor warns of a device that swings, sticks or stops" {
+	rig=sim:haptic,clock=simulated,motion=still,noise_mm=0.03
 	# a device with less damping than it states swings, and friction holds a weight
 	cat >rig.conf <<-'END'
 		clock = "simulated";
@@ -247,7 +252,6 @@ group() {
 	[[ "$(finding devices rate)" == "  warning "*"1000 Hz, but it declares 400 Hz"* ]]
 }
 
-# bats test_tags=check
 @test "doctor gives a force after an Enter behind its request only" {
 	export INCISE_MODULE_PATH=$INCISE_BUILD/tests/haptic
 	python3 - "spring:doctor-$$" >out <<-'END'

@@ -37,6 +37,7 @@ finds() {
 	[[ "$output" == "made.svg: "$1 ]] || complain "$output"
 }
 
+# bats test_tags=check
 @test "the check accepts a sound figure, and finds each fault of another" {
 	figure 'plot x title "line"'
 	measured made.svg
@@ -52,6 +53,12 @@ finds() {
 	finds "data cross 'in the way'"
 	figure 'set yrange [0:1]' 'plot 0.9 + 0.1 * sin(200 * x) title "over the key"'
 	finds "data cross 'over the key'"
+	# turned, and within a band that no line of it crosses
+	figure 'set label "turned / s" at 0.5,0.45 rotate by 45 front' 'plot x title "line"'
+	finds "data cross 'turned / s'"
+	figure 'set label "in a band" at 0.3,0.5 center front' 'set yrange [0:1]' \
+		'plot "+" using 1:(0.2):(0.8) with filledcurves title "band"'
+	finds "data cross 'in a band'"
 	figure 'set pointintervalbox 1' 'plot "+" every 50 using 1:1:(0.1) with yerrorbars'
 	finds "* white discs hide data"
 	figure 'plot "+" every 50 using 1:1:(0.1) with yerrorbars'

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """figures.py FILE.svg...: measures figures that gnuplot wrote, and prints a line for each text that
-leaves the canvas, two texts that overlap, a text that data cross, an axis that is not labelled
+leaves the canvas, two texts that overlap, a text that data cross or fill, an axis that is not labelled
 "quantity / unit", a number or unit in the form of a program, a legend entry without data, and discs of the paper's
 colour, which hide error bars. Exit 1 if there is any.
 
@@ -76,13 +76,19 @@ class Text:
                         self.below = max(self.below, DESCENT * size + lift)
         self.text = "".join(parts)
 
-    def corners(self):
+    def box(self):
+        """Left, top, right and bottom of it, from its place, as if it was not turned."""
         left = {"start": 0, "middle": -self.width / 2, "end": -self.width}[self.anchor]
-        angle = math.radians(self.degrees)
-        return [(self.x + x * math.cos(angle) - y * math.sin(angle),
-                 self.y + x * math.sin(angle) + y * math.cos(angle))
-                for x, y in ((left, -self.above), (left + self.width, -self.above),
-                             (left + self.width, self.below), (left, self.below))]
+        return left, -self.above, left + self.width, self.below
+
+    def turn(self, x, y, way=1):
+        angle = way * math.radians(self.degrees)
+        return (x * math.cos(angle) - y * math.sin(angle), x * math.sin(angle) + y * math.cos(angle))
+
+    def corners(self):
+        left, top, right, bottom = self.box()
+        return [(self.x + x, self.y + y) for x, y in (
+            self.turn(left, top), self.turn(right, top), self.turn(right, bottom), self.turn(left, bottom))]
 
 
 def overlap(a, b):
@@ -114,15 +120,29 @@ def crosses(a, b, low, high):
     return enter <= leave
 
 
+def holds(band, x, y):
+    """Whether a polygon has a place within it."""
+    within = False
+    for (ax, ay), (bx, by) in zip(band, band[1:] + band[:1]):
+        within ^= (ay > y) != (by > y) and x < ax + (y - ay) / (by - ay) * (bx - ax)
+    return within
+
+
 def data_cross(text, lines):
-    """Whether a line or marker is in what surely is ink of a text."""
-    (left, top), _, (right, bottom), _ = text.corners()
+    """Whether a line, a marker or a filled band is in what surely is ink of a text."""
+    left, top, right, bottom = text.box()
     ink = 0.1 * text.size
-    low, high = (left + ink, top + ink), (right - ink, min(bottom, text.y) - ink)
-    return any(
-        crosses(a, b, low, high) for least, most, line in lines
-        if all(least[k] <= high[k] and most[k] >= low[k] for k in (0, 1))
-        for a, b in zip(line, line[1:] or line))
+    low, high = (left + ink, top + ink), (right - ink, min(bottom, 0) - ink)
+    xs, ys = zip(*text.corners())
+    for least, most, line, filled in lines:
+        if least[0] > max(xs) or most[0] < min(xs) or least[1] > max(ys) or most[1] < min(ys):
+            continue
+        own = [text.turn(x - text.x, y - text.y, -1) for x, y in line]
+        if any(crosses(a, b, low, high) for a, b in zip(own, own[1:] or own)):
+            return True
+        if filled and holds(own, (left + right) / 2, (low[1] + high[1]) / 2):
+            return True
+    return False
 
 
 class Figure:
@@ -132,7 +152,7 @@ class Figure:
         self.texts = []
         self.segments = []  # of each plot: texts before its first series, and after
         self.shapes = []  # place, colour
-        self.lines = []  # of series: least and largest place, points
+        self.lines = []  # of series: least and largest place, points, filled
         self.entries = []  # of legends: title, text, colours of its sample
         self.walk(self.root.find("./%sg[@id='gnuplot_canvas']" % SVG), "black", None)
         # gnuplot 6 writes the labels of axes behind the series, where 5 has the next plot's title only:
@@ -141,6 +161,9 @@ class Figure:
         for segment, behind in zip(self.segments, self.segments[1:] + [last]):
             while behind and not behind[0].enhanced:
                 segment.append(behind.pop(0))
+        # A map has all of its axes behind its series.
+        if self.segments and not any(t.enhanced for t in self.segments[-1]):
+            self.segments[-1] += last
 
     def walk(self, element, colour, series):
         colour = colour_of(element, colour)
@@ -164,7 +187,8 @@ class Figure:
                 flat = map(numbers, re.sub(r"scale\(.*", "", data).split("M"))
                 for line in (list(zip(at[::2], at[1::2])) for at in flat if len(at) > 1):
                     xs, ys = zip(*line)
-                    self.lines.append(((min(xs), min(ys)), (max(xs), max(ys)), line))
+                    self.lines.append(((min(xs), min(ys)), (max(xs), max(ys)), line,
+                                       element.tag == SVG + "polygon"))
             # Where each line of a path begins, and where a marker is.
             for part in places_of(element):
                 self.shapes.append((*part, colour, series))
@@ -220,7 +244,7 @@ def check(path):
     if discs:
         yield "%d white discs hide data" % discs
     for text in figure.texts:
-        if not text.degrees and data_cross(text, figure.lines):
+        if data_cross(text, figure.lines):
             yield "data cross '%s'" % text.text
     for i, a in enumerate(boxes):
         for k in range(i):

@@ -64,6 +64,28 @@ refuses() {
 	holds "$(key r.json rendered_rms_error_N) < 0.05 * $largest"
 }
 
+# no_force SURFACE_MM TEXT: a tool that stays at 1 mm, over or in a wall, gives no force and says why
+no_force() {
+	grep -v '^#' "$root/scenes/wall.scene" >w.scene
+	echo "surface = { kind = \"plane\"; point_mm = [0.0, 0.0, $1]; normal = [0.0, 0.0, 1.0]; };" >>w.scene
+	incise haptic w.scene --rig "sim:clock=simulated,pause_s=2" --duration 1s >text
+	grep -Fqx "no force   $2" text || complain "$(cat text)"
+	incise haptic w.scene --rig "sim:clock=simulated,pause_s=2" --duration 1s --json >r.json
+	[ "$(key r.json no_force)" = "$2" ]
+}
+
+# bats test_tags=check
+@test "haptic says why there was no force" {
+	no_force -7.0 "no contact: the tool came no nearer to the tissue than 8.0 mm"
+	# of 1000 ticks four have no pose yet, as the simulated tracker is late
+	no_force 8.0 "996 ticks in contact, 996 of them while the loop waited for a small force, as out of the tissue"
+	incise haptic liver.scene --rig $quick --duration 3s >text
+	! grep "^no force" text
+	incise haptic liver.scene --rig $quick --duration 3s --json >r.json
+	run -0 key r.json no_force
+	[ -z "$output" ]
+}
+
 @test "the log has every tick, and its forces are the model's" {
 	# but for that along the cut
 	sed -i 's/fracture_J_m2 = .*;/fracture_J_m2 = 0.0;/' liver.scene

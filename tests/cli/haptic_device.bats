@@ -58,6 +58,7 @@ largest() {
 	press sim:haptic,clock=simulated,x_mm=45
 	holds "$(largest 0 6) == 0"
 	grep -q 'force off: move the handle to the middle of its workspace' notes
+	grep -q '^no force .* ticks in contact, and the force was off: move the handle to the middle' report
 	press sim:haptic,clock=simulated,x_mm=35
 	holds "$(largest 0 6) > 0.5"
 	cat >rig.conf <<-E

@@ -76,6 +76,12 @@ Last." ]
 }
 
 # bats test_tags=check
+@test "who runs a scene lists those that are installed" {
+	for word in haptic view; do
+		[ ! -x "$INCISE_BUILD/bin/incise-$word" ] || incise $word --help | grep -qx "Installed scenes: liver, neck, wall"
+	done
+}
+
 @test "every program is asked here, and every page of a program has one" {
 	# incise names its verbs, and words of verbs are what else is built
 	[ "$(printf 'incise-%s\n' "${all[@]}" | tr ' ' - | sort)" = \

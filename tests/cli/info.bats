@@ -222,4 +222,5 @@ setup() {
 		fails incise info --json $file -- $file
 		[ -z "$output" ]
 	done
+	fails incise info scenes -- scenes "installed scenes: liver, neck, wall"
 }

@@ -31,6 +31,7 @@ setup() {
 @test "it goes on where it stopped, and never changes a rig.conf" {
 	incise init lab --preset sim --yes --no-calibration >out
 	[ ! -e lab/calibration.conf ]
+	grep -q "^  incise init  *# 5 calibrations left$" out
 	cp lab/rig.conf before
 	fails incise init lab --preset haply --yes -- "rig.conf is there" "--preset"
 	fails incise init lab --camera none --yes -- "rig.conf is there"
@@ -39,6 +40,17 @@ setup() {
 	grep -qx "depth: passed" <<<"$output"
 	holds "$(grep -c '^pass: ' <<<"$output") == 4"
 	cmp before lab/rig.conf
+}
+
+# bats test_tags=check
+@test "init as JSON: what was written, what passed, what is next" {
+	incise init lab --preset sim --camera none --yes --json >r.json 2>/dev/null
+	[ "$(key r.json written)" = 1 ]
+	[ "$(key r.json 'calibrations[0].kind') $(key r.json 'calibrations[0].passed')" = "force 1" ]
+	[ "$(key r.json 'next[0]')" = "cd lab" ]
+	cd lab
+	incise init --yes --no-calibration --json >../r.json
+	[ "$(key ../r.json written) $(key ../r.json 'next[0]')" = "0 incise doctor" ]
 }
 
 # bats test_tags=check
@@ -54,6 +66,11 @@ setup() {
 	[ "$(grep -c '^  incise calibrate' <<<"$output")" = 4 ]
 	grep -q "4 calibrations left" <<<"$output"
 	[ ! -e lab/calibration.conf ]
+	run -0 incise init lab2 --preset paper --tracker none --force iio:iio:device0,0 --stepper none --yes
+	if ! compgen -G "/dev/video*" >/dev/null; then
+		grep -qx "camera: none is attached; name it in rig.conf later" <<<"$output"
+	fi
+	! grep -q "tracker: none" <<<"$output"
 	run -0 incise init arm --preset haply --yes
 	grep -q "^  incise calibrate frame" <<<"$output"
 	! grep -q capture <<<"$output"
@@ -68,6 +85,8 @@ setup() {
 	fails incise init lab --preset paper --tracker ttyy:/dev/ttyS9 --yes -- "tracker: " '"ttyy"' "there are: sim"
 	INCISE_MODULE_PATH=$PWD fails incise init lab --preset haply --yes -- "haptic: " libwebsockets-dev
 	fails incise init lab --preset paper --camera v4l2 --yes -- "camera: " BACKEND:ARGUMENTS
+	fails incise init lab --preset paper --tracker none --force none --camera none --stepper none --yes -- \
+		"rig.conf: the rig has no device" "--tracker" "--preset sim"
 	[ -z "$(ls -A lab)" ]
 	misused incise init a b -- "one folder"
 }
@@ -75,7 +94,7 @@ setup() {
 # bats test_tags=check
 @test "on a terminal it asks, and an empty answer is the default" {
 	cat >ask.py <<-'END'
-		import os, pty, sys
+		import os, pty, sys, termios
 		answers = iter(sys.argv[1].split(","))
 		seen = b""
 		def read(fd):
@@ -84,7 +103,12 @@ setup() {
 		    seen += data
 		    while b"] " in seen:
 		        seen = seen[seen.index(b"] ") + 2:]
-		        os.write(fd, (next(answers) + "\n").encode())
+		        answer = next(answers)
+		        if answer == "^C": # which would drop the output so far
+		            mode = termios.tcgetattr(fd)
+		            mode[3] |= termios.NOFLSH
+		            termios.tcsetattr(fd, termios.TCSANOW, mode)
+		        os.write(fd, b"\3" if answer == "^C" else (answer + "\n").encode())
 		    return data
 		sys.exit(os.waitstatus_to_exitcode(pty.spawn(sys.argv[2:], read)))
 	END
@@ -95,4 +119,17 @@ setup() {
 	run -2 python3 ask.py "elephant" incise init lab3 --no-calibration
 	[[ "$output" == *elephant* ]]
 	[ ! -e lab3/rig.conf ]
+	# an answer that is too long is refused, and its end does not answer the next question
+	run -0 python3 ask.py "$(printf %0299d)elephant,sim" incise init lab4 --no-calibration
+	[[ "$output" == *"an answer has up to 298 letters"* ]]
+	[ "$(grep -c ' = "sim:";' lab4/rig.conf)" = 4 ]
+	# Ctrl-C at a question: nothing is written; at a calibration: rig.conf stays, and the next run goes on
+	run -1 python3 ask.py "^C" incise init lab5
+	[[ "$output" == *"stopped; nothing more was written"* ]]
+	[ ! -e lab5/rig.conf ]
+	run -1 python3 ask.py "sim,^C" incise init lab5
+	[ -s lab5/rig.conf ]
+	[ ! -e lab5/calibration.conf ]
+	run -0 python3 ask.py "later,later,later,later,later" incise init lab5
+	[[ "$output" == *"5 calibrations left"* ]]
 }

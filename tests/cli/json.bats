@@ -105,6 +105,7 @@ devices() {
 	printf 'tracker = "sim:";\n' >rig.conf
 	report info.here info rig --all
 	rm rig.conf
+	report init init lab --preset sim --yes --no-calibration
 	report doctor doctor --rig "$short"
 	for action in status disable clear "move 2mm" "enable --duration 1s"; do
 		# shellcheck disable=SC2086 # "move 2mm" is two words

@@ -27,7 +27,7 @@ needs_view() {
 
 # bats test_tags=check
 @test "every block of the lesson is run here, and its demonstration meets all criteria" {
-	for mark in lesson "lesson with view" "lesson with window"; do
+	for mark in lesson "lesson with view" "lesson with window" "lesson over"; do
 		commands_in "$page" "$mark"
 	done >marked
 	awk '/^```/ { inside = !inside && /^```sh/; next } inside' "$page" >all
@@ -56,6 +56,12 @@ needs_view() {
 		assert failed["P03"] == {"cut_length_mm_met", "insertion_depth_mm_met", "membrane_met"}, failed
 		assert rows["EXPERT"]["met"] == rows["EXPERT"]["judged"] == "9"
 	END
+	cp -r lesson after
+	# no file has the folder's name; when the lesson is over, no file has a code of a student
+	run ! grep -rlF "$PWD" lesson
+	(cd after && bash -euo pipefail <(commands_in "$page" "lesson over"))
+	grep -rlwE 'P0[23]' lesson
+	run ! grep -rlwE 'P0[23]' after
 	browser --dump-dom 'data:text/html,<script>console.error("heard")</script>' >/dev/null
 	grep -q 'CONSOLE.*heard' said
 	for width in 390 1280; do
@@ -76,7 +82,7 @@ needs_view() {
 			<script>f.onload = () => document.body.dataset.seen = f.contentDocument.body.dataset.seen</script>" >frame.html
 		browser --virtual-time-budget=10000 --allow-file-access-from-files --dump-dom "file://$PWD/frame.html" >dom
 		seen=$(grep -oE 'data-seen="[^"]*' dom | cut -d'"' -f2)
-		[ "$seen" = "$([ "$width" = 390 ] && echo 13 || echo 36) true" ] || complain "$width: $seen"
+		[ "$seen" = "$([ "$width" = 390 ] && echo 19 || echo 48) true" ] || complain "$width: $seen"
 	done
 }
 
@@ -86,7 +92,7 @@ needs_view() {
 	commands_in "$page" "lesson with view" | sed 's/$/ --size 160x120 --rate 10/' >commands
 	(cd lesson && bash -euo pipefail ../commands) >out
 	grep -qx "wrote procedure.mp4: 220 frames, 22.0 s" out
-	grep -qx "wrote procedure.png: 4 frames" out
+	grep -qx "wrote procedure.png: 4 frames at 2.5, 8, 13, 21 s" out
 }
 
 @test "the student's window ends with q, and leaves a task log" {

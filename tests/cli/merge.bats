@@ -43,7 +43,7 @@ large_shares() {
 	for i in 1 2 3 4; do
 		grep -q "source: $(sha256sum <s$i.csv | cut -c1-64) [0-9]* pairs, s$i.csv" out
 	done
-	grep -q "groups: cut, 0.3 held out with seed 1" out
+	grep -q -e "options: --group cut --inputs depth_mm,velocity_mm_s --target force_N --check 0.3 --seed 1 --mf 5,4" out
 }
 
 @test "a source given twice is named, and a group may be a source" {
@@ -65,6 +65,9 @@ large_shares() {
 	incise train s2.csv --premises start.fis --group cut -o c.fac >/dev/null
 	incise merge c.fac a.fac b.fac -o merged.fis >out
 	grep -q "3 factors: 32000 pairs of 320 groups from 4 sources" out
+	mean=$(awk -F, 'FNR > 1 { s += $4; q += $4 ^ 2; n++ } END { printf "%.5g", sqrt(q / n - (s / n) ^ 2) }' s?.csv)
+	grep -q "^RMSE [0-9.]*, of the mean $mean, R² " out
+	grep -q "^RMSE of parts that were held out 0" out
 	cmp all.fis merged.fis
 	cmp all.fis.sd merged.fis.sd
 	incise merge a.fac b.fac -o ab.fac >/dev/null
@@ -278,7 +281,7 @@ train_killed_soon() {
 	# no penalty was selected among others, and the mean of all cuts is not known
 	[ "$(key r.json epochs) $(key r.json crossval_mean_rms_error_N)" = "1 " ]
 	incise train s1.csv --premises start.fis -o m.fis --overwrite >text 2>/dev/null
-	grep -qE "^  cross-validated: [0-9.]+$" text
+	grep -qE "^  cross-validated: [0-9.]+ N$" text
 	[ "$(incise eval m.fis --uncertainty parts <<<'5 20' | cut -d' ' -f6)" = nan ]
 	incise eval m.fis --uncertainty parts --json <<<'5 20' >r.json
 	[ -z "$(key r.json 'rows[0].sd_mean_N')" ]

@@ -67,6 +67,7 @@ VALUES = """
 --group | cut |
 --handle | |
 --haptic | none haply: |
+--http | 0 8080 127.0.0.1:0 [::1]:0 | name:1 65536 -1 127.0.0.1:x {}
 --idle | 1s 10min | 0 never {}
 --igtl | 0 18944 127.0.0.1:0 [::1]:0 18944/2 127.0.0.1:0/1 | ::1:0 127.0.0.1:x 127.0.0.1 foo 65536 -1 :0 0/3 0/new
 --images | 1 20 | 0 1.5 all {}
@@ -145,6 +146,7 @@ VALUES = """
 --uncertainty eval | none total parts | part {}
 --uncertainty export | none total parts | part {}
 --uncertainty train | none parts | part {}
+--url | url.txt |
 --viewpoint | 15,45,140 | 1,2 a,b,c {}
 --weights | 0,50g,100g,0.2kg | 1,a {}
 """

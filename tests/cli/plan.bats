@@ -16,6 +16,7 @@ setup() {
 		for word in kept "left out" devices libraries arithmetic stability; do
 			[[ "$output" == *$'\n'"$word"* ]]
 		done
+		[ "${lines[-1]}" = "accepted    $scene.scene" ]
 	done
 }
 
@@ -177,14 +178,15 @@ sheet() {
 	for up in 0 0.0871557 0.8 0.999; do
 		sheet 80 $up >m.obj
 		printf 'surface = { kind = "mesh"; file = "m.obj"; };\ntissue = { reaction_N_mm = 0.1; };\n' >m.scene
-		run -0 --separate-stderr incise plan m.scene
-		[[ "${lines[0]}" == "m.scene: "*" ns a tick"* ]]
-		[[ "$output" == *$'\nsurface     '*" x 40 x "*" mm, 400 triangles, 60 open edges from (0, 0, 0) to ("* ]]
-		[[ "$stderr" == *"warning: m.scene: its surface is open"* ]]
 		run -0 --separate-stderr incise plan m.scene --json
 		[[ "$stderr" == *"warning: m.scene: its surface is open"* ]]
 		jq -e '.surface | .triangles == 400 and .size_mm[1] == 40 and .open_edges == 60 and
 			.open_from_mm == [0, 0, 0] and .open_to_mm[1] == 40' <<<"$output"
+		[ $up = 0.8 ] || [ "${CASES:-}" = all ] || continue
+		run -0 --separate-stderr incise plan m.scene
+		[[ "${lines[0]}" == "m.scene: "*" ns a tick"* ]]
+		[[ "$output" == *$'\nsurface     '*" x 40 x "*" mm, 400 triangles, 60 open edges from (0, 0, 0) to ("* ]]
+		[[ "$stderr" == *"warning: m.scene: its surface is open"* ]]
 		incise haptic m.scene --rig sim:clock=simulated --duration 0.1s
 	done
 	sheet 0.08 >m.obj

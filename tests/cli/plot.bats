@@ -44,14 +44,15 @@ shows() {
 }
 
 # bats test_tags=check
-@test "a model: functions, surface and contours" {
+@test "a model: functions and contours" {
 	draws m.fis
 	shows "depth / mm" "velocity / (mm/s)" "force / N" "degree of membership" shallow
+	shows "95 % intervals at 25 mm/s" "95 % intervals at 10 mm"
 	! grep -q residual texts
 	# a curve for each function: 5 over the depth and 4 over the velocity
 	[ "$(grep -cxE '(very )?(shallow|medium|deep|slow|fast)' texts)" = 9 ]
 	# both intervals; no calibration of a rig is stated, and degrees have their unit
-	shows "a new cut" "the mean of all cuts" "95 % intervals at depth / mm = 10"
+	shows "a new cut" "the mean of all cuts" output
 	sed '1s/_mm/_deg/g' pairs.csv >deg.csv
 	incise train deg.csv --inputs depth_deg,velocity_deg_s -o deg.fis >/dev/null 2>&1
 	draws deg.fis
@@ -60,14 +61,19 @@ shows() {
 
 @test "residuals are those of incise eval" {
 	draws m.fis --data pairs.csv
-	shows "residual of force / N" "quantile of the normal distribution / SD"
+	shows "residual of force / N" "quantile of the normal distribution / SD" "mean and its standard error"
 	awk -F, 'NR > 1 { print $2, $3 }' pairs.csv >points
 	# three digits of the RMSE, which is 0.0442 N: no "mean -8.4e-06"
 	paste -d, <(tail -n +2 pairs.csv) <(incise eval m.fis points) | awk -F, '
 		{ e = $4 - $5; sum += e; squares += e * e; n++ }
-		END { printf "%d rows: measured - model, RMSE %.4f, mean %.4f\n",
+		END { printf "%d rows: measured - model, RMSE %.4f N, mean %.4f N\n",
 			n, sqrt(squares / n), sum / n }' | sed 's/-0.0000/0.0000/' >want
 	shows "$(cat want)"
+	# means over twelve parts of the depth: those of the residuals there, weighted, give the mean of all
+	keep_data m.fis --data pairs.csv
+	paste -d, <(tail -n +2 pairs.csv) <(incise eval m.fis points) | awk -F, '$2 >= 20 - 20 / 12 {
+		e = $4 - $5; sum += e; n++ } END { printf "%.5f\n", sum / n }' >want
+	tail -n 1 kept/*-residuals.dat | awk '{ printf "%.5f\n", $2 }' | diff want -
 	# rows where the blade did not advance are no data of the model
 	sed '1s/$/,advancing/; 2,11s/$/,0/; 12,$s/$/,1/' pairs.csv >some.csv
 	draws m.fx --data some.csv
@@ -342,6 +348,17 @@ entry() {
 		$(date -ud 2026-04-05 +%s) 1300 18 0
 		$(date -ud 2026-07-05 +%s) 1238.5 3 1
 	END
+	# the sd of a delay is half of its bar; that of a stream without a delay of its own is a value
+	cat >d.conf <<-END
+		tracker_delay_ms = 4.0;
+		history = ( { kind = "delay"; date = "2026-01-05T00:00:00Z"; pass = true; values = (
+			{ key = "tracker_delay_ms"; found = 0.0; left = 4.0; u = 0.05; unit = "ms"; },
+			{ key = "tracker_delay_sd_ms"; found = 0.0; left = 0.05; u = 0.0; unit = "ms"; },
+			{ key = "force_delay_sd_ms"; found = 0.0; left = 0.01; u = 0.0; unit = "ms"; } ); } );
+	END
+	draws d.conf
+	shows "tracker delay / ms" "force delay sd / ms"
+	! grep "tracker delay sd" texts
 	echo "force_mV_N = 1238.5;" >c.conf
 	fails incise plot c.conf -o c.png -- "c.conf:"
 }

@@ -50,6 +50,25 @@ setup() {
 	jq -e --arg head "$head" '.origins | length == 1 and .[0].sha256 == $head and .[0].state == "same"' <<<"$output"
 }
 
+@test "a model keeps the options that make it again" {
+	incise train p.csv --group cut --check 0.3 --mf 3,2 --seed 7 --ridge 1 --all-rows -o a.fis >/dev/null 2>&1
+	run -0 --separate-stderr incise provenance a.fis
+	options="--group cut --all-rows --inputs depth_mm,velocity_mm_s --target force_N --check 0.3 --seed 7 --mf 3,2 --ridge 1"
+	[ "${lines[0]}" = "a.fis was made by incise train … $options of" ]
+	# shellcheck disable=SC2086 # the options are words
+	incise train p.csv $options -o b.fis >/dev/null 2>&1
+	cmp a.fis b.fis
+	incise train p.csv --inputs velocity_mm_s,depth_mm --search type=gbellmf,classic,step=0.1 --epochs 2 \
+		--mf 2,2 -o c.fis >/dev/null 2>&1
+	command="incise train … --group cut --inputs velocity_mm_s,depth_mm --target force_N --mf 2,2 --search type=gbellmf"
+	command+=" --search classic,step=0.1 --epochs 2"
+	[ "$(incise provenance c.fis --json | jq -r .command)" = "$command" ]
+	${command/…/p.csv} -o d.fis >/dev/null 2>&1
+	cmp c.fis d.fis
+	incise train "a b;.rec" --rate 100 --cut 2 --mf 2,2 -o r.fis >/dev/null 2>&1
+	grep -q "^% incise: source: .*, read with --rate 100 --cut 2$" r.fis
+}
+
 @test "exports carry it: CSV, HDF5, MCAP; and models of recordings, also merged ones" {
 	incise export "a b;.rec" --rate 100 -o e.csv
 	incise export "a b;.rec" -o e.mcap
@@ -93,8 +112,12 @@ setup() {
 	fails incise provenance away -- "away:"
 	incise export "$made/a b;.rec" --average 6x6,count=5 --no-lineage -o plain.csv >/dev/null
 	fails incise provenance plain.csv -- "plain.csv:"
+	sed '/^% incise/d' "$made/m.fis" >table.fis
+	fails incise provenance table.fis -- "table.fis:" "incise.train() of a table"
 	fails incise provenance m.fis.sd -- "m.fis.sd:"
 	fails incise provenance none -- "none:"
+	incise haptic neck --procedure --duration 1s -o s.session >/dev/null
+	fails incise provenance s.session -- s.session "keys source and scene"
 	a=$(printf 'a%.0s' {1..64})
 	printf 'x\0incise:1:model:%s:0:-:%%1B%%5B31m%%2E.fis;incise:1:model:%s:0:-:%%1B%%5B31m.fis;' "$a" "$a" >odd
 	run -1 --separate-stderr incise provenance odd

@@ -40,7 +40,6 @@ refuses() { # WORDS [MAKE-VARIABLE…]
 	[ -z "$(git tag -l)" ] || complain "tagged: $words"
 }
 
-# bats test_tags=check
 @test "release refuses what is not ready, says what it would do, and tags what passed" {
 	scratch_clone
 	echo >>README.md

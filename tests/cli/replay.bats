@@ -57,6 +57,17 @@ teardown() {
 	[ $(($(uptime_ms) - start)) -ge 2980 ]
 }
 
+@test "the report has the largest force along the normal, and a texture that is left out" {
+	incise replay liver.rec "$root/scenes/liver.scene" --model liver.fis -o t.csv >out
+	most=$(awk -F, 'NR > 1 { f = $5 < 0 ? -$5 : $5; if (f > m) m = f } END { printf "%.3f", m }' t.csv)
+	grep -q "^force      largest [0-9.]* N\( (limit)\)\?, along the normal $most N, " out
+	grep -qx "texture    its texture is of the scene's own model" out
+	run -0 incise replay liver.rec liver.scene
+	[[ "$output" != *texture* ]]
+	incise haptic "$root/scenes/liver.scene" --model liver.fis --rig sim:clock=simulated --duration 0.1s >out
+	grep -qx "texture    its texture is of the scene's own model" out
+}
+
 # bats test_tags=check
 @test "the table has every tick, and the report is the table's" {
 	incise replay liver.rec liver.scene -o t.csv --json >r.json

@@ -184,7 +184,7 @@ until_it_says() {
 	fails incise info stepper --json -- "systemctl start incise-stepper"
 	fails incise info /dev/incise-stepper0 -- /dev/incise-stepper0 "No such file"
 	echo text >stepper
-	fails incise info ./stepper # a file of that name -- ./stepper
+	fails incise info ./stepper -- ./stepper # a file of that name
 }
 
 @test "--axis chooses one of the rig's actuators" {

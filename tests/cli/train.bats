@@ -21,6 +21,36 @@ parameters() {
 	grep -v -e ^Name -e ^% "$1"
 }
 
+@test "each group that is held out has its name and its error" {
+	sed '2,$s/^c/d/' pairs.csv | awk -F, -v OFS=, 'NR > 1 { $4 *= 1.1 } 1' >other.csv
+	for group in cut recording; do
+		incise train pairs.csv other.csv --group $group --check 0.4 -o m.fis --overwrite >out 2>/dev/null
+		incise train pairs.csv other.csv --group $group --check 0.4 -o m.fis --overwrite --json >r.json 2>/dev/null
+		[ "$(key r.json check_groups)" = "$(jq '.check_names | length' r.json)" ]
+		jq -r '[.check_names, .check_names_rms_error_N] | transpose[] | join(" ")' r.json >held
+		while read -r kind name rest; do
+			file=${rest#of }
+			[ $kind = cut ] && file=${file% *} || file=$name
+			awk -F, -v name="$name" -v all=$group \
+				'NR > 1 && (all == "recording" || $1 == name) { print $2, $3, $4 }' "$file" >rows
+			rmse=$(paste rows <(cut -d' ' -f1,2 rows | incise eval m.fis 2>/dev/null) |
+				awk '{ s += ($3 - $4) ^ 2 } END { printf "%.12g", sqrt(s / NR) }')
+			holds "(${rest##* } - $rmse)^2 < 1e-18" || complain "$kind $name" || return
+			grep -q "^  $kind $name.* $(printf %.5g "$rmse") N$" out
+		done <<<"$(sed 's/^recording \([^ ]*\) /recording \1 of \1 /' held)"
+	done
+}
+
+@test "few groups make a wide interval, and the report says so" {
+	incise train pairs.csv --group cut -o m.fis >out
+	run ! grep "wide" out
+	grep -v -e ^c4 -e ^c5 -e ^c6 pairs.csv >few.csv
+	incise train few.csv --group cut -o few.fis >out 2>/dev/null
+	grep -q "95 % interval: noise .* N (wide: only 3 cuts)" out
+	grep -q "^  RMSE, N  *training *$" out
+	grep -q "^  cross-validated: [0-9.]*, quadratic [0-9.]*, linear [0-9.]*, mean [0-9.]* N$" out
+}
+
 # bats test_tags=check
 @test "train learns, and says how well" {
 	run -0 --separate-stderr incise train pairs.csv --group cut --check 0.3 -o m.fis
@@ -137,7 +167,7 @@ parameters() {
 	[ "$(key r.json rules)" = 6 ]
 	holds "$(key r.json train.rmse_mNm) > 0"
 	holds "$(key r.json train.mse_mNm2) > 0"
-	[ "$(grep -c gbellmf m.fis)" -eq 5 ]
+	[ "$(grep -c "':'gbellmf'" m.fis)" -eq 5 ]
 	[ "$(sed -n "s/^Name='\(.*\)'/\1/p" m.fis | tail -n 3 | tr '\n' ' ')" = "b a torque_mNm " ]
 	incise train other.csv --inputs a --target torque_mNm -o one.fis 2>/dev/null
 	[ "$(grep -c gaussmf one.fis)" -eq 3 ]
@@ -168,7 +198,7 @@ parameters() {
 @test "train writes the standard deviation beside the model, and checks it" {
 	run -0 --separate-stderr incise train pairs.csv --group cut --check 0.3 -o m.fis
 	[ -s m.fis.sd ]
-	[[ "$output" == *"95 % interval: noise 0."*" N, holds "*" % of the unseen cuts ("*" % of the thirds by depth_mm), "*" % of the worst cut"* ]]
+	[[ "$output" == *"95 % interval: noise 0."*" N (wide: only 4 cuts), holds "*" % of the unseen cuts ("*" % of the thirds by depth_mm), "*" % of the worst cut"* ]]
 	incise train pairs.csv --group cut --check 0.3 -o n.fis --json >r.json 2>/dev/null
 	cmp m.fis.sd n.fis.sd
 	# two cuts only, and they may be the outermost of the six
@@ -201,7 +231,7 @@ parameters() {
 		[ "$(key r.json pairs_tuned)" = "${sample#*:}" ] || complain "$sample: $(key r.json pairs_tuned)" || return
 		[ "$(key r.json pairs)" = 5000 ]
 	done
-	grep -q '^% incise: options: .*search on all pairs' m.fis
+	grep -q '^% incise: options: .* --search sample=0' m.fis
 }
 
 # The largest resident memory of a command, in kB. Address space is no measure of it: a library

@@ -76,7 +76,6 @@ refuses() {
 	[ -z "$(ls bad.fis* 2>/dev/null)" ] || complain "left: $(ls bad.fis*)"
 }
 
-# bats test_tags=check
 @test "train refuses sources without a texture" {
 	refuses smooth.rec events 20 || return
 	grep -v '^#' raw.csv >rows.csv
@@ -88,6 +87,7 @@ refuses() {
 	refuses mean.csv mean.csv means count
 }
 
+# bats test_tags=check
 @test "train refuses options that a texture cannot have" {
 	local wrong
 	for wrong in "--rate 100 -o m.fis" "--share mpi -o m.fis" "--premises t.fis -o m.fac" "-o -"; do

@@ -38,6 +38,7 @@ table() {
 		calibrate delay --rig $rig|--duration or --from
 		calibrate depth|missing method: two-point, line or board
 		calibrate depth three-point|three-point
+		haptic neck --procedure --rig $rig|section 4 of the page that 'incise help lesson' names
 		calibrate depth two-point|(needed without a terminal)
 		calibrate depth board --images 5|(needed without a terminal)
 		calibrate depth line|missing --from pairs.csv

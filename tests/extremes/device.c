@@ -215,7 +215,10 @@ static void try_devices(struct extremes_row *row, const struct property *propert
 	scene = incise_scene_load(file.path, NULL, &err);
 	if (!scene)
 		cli_fail_with(&err);
-	for (long k = extremes_cases(row, property->cases); k; k--)
+	/* Of a part of the cases a third: a run has hundreds of ticks. */
+	for (long k = extremes_cases(row,
+				     property->cases / (row->setup->part > 1 ? 3 : 1));
+	     k; k--)
 		run(row, scene, property->kind);
 	incise_scene_free(scene);
 	fclose(file.file);

@@ -325,17 +325,24 @@ static void write_scalars(FILE *script, const json_t *object)
 	}
 }
 
-/* Different values of a column; neighbours are alike. NULL: 1. */
+/* Different values of a column. NULL: 1. */
 static int count_values(const struct bench_rows *rows, const char *key)
 {
-	char word[TEXT_BYTES], last[TEXT_BYTES] = "";
+	const struct bench_column *column =
+		key ? column_of(rows->table, key, strlen(key)) : NULL;
+	char word[TEXT_BYTES], first[TEXT_BYTES];
 	int n = key ? 0 : 1;
 
-	for (int i = 0; key && i < rows->n; i++) {
-		word_of(column_of(rows->table, key, strlen(key)),
-			row_at(rows->table, rows->rows, i), "%g", word, sizeof(word));
-		n += strcmp(word, last) != 0;
-		strcpy(last, word);
+	for (int i = 0, k; key && i < rows->n; i++) {
+		word_of(column, row_at(rows->table, rows->rows, i), "%g", word,
+			sizeof(word));
+		for (k = 0; k < i; k++) {
+			word_of(column, row_at(rows->table, rows->rows, k), "%g", first,
+				sizeof(first));
+			if (!strcmp(word, first))
+				break;
+		}
+		n += k == i;
 	}
 	return n;
 }

@@ -44,18 +44,19 @@ void calibrate_stated(struct calibrate *c, double given, const char *key,
 {
 	struct incise_calibration_record *record = &c->record;
 	double found = incise_calibration_get(&c->found, key);
-	char line[100], *end;
+	char line[100] = "", *end;
 
 	if (isnan(given) && isnan(found) && !c->json && isatty(STDIN_FILENO) &&
 	    isatty(STDERR_FILENO)) {
-		fprintf(stderr, "%s, in %s [not stated] ", question, unit);
-		*line = '\n';
+		char *text = cli_text("%s, in %s [not stated] ", question, unit);
+
 		/* The end of the input leaves it out, too. */
-		if (!fgets(line, sizeof(line), stdin))
+		if (!cli_ask(text, line, sizeof(line)))
 			calibrate_check_stop();
-		if (*line != '\n') {
+		free(text);
+		if (*line) {
 			given = incise_decimal(line, &end);
-			if (end == line || *end != '\n' || !(given >= 0 && given <= 1000))
+			if (end == line || *end || !(given >= 0 && given <= 1000))
 				cli_fail("expected a number of %s from 0 to 1000; the "
 					 "previous calibration stays active",
 					 unit);

@@ -1026,6 +1026,44 @@ void cli_catch_signals(void)
 	sigaction(SIGHUP, &action, NULL);
 }
 
+/* Wait for input; false: a caught signal came, however shortly before. */
+static bool await_input(void)
+{
+	struct pollfd input = {STDIN_FILENO, POLLIN, 0};
+	sigset_t caught, before;
+	int n;
+
+	sigemptyset(&caught);
+	sigaddset(&caught, SIGINT);
+	sigaddset(&caught, SIGTERM);
+	sigaddset(&caught, SIGHUP);
+	sigprocmask(SIG_BLOCK, &caught, &before);
+	n = cli_stop ? -1 : ppoll(&input, 1, NULL, &before);
+	sigprocmask(SIG_SETMASK, &before, NULL);
+	return n > 0;
+}
+
+bool cli_ask(const char *question, char *answer, int size)
+{
+	for (;;) {
+		int rest;
+
+		fputs(question, stderr);
+		if (!await_input() || !fgets(answer, size, stdin) || cli_stop)
+			return false;
+		if (strchr(answer, '\n') || feof(stdin))
+			break;
+		/* It would answer the next question. */
+		do
+			rest = getchar();
+		while (rest != '\n' && rest != EOF);
+		cli_warn("an answer has up to %d letters; this one was not taken",
+			 size - 2);
+	}
+	answer[strcspn(answer, "\n")] = '\0';
+	return true;
+}
+
 void cli_finish(void)
 {
 	struct pollfd reader = {.fd = STDOUT_FILENO};

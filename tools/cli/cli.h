@@ -119,6 +119,7 @@ struct cli_command {
 	const char *summary;  /* for --help, as of help_print_text() */
 	const struct cli_option *options;
 	const char *notes;    /* the same, below the options; or NULL */
+	char *(*more)(void);  /* one more line below them, free(3); or NULL */
 	const char *examples; /* a command a line; or NULL */
 	/* Meaning of exit status 0 and 1; NULL: "success" and "failure". */
 	const char *success, *failure;
@@ -317,6 +318,13 @@ void cli_progress_forget(void);
 /* SIGINT, SIGTERM and SIGHUP set cli_stop. A second SIGINT or SIGTERM kills. */
 void cli_catch_signals(void);
 extern volatile sig_atomic_t cli_stop;
+
+/*
+ * Ask on standard error, and read the answer from standard input, without its line's end; one that is
+ * longer than @size - 2 is refused and asked for again. Returns false if the input ends or a caught
+ * signal comes.
+ */
+bool cli_ask(const char *question, char *answer, int size);
 
 /*
  * The escape sequence that begins a colour, or with CLI_PLAIN ends it; "" unless the stream is a

@@ -90,7 +90,7 @@ const char *features_remedy(const char *name)
 		if (strstr(features[i][0], word)) {
 			snprintf(remedy, sizeof(remedy), "apt-get install %s%s%s",
 				 features[i][1],
-				 *features[i][2] ? ", or pip install " : "",
+				 *features[i][2] ? "    # or: pip install " : "",
 				 features[i][2]);
 			return remedy;
 		}

@@ -26,7 +26,7 @@ void features_each(void (*found)(void *context, const struct feature *feature),
 extern const char features_left_out[];
 
 /*
- * "apt-get install PACKAGES[, or pip install PACKAGE]" for a name of lib/base/features.def, until the next
+ * "apt-get install PACKAGES[    # or: pip install PACKAGE]", to be pasted, for a name of lib/base/features.def, until the next
  * call. NULL: it has no row.
  */
 const char *features_remedy(const char *name);

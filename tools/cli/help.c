@@ -2,6 +2,7 @@
 /*
  * --help of a command; see help.h.
  */
+#include <ctype.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -134,6 +135,13 @@ void help_print(const struct cli_command *command)
 	if (command->notes) {
 		help_print_text(command->notes, 0, 0);
 		putchar('\n');
+	}
+	if (command->more) {
+		text = command->more();
+		*text = (char)toupper(*text);
+		help_print_text(text, 0, 0);
+		putchar('\n');
+		free(text);
 	}
 	if (example)
 		printf("Example%s:\n", strchr(example, '\n') ? "s" : "");

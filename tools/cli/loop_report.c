@@ -81,8 +81,13 @@ json_t *loop_lateness_json(const struct incise_loop_stats *s)
 			 histogram_json(s->lateness_us));
 }
 
-void loop_texture_line(const struct incise_loop_stats *s)
+void loop_texture_line(const struct incise_loop_stats *s,
+		       const struct incise_scene *scene)
 {
+	const char *why = incise_scene_texture_left_out(scene);
+
+	if (why)
+		printf("texture    %s\n", why);
 	if (!isnan(s->texture_felt))
 		printf("texture    %.0f %% of it acted on the hand\n",
 		       100 * s->texture_felt);

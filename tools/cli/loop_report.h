@@ -6,6 +6,7 @@
 #define INCISE_LOOP_REPORT_H
 
 #include <incise/loop.h>
+#include <incise/scene.h>
 #include "json.h"
 
 /* By enum incise_tool; ends with NULL. */
@@ -34,7 +35,8 @@ const char *loop_below(char *text, size_t size, double us);
 json_t *loop_lateness_json(const struct incise_loop_stats *stats);
 
 /* The line "texture", if there was one. */
-void loop_texture_line(const struct incise_loop_stats *stats);
+void loop_texture_line(const struct incise_loop_stats *stats,
+		       const struct incise_scene *scene);
 
 /* The line "lateness". */
 void loop_lateness_line(const struct incise_loop_stats *stats);

@@ -238,25 +238,34 @@ void plot_put_text(FILE *script, const char *text)
 	plot_put_quoted(script, text, 60, '\'');
 }
 
-void plot_put_label(FILE *script, const char *name)
+const char *plot_unit_of(const char *name, size_t *n)
 {
 	static const struct {
 		const char *suffix, *unit;
-	} units[] = {{"_mm_s", "(mm/s)"}, {"_mm", "mm"}, {"_deg_s", "(°/s)"},
-		     {"_deg", "°"},	  {"_N", "N"},	 {"_s", "s"}};
-	size_t n = strlen(name);
-	const char *unit = NULL;
-	char *text;
+	} units[] = {{"_mm_s", "mm/s"}, {"_mm", "mm"}, {"_deg_s", "°/s"},
+		     {"_deg", "°"},	{"_N", "N"},   {"_s", "s"}};
 
-	for (size_t i = 0; i < sizeof(units) / sizeof(*units) && !unit; i++) {
+	*n = strlen(name);
+	for (size_t i = 0; i < sizeof(units) / sizeof(*units); i++) {
 		size_t suffix = strlen(units[i].suffix);
 
-		if (n <= suffix || strcmp(name + n - suffix, units[i].suffix))
+		if (*n <= suffix || strcmp(name + *n - suffix, units[i].suffix))
 			continue;
-		unit = units[i].unit;
-		n -= suffix;
+		*n -= suffix;
+		return units[i].unit;
 	}
-	text = cli_text(unit ? "%.*s / %s" : "%.*s", (int)n, name, unit);
+	return "";
+}
+
+void plot_put_label(FILE *script, const char *name)
+{
+	size_t n;
+	const char *unit = plot_unit_of(name, &n);
+	char *text = cli_text(!*unit		  ? "%.*s%s"
+			      : strchr(unit, '/') ? "%.*s / (%s)"
+						  : "%.*s / %s",
+			      (int)n, name, unit);
+
 	plot_put_text(script, text);
 	free(text);
 }

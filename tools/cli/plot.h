@@ -77,6 +77,9 @@ void plot_put_quoted(FILE *out, const char *text, int most, char quote);
 /* The same in a script, of 60 characters at most. */
 void plot_put_text(FILE *script, const char *text);
 
+/* The unit in a name such as velocity_mm_s, "mm/s", and the length of the name before it; "": none. */
+const char *plot_unit_of(const char *name, size_t *n);
+
 /* Write the name of a quantity as the title of an axis: 'depth / mm' of depth_mm. */
 void plot_put_label(FILE *script, const char *name);
 

@@ -197,3 +197,27 @@ void recording_replace(const char *new, const char *given)
 	replace(new, path);
 	free(path);
 }
+
+void recording_cuts_step(struct recording_cuts *cuts, double t_s, double depth_mm)
+{
+	if (!cuts->inside && depth_mm > INCISE_CUT_START_MM) {
+		if (cuts->n < RECORDING_CUTS_MOST)
+			cuts->cut[cuts->n++] = (struct recording_cut){t_s, t_s};
+		cuts->inside = true;
+	} else if (cuts->inside && depth_mm < INCISE_CUT_END_MM) {
+		cuts->inside = false;
+	}
+	if (cuts->inside && cuts->n)
+		cuts->cut[cuts->n - 1].to_s = t_s;
+}
+
+bool recording_shows_event(const char *kind)
+{
+	static const char *const kinds[] = {"marker", "button", "trigger",
+					    "failed", "silent", "rate"};
+
+	for (size_t i = 0; i < sizeof(kinds) / sizeof(*kinds); i++)
+		if (!strcmp(kind, kinds[i]))
+			return true;
+	return false;
+}

@@ -34,6 +34,23 @@ int recording_altered(const char *path, bool samples, struct incise_error *err);
 bool recording_intact(const char *path, bool samples, bool damaged,
 		      struct incise_error *err);
 
+/* Cuts by the depth of the tip, counted as in incise-export(1). */
+#define RECORDING_CUTS_MOST 10000
+
+struct recording_cuts {
+	bool inside;
+	int n;
+	struct recording_cut {
+		double from_s, to_s;
+	} cut[RECORDING_CUTS_MOST];
+};
+
+/* The next depth. */
+void recording_cuts_step(struct recording_cuts *cuts, double t_s, double depth_mm);
+
+/* Whether people want to see events of a kind: losses are seen in the streams, cuts in the depth. */
+bool recording_shows_event(const char *kind);
+
 /* Remove a recording; a folder with anything else in it stays. */
 void recording_remove(const char *path);
 

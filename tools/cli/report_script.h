@@ -17,7 +17,7 @@ char *report_script_path(const char *name);
 
 /*
  * Run it until it ends. @what: "check", whether it can run; "bench", report.json of a folder as
- * report.md and report.html; "page", @data as HTML into @out, with the plots of the folder;
+ * report.md and report.html; "page" and "demo", @data as HTML into @out, with the plots of the folder;
  * "compare", two reports of @data as their comparison; "tables", the report @data as text.
  * Returns 0, or a negative errno with the script's last line.
  */

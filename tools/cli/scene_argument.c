@@ -40,6 +40,22 @@ void scene_argument_list_shipped(glob_t *found)
 	free(pattern);
 }
 
+char *scene_argument_installed(void)
+{
+	char *all = cli_text("installed scenes:");
+	glob_t found;
+
+	scene_argument_list_shipped(&found);
+	for (size_t i = 0; i < found.gl_pathc; i++) {
+		char *name = scene_argument_name(found.gl_pathv[i]), *before = all;
+
+		all = cli_text("%s%s %s", before, i ? "," : "", name);
+		free(name), free(before);
+	}
+	globfree(&found);
+	return all;
+}
+
 bool scene_argument_find(struct scene_argument *argument, const char *operand)
 {
 	const char *places[PLACES] = {".", OF_MACHINE, scene_argument_shipped()};

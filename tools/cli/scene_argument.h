@@ -61,6 +61,9 @@ const char *scene_argument_shipped(void);
 /* The paths of all installed scenes, by name: globfree(3). Fails the program if there are none. */
 void scene_argument_list_shipped(glob_t *found);
 
+/* "installed scenes: liver, neck, wall": free(3). */
+char *scene_argument_installed(void);
+
 /* Read it; NULL with errno and @err on failure. incise_scene_free(). */
 struct incise_scene *scene_argument_read(const struct scene_argument *argument,
 					 struct incise_error *err);

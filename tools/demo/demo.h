@@ -16,6 +16,7 @@ struct demo {
 	const char *folder; /* all is left in it */
 	long seed;	    /* of the virtual rig */
 	bool quiet;	    /* --json: no steps and commands */
+	bool silent;	    /* commands warn unseen, as long as they succeed */
 	json_t *summary, *pictures;
 };
 

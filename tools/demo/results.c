@@ -650,6 +650,7 @@ void demo_summary_print(const struct demo *demo, FILE *out, double seconds)
 		"  MSE here / N^2     %12.5f %10.5f\n"
 		"  of %d splits                    %10.5f median, %.5f to %.5f\n"
 		"  MSE in the paper   %12.5f %10.5f   (its unit is not stated)\n"
+		"  %.0f warnings, not printed: half of the pairs is little to learn from\n"
 		"\n"
 		"On held-out cuts, settings by cross-validation, RMSE / N:\n"
 		"  this model         %12.4f %10.4f\n"
@@ -678,6 +679,7 @@ void demo_summary_print(const struct demo *demo, FILE *out, double seconds)
 		number_of_results(halves, "check", "mse_N2"), DEMO_SPLITS,
 		(splits[DEMO_SPLITS / 2 - 1] + splits[DEMO_SPLITS / 2]) / 2, splits[0],
 		splits[DEMO_SPLITS - 1], PAPER_MSE_TRAIN, PAPER_MSE_CHECK,
+		number_of_results(demo->summary, "warnings_of_splits", NULL),
 		number_of_results(unseen, "train", "rms_error_N"),
 		number_of_results(unseen, "check", "rms_error_N"),
 		number_of_results(lines, "mean", "rms_error_N"),

@@ -502,18 +502,63 @@ static void kernel_line(const struct haptic *haptic)
 	       (unsigned long long)r.refused, reasons);
 }
 
+/* Why no tick commanded a force: free(3); NULL if one did. */
+static char *no_force_text(const struct incise_loop_stats *s)
+{
+	static const struct {
+		enum incise_tick_flag flag;
+		const char *text;
+	} causes[] = {
+		{INCISE_TICK_FAULT, "after a device had failed"},
+		{INCISE_TICK_STALE, "without a fresh pose"},
+		{INCISE_TICK_UNUSABLE, "with poses that the tracker flagged as bad"},
+		{INCISE_TICK_NOT_FINITE, "with a force that was not finite"},
+		{INCISE_TICK_STARTING, "while the loop waited for a small force, as out "
+				       "of the tissue"},
+		{INCISE_TICK_UNPAID, "with a force that no work had paid for"},
+		{INCISE_TICK_IN_CUT, "in a cut that was there"},
+	};
+	const unsigned long long contact = s->forceless[0];
+	char *text, *more;
+
+	if (s->force_max_N > 0)
+		return NULL;
+	if (!contact && !(s->nearest_mm < HUGE_VAL))
+		return cli_text("no tick had a fresh pose that can be used");
+	if (!contact)
+		return cli_text("no contact: the tool came no nearer to the tissue than "
+				"%.1f mm",
+				fmax(s->nearest_mm, 0));
+	if (s->forceless_off != INCISE_HAPTIC_ON)
+		return cli_text("%llu ticks in contact, and the force was %s", contact,
+				incise_haptic_off_text(s->forceless_off));
+	text = cli_text("%llu ticks in contact", contact);
+	for (size_t i = 0; i < sizeof(causes) / sizeof(*causes); i++) {
+		const uint64_t ticks = s->forceless[__builtin_ctz(causes[i].flag)];
+
+		if (!ticks)
+			continue;
+		more = cli_text("%s, %llu of them %s", text, (unsigned long long)ticks,
+				causes[i].text);
+		free(text);
+		text = more;
+	}
+	return text;
+}
+
 static void report_run_json(const struct haptic *haptic)
 {
 	struct incise_stepper *stepper = incise_rig_stepper(haptic->rig);
 	const struct incise_loop_stats *s = haptic->stats;
 	bool real = is_real(haptic);
 	json_t *stages = json_array();
+	char *no_force = no_force_text(s);
 
 	for (int i = 0; incise_plan_stage(haptic->plan, i); i++)
 		json_array_append_new(stages,
 				      json_string(incise_plan_stage(haptic->plan, i)));
 	json_print(json_pack(
-		"{sI sI sI sf so so sI sI sI sI so so sf so so so so so ss so so so so so so so}",
+		"{sI sI sI sf so so sI sI sI sI so so sf so so so so so ss so so so so so so so ss?}",
 		"ticks", (json_int_t)s->ticks, "skipped", (json_int_t)s->skipped,
 		"overruns", (json_int_t)s->overruns, "rate_hz", haptic->loop.rate_hz,
 		"lateness_us", real ? loop_lateness_json(s) : json_null(), "tick_ns",
@@ -532,8 +577,9 @@ static void report_run_json(const struct haptic *haptic)
 		cli_stop ? json_string(strsignal(cli_stop)) : json_null(), "kernel",
 		kernel_json(haptic), "calibration",
 		calibration_json(&haptic->calibration), "haptic",
-		haptic_device_json(haptic), "texture_felt",
-		json_number(s->texture_felt)));
+		haptic_device_json(haptic), "texture_felt", json_number(s->texture_felt),
+		"no_force", no_force));
+	free(no_force);
 }
 
 /* Directions that can be felt, and the part of the force that cannot. */
@@ -554,7 +600,7 @@ static void report_run_text(const struct haptic *haptic)
 	struct incise_stepper *stepper = incise_rig_stepper(haptic->rig);
 	const struct incise_loop_stats *s = haptic->stats;
 	double rms_N = render_error(haptic);
-	char a[32], b[32], flags[1000];
+	char a[32], b[32], flags[1000], *no_force = no_force_text(s);
 
 	printf("%llu ticks at %g Hz, %llu missed deadlines in %llu overruns (%s)\n"
 	       "stages    ",
@@ -582,6 +628,9 @@ static void report_run_text(const struct haptic *haptic)
 		printf(", actuator off by %.4f N rms", rms_N);
 	if (stepper)
 		felt_line(haptic);
+	if (no_force)
+		printf("\nno force   %s", no_force);
+	free(no_force);
 	printf("\n"
 	       "ticks      %llu in contact, %llu out of the training range, %llu "
 	       "without a fresh pose, %llu limited\n",
@@ -597,7 +646,7 @@ static void report_run_text(const struct haptic *haptic)
 	       (unsigned long long)ticks_with(s, INCISE_TICK_SLEWED),
 	       (unsigned long long)ticks_with(s, INCISE_TICK_TRAVEL),
 	       (unsigned long long)ticks_with(s, INCISE_TICK_STARTING));
-	loop_texture_line(s);
+	loop_texture_line(s, haptic->scene);
 	kernel_line(haptic);
 	haptic_device_line(haptic);
 	for (int i = 0; (stepper = incise_rig_axis(haptic->rig, i, NULL)); i++)

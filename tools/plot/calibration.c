@@ -65,6 +65,19 @@ static struct series *find_series(struct history *history, const char *kind,
 	return series;
 }
 
+/* A delay has its standard deviation as half of its own bar, in the same record. */
+static bool is_bar(const struct incise_calibration_record *record, const char *key)
+{
+	const char *sd = strstr(key, "_delay_sd_ms");
+	char *delay = cli_text("%.*s_delay_ms", sd ? (int)(sd - key) : 0, key);
+	bool found = false;
+
+	for (int i = 0; sd && i < record->n; i++)
+		found |= !strcmp(record->values[i].key, delay);
+	free(delay);
+	return found;
+}
+
 static struct history read_history(const char *path)
 {
 	struct incise_calibration active;
@@ -78,9 +91,11 @@ static struct history read_history(const char *path)
 		double t_s = date_s(record->date);
 
 		for (int k = 0; k < record->n && !isnan(t_s); k++) {
-			struct series *series =
-				find_series(&history, record->kind, &record->values[k]);
+			struct series *series;
 
+			if (is_bar(record, record->values[k].key))
+				continue;
+			series = find_series(&history, record->kind, &record->values[k]);
 			series->first_s = series->n ? fmin(series->first_s, t_s) : t_s;
 			series->last_s = series->n ? fmax(series->last_s, t_s) : t_s;
 			series->n++;

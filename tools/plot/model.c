@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * The figure of a model: its membership functions, its output as a surface and as contours, and
- * the residuals of a dataset. See figure.h.
+ * The figure of a model: its membership functions, its output as a map with contours, or of one input
+ * as a curve, and the residuals of a dataset. See figure.h.
  *
  *     ┌─ functions ──┬─ functions ──┐   of a .fis
- *     ├─ surface ────┼─ contours ───┤
- *     ├─ band ───────┼─ band ───────┤   over the first two inputs, with MODEL.fis.sd
+ *     ├─ output ─────┴──────────────┤
+ *     ├─ band ───────┬─ band ───────┤   over the first two inputs, with MODEL.fis.sd
  *     ├─ residuals ──┼─ quantiles ──┤   with --data
  *     └──────────────┴──────────────┘
  */
@@ -25,6 +25,7 @@
 #define RESIDUALS_HEIGHT 400
 
 #define QUANTILES 400
+#define MEANS 12 /* of residuals, over the first input */
 
 /* Panels in rows, two of them side by side, from the top. */
 struct model_grid {
@@ -93,6 +94,31 @@ static void widen_model(double *low, double *high, const double *value, size_t n
 	}
 }
 
+/* Rows "middle, mean, its standard error" of equal parts of the first input that have two residuals or more. */
+static void write_means(const struct residuals *r, double low, double high, FILE *data)
+{
+	struct {
+		double n, sum, squares;
+	} part[MEANS] = {{0}};
+	const double width = fmax((high - low) / MEANS, 1e-300);
+
+	for (size_t i = 0; i < r->n; i++) {
+		const int k = (int)fmin((r->at[i] - low) / width, MEANS - 1);
+
+		part[k].n++;
+		part[k].sum += r->value[i];
+		part[k].squares += r->value[i] * r->value[i];
+	}
+	for (int k = 0; k < MEANS; k++) {
+		const double n = part[k].n, mean = part[k].sum / n;
+
+		if (n > 1)
+			fprintf(data, "%.6g %.6g %.6g\n", low + (k + 0.5) * width, mean,
+				sqrt(fmax(0, part[k].squares / n - mean * mean) /
+				     (n - 1)));
+	}
+}
+
 static void write_residuals(const struct residuals *r, const char *folder,
 			    const char *name)
 {
@@ -107,6 +133,8 @@ static void write_residuals(const struct residuals *r, const char *folder,
 		if (scatter_takes(&scatter, r->at[i], r->value[i]))
 			fprintf(data, "%.6g %.6g\n", r->at[i], r->value[i]);
 	scatter_end(&scatter);
+	fputs("\n\n", data);
+	write_means(r, low[0], high[0], data);
 	plot_data_end(data, folder);
 }
 
@@ -135,23 +163,30 @@ static void put_residuals(struct model_grid *grid, const struct model_surface *s
 {
 	/* Three digits of the RMSE. */
 	int decimals = r->rms > 0 ? (int)fmin(fmax(2 - floor(log10(r->rms)), 0), 12) : 0;
+	size_t n;
+	const char *unit = plot_unit_of(surface->output.name, &n),
+		   *gap = *unit ? " " : "";
 
 	place_model_plot(grid, 0, 2, RESIDUALS_HEIGHT);
 	fprintf(grid->script,
-		"unset key\nset xrange [*:*]\nset yrange [*:*]\n"
-		"set title '%zu rows: measured - model, RMSE %.*f, mean %.*f'\n"
+		"set key outside bottom center horizontal\nset xrange [*:*]\nset yrange [*:*]\n"
+		"set title '%zu rows: measured - model, RMSE %.*f%s%s, mean "
+		"%.*f%s%s'\n"
 		"set xlabel ",
-		r->n, decimals, r->rms, decimals,
-		round(r->mean * pow(10, decimals)) / pow(10, decimals) + 0.0); /* no -0 */
+		r->n, decimals, r->rms, gap, unit, decimals,
+		round(r->mean * pow(10, decimals)) / pow(10, decimals) + 0.0, /* no -0 */
+		gap, unit);
 	plot_put_label(grid->script, surface->input[0].name);
 	fputc('\n', grid->script);
 	put_residual_label(grid->script, surface);
 	fprintf(grid->script,
-		"plot '%s' with points pt 7 ps 0.4 lc rgb blue, 0 with lines lc rgb ink\n",
+		"plot '%s' index 0 with points pt 7 ps 0.4 lc rgb blue title 'rows', "
+		"0 with lines lc rgb ink notitle, '' index 1 with yerrorbars pt 7 ps 0.8 lw 1.5 "
+		"lc rgb orange title 'mean and its standard error'\n",
 		grid->residuals);
 	place_model_plot(grid, 1, 2, RESIDUALS_HEIGHT);
 	fprintf(grid->script,
-		"set title 'quantiles of the residuals; line: normal distribution'\n"
+		"unset key\nset title 'quantiles of the residuals; line: normal distribution'\n"
 		"set xlabel 'quantile of the normal distribution / SD'\n"
 		"plot '%s' using (invnorm($1)):2 with points pt 7 ps 0.4 lc rgb "
 		"blue, %g + %g * x with lines lc rgb ink\n",
@@ -216,10 +251,15 @@ static void put_band(struct model_grid *grid, const struct model_surface *surfac
 				      : "");
 	if (surface->n_inputs == 2) {
 		const struct incise_variable *other = &surface->input[!input];
+		double middle = (other->min + other->max) / 2;
+		size_t n;
+		const char *unit = plot_unit_of(other->name, &n);
+		char *at = *unit ? cli_text(" at %.3g %s", middle, unit)
+				 : cli_text(" at %s = %.3g", other->name, middle);
 
-		fputs(".' at '.", grid->script);
-		plot_put_label(grid->script, other->name);
-		fprintf(grid->script, ".' = %.3g'", (other->min + other->max) / 2);
+		putc('.', grid->script);
+		plot_put_text(grid->script, at);
+		free(at);
 	}
 	fputs("\nset xlabel ", grid->script);
 	plot_put_label(grid->script, surface->input[input].name);
@@ -241,19 +281,12 @@ static void put_surface(struct model_grid *grid, const struct model_surface *sur
 				    ? "the other inputs at the middle of their support"
 				    : "";
 
-	fputs("unset key\nset xrange [*:*]\n", grid->script);
-	if (surface->n_inputs == 1) {
-		place_model_plot(grid, 0, 1, SURFACE_HEIGHT);
+	fputs("unset key\nset xrange [*:*]\nset yrange [*:*]\n", grid->script);
+	place_model_plot(grid, 0, 1, SURFACE_HEIGHT);
+	if (surface->n_inputs == 1)
 		model_plot_surface(grid->script, surface, grid->surface, title, "");
-		return;
-	}
-	/* The map has the colours of the surface. */
-	fputs("unset colorbox\n", grid->script);
-	place_model_plot(grid, 0, 2, SURFACE_HEIGHT);
-	model_plot_surface(grid->script, surface, grid->surface, title, "");
-	fputs("set colorbox\n", grid->script);
-	place_model_plot(grid, 1, 2, SURFACE_HEIGHT);
-	model_plot_contours(grid->script, surface, grid->surface, title);
+	else
+		model_plot_contours(grid->script, surface, grid->surface, title);
 }
 
 /* @model NULL: a compiled model has no known functions; @uncertainty NULL: unknown. */

@@ -166,12 +166,7 @@ static const struct stream {
 	const char *name, *arrow;
 } streams[STREAMS] = {{"force", "force"}, {"tracker", "tracker"}, {"camera", "frames"}};
 
-#define CUTS_MOST 10000
 #define EVENTS_MOST 2000
-
-struct cut {
-	double from_s, to_s;
-};
 
 struct event {
 	double t_s;
@@ -192,8 +187,8 @@ struct recorded {
 	double whole_s; /* all that was recorded */
 	struct presence presence[STREAMS];
 	uint64_t clipped;
-	int n_cuts, n_events;
-	struct cut cut[CUTS_MOST];
+	struct recording_cuts cuts;
+	int n_events;
 	struct event event[EVENTS_MOST];
 	struct recording_range range[PANELS];
 	uint64_t rows, rows_read; /* for the progress */
@@ -309,19 +304,6 @@ static void read_force(struct recorded *r)
 	line_close(&clipped, r->figure->folder);
 }
 
-/* A cut starts at the first depth and ends at the second one, as in incise-export(1). */
-static void step_cut(struct recorded *r, double t_s, double depth_mm, bool *inside)
-{
-	if (!*inside && depth_mm > INCISE_CUT_START_MM && r->n_cuts < CUTS_MOST)
-		r->cut[r->n_cuts++] = (struct cut){t_s, t_s};
-	if (!*inside && depth_mm > INCISE_CUT_START_MM)
-		*inside = true;
-	else if (*inside && depth_mm < INCISE_CUT_END_MM)
-		*inside = false;
-	if (*inside && r->n_cuts)
-		r->cut[r->n_cuts - 1].to_s = t_s;
-}
-
 /* A pose that gives no depth is missing here too. */
 static void read_depth(struct recorded *r)
 {
@@ -330,7 +312,6 @@ static void read_depth(struct recorded *r)
 	struct recording_line depth, speed;
 	struct ArrowArray batch;
 	int64_t seq = -1;
-	bool inside = false;
 
 	line_open(&depth, &r->span, folder, "depth.dat");
 	line_open(&speed, &r->span, folder, "speed.dat");
@@ -345,7 +326,7 @@ static void read_depth(struct recorded *r)
 			}
 			line_add(&depth, t_s, real_at(&batch, 2, i));
 			line_add(&speed, t_s, real_at(&batch, 3, i));
-			step_cut(r, t_s, real_at(&batch, 2, i), &inside);
+			recording_cuts_step(&r->cuts, t_s, real_at(&batch, 2, i));
 		}
 	stream.release(&stream);
 	line_close(&depth, folder);
@@ -375,18 +356,6 @@ static void read_frames(struct recorded *r)
 	read_lines(r, rc ? NULL : &stream, &depth, NULL, NULL);
 }
 
-/* Losses are seen in the streams, cuts in the depth. */
-static bool is_shown(const char *kind)
-{
-	static const char *const kinds[] = {"marker", "button", "trigger",
-					    "failed", "silent", "rate"};
-
-	for (size_t i = 0; i < sizeof(kinds) / sizeof(*kinds); i++)
-		if (!strcmp(kind, kinds[i]))
-			return true;
-	return false;
-}
-
 static void read_events(struct recorded *r)
 {
 	struct ArrowArrayStream stream = open_stream(r, "events");
@@ -399,8 +368,9 @@ static void read_events(struct recorded *r)
 
 			text_at(&batch, 1, i, event.kind, sizeof(event.kind));
 			text_at(&batch, 2, i, event.text, sizeof(event.text));
-			if (is_shown(event.kind) && event.t_s >= r->span.from_s &&
-			    event.t_s <= r->span.to_s && r->n_events < EVENTS_MOST)
+			if (recording_shows_event(event.kind) &&
+			    event.t_s >= r->span.from_s && event.t_s <= r->span.to_s &&
+			    r->n_events < EVENTS_MOST)
 				r->event[r->n_events++] = event;
 		}
 	stream.release(&stream);
@@ -486,9 +456,9 @@ static int write_cuts(const struct recorded *r)
 	double apart_s = (r->span.to_s - r->span.from_s) / 45, last_s = -INFINITY;
 	int n = 0;
 
-	for (int i = 0; i < r->n_cuts; i++) {
-		double from_s = fmax(r->cut[i].from_s, r->span.from_s);
-		double to_s = fmin(r->cut[i].to_s, r->span.to_s);
+	for (int i = 0; i < r->cuts.n; i++) {
+		double from_s = fmax(r->cuts.cut[i].from_s, r->span.from_s);
+		double to_s = fmin(r->cuts.cut[i].to_s, r->span.to_s);
 		bool fits = (from_s + to_s) / 2 - last_s >= apart_s;
 
 		if (from_s > to_s)

@@ -3,7 +3,7 @@
 
 report.py bench FOLDER   FOLDER/report.json as FOLDER/report.md and report.html, by bench.j2
 report.py check          nothing: what it needs is there
-report.py page FOLDER    JSON on standard input as HTML on standard output, by assess.j2
+report.py page FOLDER    JSON on standard input as HTML on standard output, by assess.j2; demo FOLDER, by demo.j2
 
 Plots are FOLDER/*.svg, or below FOLDER/plots. A template makes blocks: `{% filter p %}` a paragraph,
 `{% filter li %}` an item of a list, `{% filter note %}` a box, and table(), plot(), heading() and
@@ -390,7 +390,8 @@ def main():
         bench(folder)
     else:
         data = json.load(sys.stdin)
-        sys.stdout.write(render("assess.j2", Page(folder), data["title"], data))
+        template = {"page": "assess.j2", "demo": "demo.j2"}[command]
+        sys.stdout.write(render(template, Page(folder), data["title"], data))
 
 
 if __name__ == "__main__":

@@ -21,8 +21,8 @@
 #include "../../lib/device/igtl/igtl_message.h"
 #include "../cli/cli.h"
 #include "../cli/json.h"
+#include "../cli/pixels.h"
 #include "clients.h"
-#include "pixels.h"
 #include "serve.h"
 
 enum output { POSE, FORCE, DATA, FRAME, STATUS, REPLY, OUTPUTS };
@@ -283,7 +283,8 @@ static void igtl_send(struct serve_sink *sink, const struct serve_item *item)
 		[SERVE_STATUS] = send_status,
 	};
 
-	send[item->kind]((struct igtl *)sink, item);
+	if (send[item->kind])
+		send[item->kind]((struct igtl *)sink, item);
 }
 
 /* --- receiving ----------------------------------------------------------------------- */

@@ -2,7 +2,7 @@
 /*
  * The parts of incise serve, in one thread:
  *
- *     source ── samples ──▶ stream: rate, means, UTC ── items ──▶ sinks: OpenIGTLink, LSL, ROS 2
+ *     source ── samples ──▶ stream: rate, means, UTC ── items ──▶ sinks: OpenIGTLink, LSL, ROS 2, pages
  *     (loop, rig, recording)                                      (each with its clients)
  *
  * A source names the time of the next request for its new samples. A sink takes items and
@@ -17,10 +17,19 @@
 #include <incise/calibration.h>
 #include <incise/camera.h>
 #include <incise/outlet.h>
+#include <incise/state.h>
 
 /* --- items ----------------------------------------------------------------------------- */
 
-enum serve_kind { SERVE_POSE, SERVE_FORCE, SERVE_FRAME, SERVE_STATUS, SERVE_KINDS };
+enum serve_kind {
+	SERVE_POSE,
+	SERVE_FORCE,
+	SERVE_FRAME,
+	SERVE_STATUS,
+	SERVE_DEPTH, /* these are for pages alone */
+	SERVE_LOOP,
+	SERVE_KINDS
+};
 
 enum serve_state {
 	SERVE_RUNS,
@@ -48,6 +57,8 @@ struct serve_item {
 			int samples;
 		} force;
 		const struct incise_camera_frame *frame;
+		double depth_mm; /* of the tip below the surface */
+		const struct incise_state_now *loop;
 		struct {
 			enum serve_state state;
 			const char *name; /* "running", … */
@@ -65,6 +76,7 @@ struct serve_info {
 	double rate_hz;	  /* poses and forces at most */
 	bool kinds[SERVE_KINDS];
 	bool commanded; /* forces are a loop's commands, in the tracker's frame */
+	bool tools;	/* its tool can be set */
 };
 
 struct serve_sink {
@@ -124,6 +136,22 @@ void serve_ros2_parse(void *options, char *text);
 struct serve_sink *serve_outlets_new(const struct serve_outlets_options *options,
 				     const struct serve_info *info);
 
+struct serve_source;
+
+/* Pages of browsers, and the viewer (http.c). */
+struct serve_http_options {
+	const char *address; /* [ADDR:]PORT; NULL: no pages */
+	const char *url;     /* file for the page's address; NULL: the terminal */
+	const char *view;    /* a file to show in place of the source; or NULL */
+	bool control;	     /* orders are taken */
+	char capture[80];    /* name of the recording that is made; "" none */
+};
+
+/* Listen; fails the program if it cannot. @options, @info and @source, which may be NULL, live longer. */
+struct serve_sink *serve_http_new(const struct serve_http_options *options,
+				  const struct serve_info *info,
+				  struct serve_source *source);
+
 /* --- sources --------------------------------------------------------------------------- */
 
 struct serve_stream;
@@ -139,6 +167,12 @@ struct serve_source_ops {
 	 */
 	int (*read)(struct serve_source *source, struct serve_stream *stream,
 		    int64_t now_ns, int64_t *next_ns);
+	/*
+	 * An order of a page: "tool", "capture", "stop", "mark", with its text. Returns whether it
+	 * failed, and in @reply why, or what was done. NULL: none is taken.
+	 */
+	bool (*order)(struct serve_source *source, const char *what, const char *text,
+		      char *reply, size_t size);
 	/* UTC of a time of the source, ns since 1970; 0: not known. */
 	int64_t (*utc)(struct serve_source *source, int64_t t_ns);
 	void (*free)(struct serve_source *source);
@@ -149,7 +183,9 @@ struct serve_source_options {
 	const char *operand; /* a loop, its status file, or a recording; or NULL */
 	const char *rig;
 	struct incise_calibration calibration;
-	bool camera;	    /* send frames */
+	const char *calibration_path; /* NULL: nominal values */
+	char *capture; /* of 80 bytes: name of the recording that is made, set by the rig */
+	bool camera;   /* send frames */
 	bool camera_needed; /* and fail without */
 	double rate_hz;
 	double speed; /* of a recording */
@@ -173,6 +209,9 @@ void serve_pose(struct serve_stream *stream, int64_t t_ns, const double position
 		const double quaternion[4], const double tip_mm[3], uint64_t lost);
 void serve_force(struct serve_stream *stream, int64_t t_ns, const double force_N[3],
 		 uint64_t lost);
+/* The depth of the tip, and the state of a loop: for pages alone. */
+void serve_depth(struct serve_stream *stream, int64_t t_ns, double depth_mm);
+void serve_loop(struct serve_stream *stream, const struct incise_state_now *now);
 bool serve_frame_is_due(const struct serve_stream *stream, int64_t t_ns);
 void serve_frame(struct serve_stream *stream, const struct incise_camera_frame *frame,
 		 uint64_t lost);

@@ -4,8 +4,10 @@
  */
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <incise/state.h>
 #include "../cli/cli.h"
+#include "../haptic/control.h"
 #include "../status/pages.h"
 #include "serve.h"
 
@@ -62,7 +64,9 @@ static void look_source_loop(struct loop *loop, struct serve_stream *stream)
 		     : (unsigned int)now.run < INCISE_RUNS ? states[now.run]
 							   : SERVE_FAULT,
 		     now.alive || ended ? incise_run_name(now.run) : "dead", text);
-	if (!now.alive)
+	if (now.alive)
+		serve_loop(stream, &now);
+	else
 		follow_next(loop);
 }
 
@@ -88,9 +92,36 @@ static int loop_read(struct serve_source *source, struct serve_stream *stream,
 					   ticks[i].quaternion, no_tip, loop->lost);
 			serve_force(stream, ticks[i].t_ns, ticks[i].command_N,
 				    loop->lost);
+			serve_depth(stream, ticks[i].t_ns, ticks[i].depth_mm);
 		}
 	} while (n == BATCH);
 	return 0;
+}
+
+/* As incise tool does. */
+static bool loop_order(struct serve_source *source, const char *what, const char *text,
+		       char *reply, size_t size)
+{
+	const struct loop *loop = (struct loop *)source;
+	char answer[CONTROL_LINE], *path, *request;
+	int rc;
+
+	if (strcmp(what, "tool")) {
+		snprintf(reply, size,
+			 "a loop has no order '%s': its tool can be set here", what);
+		return true;
+	}
+	path = control_path(loop->path);
+	request = cli_text("tool %s", text);
+	rc = control_ask(path, request, 500, answer);
+	if (rc)
+		snprintf(reply, size, "%s: its loop does not answer: %s", loop->name,
+			 strerror(-rc));
+	else
+		snprintf(reply, size, "%s", answer);
+	free(path);
+	free(request);
+	return rc || strncmp(answer, "ok ", 3);
 }
 
 static int64_t loop_utc(struct serve_source *source, int64_t t_ns)
@@ -108,7 +139,7 @@ static void loop_free(struct serve_source *source)
 }
 
 static const struct serve_source_ops loop_ops = {
-	.read = loop_read, .utc = loop_utc, .free = loop_free};
+	.read = loop_read, .order = loop_order, .utc = loop_utc, .free = loop_free};
 
 /* The named page, or the page of the only loop that runs. */
 static struct state_page_file *choose_source_loop(struct state_pages *pages, bool named)
@@ -156,7 +187,8 @@ struct serve_source *serve_loop_open(const struct serve_source_options *options,
 	if (incise_state_alive(page->state) != 1)
 		cli_warn("loop %s does not run; its next run is followed", page->name);
 	info->name = cli_text("loop %s", page->name);
-	info->commanded = true;
+	info->commanded = info->tools = true;
 	info->kinds[SERVE_POSE] = info->kinds[SERVE_FORCE] = true;
+	info->kinds[SERVE_DEPTH] = true;
 	return &loop->base;
 }

@@ -4,7 +4,10 @@
  */
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
+#include <incise/recorder.h>
 #include <incise/rig.h>
+#include "../../lib/base/vector.h"
 #include "../cli/cli.h"
 #include "serve.h"
 
@@ -12,6 +15,7 @@
 #define POLL_MAX_NS 5000000LL
 #define POSES 64
 #define SAMPLES 1024
+#define CAPTURE 80 /* bytes of options->capture */
 
 struct rig {
 	struct serve_source base;
@@ -20,6 +24,7 @@ struct rig {
 	struct incise_force *force;
 	struct incise_camera *camera;
 	struct incise_calibration calibration;
+	double surface_mm[3], normal[3];
 	struct incise_tracker_info tracker_info;
 	struct incise_force_info force_info;
 	int64_t poll_ns, tracker_delay_ns, force_delay_ns, camera_delay_ns;
@@ -27,7 +32,10 @@ struct rig {
 	double zero_sum;
 	int64_t zero_n, zero_until_ns;
 	uint64_t lost;
-	const char *failed; /* the device that failed */
+	struct incise_recorder *recorder; /* it reads the devices; NULL: no capture */
+	const char *calibration_path;
+	char *capture, ended[300]; /* its name, for pages; why it ended by itself */
+	const char *failed;	   /* the device that failed */
 	char why[300];
 };
 
@@ -56,6 +64,16 @@ static int camera_cause(void *of, char *text, size_t size)
 	return incise_camera_cause(of, text, size);
 }
 
+static double depth_mm(const struct rig *rig, const struct incise_tracker_sample *pose)
+{
+	double tip_mm[3], below_mm[3];
+
+	v3_rotate(tip_mm, pose->quaternion, rig->calibration.tip_mm);
+	v3_add(tip_mm, pose->position_mm, 1, tip_mm);
+	v3_add(below_mm, rig->surface_mm, -1, tip_mm);
+	return v3_dot(below_mm, rig->normal);
+}
+
 static void read_poses(struct rig *rig, struct serve_stream *stream)
 {
 	struct incise_tracker_sample poses[POSES];
@@ -74,6 +92,8 @@ static void read_poses(struct rig *rig, struct serve_stream *stream)
 			serve_pose(stream, poses[i].t_ns - rig->tracker_delay_ns,
 				   poses[i].position_mm, poses[i].quaternion,
 				   rig->calibration.tip_mm, rig->lost);
+			serve_depth(stream, poses[i].t_ns - rig->tracker_delay_ns,
+				    depth_mm(rig, &poses[i]));
 		}
 	} while (n == POSES);
 	if (n >= 0)
@@ -140,6 +160,110 @@ static void read_frames(struct rig *rig, struct serve_stream *stream)
 	rig->camera = NULL;
 }
 
+/* --- a capture --------------------------------------------------------------------------- */
+
+/* Returns whether it failed, and in @reply why, or what was written. @why: it ended by itself. */
+static bool end_capture(struct rig *rig, const char *why, char *reply, size_t size)
+{
+	struct incise_error err = {0};
+	bool failed = incise_recorder_close(rig->recorder, &err);
+
+	if (failed)
+		snprintf(reply, size, "%s%s%s", why, *why ? "; " : "", err.text);
+	else
+		snprintf(reply, size, "wrote %s.rec", rig->capture);
+	cli_note("%s", reply);
+	rig->recorder = NULL;
+	*rig->capture = '\0';
+	snprintf(rig->ended, sizeof(rig->ended), "%s", why);
+	return failed;
+}
+
+/* The recorder reads all samples; the page gets the last of each. */
+static void read_recorder(struct rig *rig, struct serve_stream *stream, int64_t now_ns)
+{
+	struct incise_recorder_stats stats;
+	struct incise_error err = {0};
+	char reply[400];
+
+	if (incise_recorder_poll(rig->recorder, &err)) {
+		end_capture(rig, err.text, reply, sizeof(reply));
+		return;
+	}
+	incise_recorder_stats(rig->recorder, &stats);
+	serve_force(stream, now_ns, (double[]){0, 0, stats.force_N}, stats.force_lost);
+	serve_depth(stream, now_ns, stats.depth_mm);
+	serve_lost(stream, stats.force_lost + stats.tracker_lost);
+}
+
+static bool is_capture_name(const char *name)
+{
+	size_t n = strspn(name, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
+				"0123456789_-");
+
+	return n > 0 && n < 70 && !name[n] && *name != '-';
+}
+
+static bool start_capture(struct rig *rig, const char *name, char *reply, size_t size)
+{
+	const struct incise_recorder_setup setup = {
+		.calibration = &rig->calibration,
+		.calibration_path = rig->calibration_path,
+		.cuts = true,
+	};
+	struct incise_error err = {0};
+	char *path;
+
+	if (rig->recorder || !is_capture_name(name)) {
+		snprintf(reply, size,
+			 rig->recorder
+				 ? "%s.rec is being recorded; stop it first"
+				 : "'%.80s' is no name of a recording: give letters, "
+				   "digits, - and _",
+			 rig->recorder ? rig->capture : name);
+		return true;
+	}
+	path = cli_text("%s.rec", name);
+	rig->recorder = incise_recorder_new(path, rig->rig, &setup, &err);
+	snprintf(reply, size, "%s", rig->recorder ? path : err.text);
+	free(path);
+	if (!rig->recorder)
+		return true;
+	snprintf(rig->capture, CAPTURE, "%s", name);
+	*rig->ended = '\0';
+	return false;
+}
+
+static bool rig_order(struct serve_source *source, const char *what, const char *text,
+		      char *reply, size_t size)
+{
+	struct rig *rig = (struct rig *)source;
+	struct incise_error err = {0};
+
+	if (!strcmp(what, "capture"))
+		return start_capture(rig, text, reply, size);
+	if (strcmp(what, "stop") && strcmp(what, "mark")) {
+		snprintf(reply, size,
+			 "a rig has no order '%s': there are capture, stop and mark",
+			 what);
+		return true;
+	}
+	if (!rig->recorder) {
+		snprintf(reply, size, "nothing is being recorded");
+		return true;
+	}
+	if (*what == 'm') {
+		snprintf(reply, size, "marked: %s", text);
+		if (!incise_recorder_mark(rig->recorder, "marker", text, &err))
+			return false;
+		end_capture(rig, err.text, reply, size);
+		return true;
+	}
+	return end_capture(rig, "", reply, size);
+}
+
+/* --- the source -------------------------------------------------------------------------- */
+
 static int rig_read(struct serve_source *source, struct serve_stream *stream,
 		    int64_t now_ns, int64_t *next_ns)
 {
@@ -149,13 +273,20 @@ static int rig_read(struct serve_source *source, struct serve_stream *stream,
 	*next_ns = now_ns + rig->poll_ns;
 	rig->lost = (rig->tracker ? incise_tracker_lost(rig->tracker) : 0) +
 		    (rig->force ? incise_force_lost(rig->force) : 0);
-	if (rig->tracker)
-		read_poses(rig, stream);
-	if (rig->force)
-		read_forces(rig, stream);
-	if (rig->camera)
-		read_frames(rig, stream);
-	if (rig->failed) {
+	if (rig->recorder) {
+		read_recorder(rig, stream, now_ns);
+	} else {
+		if (rig->tracker)
+			read_poses(rig, stream);
+		if (rig->force)
+			read_forces(rig, stream);
+		if (rig->camera)
+			read_frames(rig, stream);
+	}
+	if (*rig->ended) {
+		snprintf(text, sizeof(text), "the capture ended: %s", rig->ended);
+		serve_status(stream, SERVE_FAULT, "fault", text);
+	} else if (rig->failed) {
 		snprintf(text, sizeof(text), "%s: %s", rig->failed, rig->why);
 		serve_status(stream, SERVE_FAULT, "fault", text);
 	} else {
@@ -175,12 +306,14 @@ static void rig_free(struct serve_source *source)
 {
 	struct rig *rig = (struct rig *)source;
 
+	if (rig->recorder)
+		end_capture(rig, "", (char[400]){0}, 400);
 	incise_rig_close(rig->rig);
 	free(rig);
 }
 
 static const struct serve_source_ops rig_ops = {
-	.read = rig_read, .utc = rig_utc, .free = rig_free};
+	.read = rig_read, .order = rig_order, .utc = rig_utc, .free = rig_free};
 
 static int64_t delay_ns(double ms, int64_t own_ns)
 {
@@ -205,6 +338,7 @@ struct serve_source *serve_rig_open(const struct serve_source_options *options,
 			 "clock=real",
 			 incise_rig_spec(rig->rig));
 	rig->calibration = options->calibration;
+	incise_rig_surface(rig->rig, rig->surface_mm, rig->normal);
 	rig->tracker = incise_rig_tracker(rig->rig);
 	rig->force = incise_rig_force(rig->rig);
 	rig->camera = incise_rig_camera(rig->rig);
@@ -223,7 +357,9 @@ struct serve_source *serve_rig_open(const struct serve_source_options *options,
 		       : rig->poll_ns > POLL_MAX_NS ? POLL_MAX_NS
 						    : rig->poll_ns;
 	info->name = cli_text("rig %s", incise_rig_spec(rig->rig));
-	info->kinds[SERVE_POSE] = true;
+	rig->capture = options->capture;
+	rig->calibration_path = options->calibration_path;
+	info->kinds[SERVE_POSE] = info->kinds[SERVE_DEPTH] = true;
 	info->kinds[SERVE_FORCE] = rig->force;
 	info->kinds[SERVE_FRAME] = rig->camera;
 	return &rig->base;

@@ -199,6 +199,30 @@ void serve_force(struct serve_stream *stream, int64_t t_ns, const double force_N
 	send_item(stream, &item);
 }
 
+void serve_depth(struct serve_stream *stream, int64_t t_ns, double depth_mm)
+{
+	struct serve_item item = {.kind = SERVE_DEPTH,
+				  .t_ns = t_ns,
+				  .lost = stream->lost,
+				  .depth_mm = depth_mm};
+
+	note_step(stream, SERVE_DEPTH, t_ns);
+	if (!is_due(stream, SERVE_DEPTH, t_ns))
+		return;
+	set_due(stream, SERVE_DEPTH, t_ns);
+	send_item(stream, &item);
+}
+
+void serve_loop(struct serve_stream *stream, const struct incise_state_now *now)
+{
+	struct serve_item item = {.kind = SERVE_LOOP,
+				  .t_ns = cli_now_ns(),
+				  .lost = stream->lost,
+				  .loop = now};
+
+	send_item(stream, &item);
+}
+
 bool serve_frame_is_due(const struct serve_stream *stream, int64_t t_ns)
 {
 	return is_due(stream, SERVE_FRAME, t_ns);

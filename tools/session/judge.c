@@ -13,21 +13,24 @@ static const struct {
 	enum form form;
 	int digits;
 	bool of_membrane; /* a scene without one has no value */
+	bool of_contact;  /* nor has a session in which no tool touched the tissue */
 } criteria[INCISE_CRITERIA] = {
 	[INCISE_CRITERION_CUT_LENGTH] = {"length of the incision", "length_mm", "mm",
 					 RANGE, 1, false},
 	[INCISE_CRITERION_CUT_DEPTH] = {"depth of the incision", "depth_mm", "mm", RANGE,
 					1, false},
 	[INCISE_CRITERION_OFF_TARGET] = {"off the target", "off_mm", "mm", MOST, 1, true},
-	[INCISE_CRITERION_INCISIONS] = {"incisions", "incisions", "", MOST, 0, false},
+	[INCISE_CRITERION_INCISIONS] = {"incisions", "incisions", "", MOST, 0, false,
+					true},
 	[INCISE_CRITERION_MEMBRANE] = {"through the membrane", "membrane", "", SWITCH, 0,
 				       true},
 	[INCISE_CRITERION_INSERTION] = {"depth of the tube", "tube_mm", "mm", RANGE, 1,
 					false},
 	[INCISE_CRITERION_BACK_WALL] = {"back wall touched", "back_wall", "", SWITCH, 0,
-					true},
-	[INCISE_CRITERION_FORCE] = {"largest force", "force_N", "N", MOST, 2, false},
-	[INCISE_CRITERION_TIME] = {"time needed", "time_s", "s", MOST, 1, false},
+					true, true},
+	[INCISE_CRITERION_FORCE] = {"largest force", "force_N", "N", MOST, 2, false,
+				    true},
+	[INCISE_CRITERION_TIME] = {"time needed", "time_s", "s", MOST, 1, false, true},
 };
 
 const char *session_criterion_label(int criterion)
@@ -151,6 +154,13 @@ static void see_incisions(const struct session *session,
 	verdicts[INCISE_CRITERION_INCISIONS].value = n;
 }
 
+/* A time ends with the tube in place, where the scene asks for one. */
+static bool has_time(const struct session *session)
+{
+	return !session->criteria[INCISE_CRITERION_INSERTION].asked ||
+	       !isnan(session->insertion.placed_s);
+}
+
 void session_judge(const struct session *session,
 		   struct session_verdict verdicts[INCISE_CRITERIA])
 {
@@ -163,7 +173,9 @@ void session_judge(const struct session *session,
 	for (int i = 0; i < INCISE_CRITERIA; i++) {
 		struct session_verdict *verdict = &verdicts[i];
 		const struct incise_scene_criterion *asked = &session->criteria[i];
-		bool there = session->has_membrane || !criteria[i].of_membrane;
+		bool there = (session->has_membrane || !criteria[i].of_membrane) &&
+			     (!isnan(session->first_s) || !criteria[i].of_contact) &&
+			     (i != INCISE_CRITERION_TIME || has_time(session));
 
 		if (!there)
 			verdict->value = NAN;

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
+#include <unistd.h>
 #include <incise/outfile.h>
 #include "../cli/json.h"
 #include "log.h"
@@ -37,11 +38,17 @@ void session_options_check(const struct session_options *options)
 		cli_usage("--code needs -o FILE.session (file to write)");
 }
 
-/* As much of the end of a path as there is place for. */
-static void copy_end(char *to, size_t size, const char *text)
+/*
+ * A path without its folders, which may be of a person's home, and other text as it is; as much of
+ * the end as there is place for.
+ */
+static void copy_name(char *to, size_t size, const char *text)
 {
-	size_t n = strlen(text);
+	const char *slash = access(text, F_OK) ? NULL : strrchr(text, '/');
+	size_t n;
 
+	text = slash && slash[1] ? slash + 1 : text;
+	n = strlen(text);
 	snprintf(to, size, "%s", n < size ? text : text + (n - size + 1));
 }
 
@@ -52,8 +59,8 @@ static void describe_log(struct session_log *log, const struct session_options *
 	struct timespec now;
 
 	snprintf(s->program, sizeof(s->program), "%s", start->program);
-	copy_end(s->source, sizeof(s->source), start->source);
-	copy_end(s->scene.path, sizeof(s->scene.path), start->scene_path);
+	copy_name(s->source, sizeof(s->source), start->source);
+	copy_name(s->scene.path, sizeof(s->scene.path), start->scene_path);
 	snprintf(s->scene.crc32c, sizeof(s->scene.crc32c), "%08x", crc32c);
 	snprintf(s->code, sizeof(s->code), "%s", options->code ? options->code : "");
 	if (!start->real)

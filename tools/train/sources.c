@@ -109,6 +109,28 @@ static bool is_part(const struct recording_rows *rows)
 	return rows->from_s > 0 || rows->to_s > 0 || rows->cut;
 }
 
+/* Append the options that choose rows to the text that a model notes. */
+static void note_rows(struct own *own)
+{
+	const struct recording_rows *rows = own->rows;
+	char *text = cli_text("%s", own->text), rate[40] = "", range[80] = "",
+	     cut[20] = "";
+
+	if (rows->rate_hz > 0)
+		snprintf(rate, sizeof(rate), " --rate %g", rows->rate_hz);
+	if (rows->to_s > 0)
+		snprintf(range, sizeof(range), " --range %.9gs..%.9gs", rows->from_s,
+			 rows->to_s);
+	else if (rows->from_s > 0)
+		snprintf(range, sizeof(range), " --range %.9gs..", rows->from_s);
+	if (rows->cut)
+		snprintf(cut, sizeof(cut), " --cut %d", rows->cut);
+	if (*rate || *range || *cut)
+		snprintf(own->text, sizeof(own->text), "%s, read with%s%s%s", text, rate,
+			 range, cut);
+	free(text);
+}
+
 static int open_recording(struct incise_train_source *source, struct incise_error *err)
 {
 	struct own *own = source->user;
@@ -133,6 +155,7 @@ static int open_recording(struct incise_train_source *source, struct incise_erro
 	incise_recording_close(recording);
 	if (rc)
 		return rc;
+	note_rows(own);
 	snprintf(own->rig, sizeof(own->rig), "%s", info.rig);
 	text = cli_text("%s; %.17g mV/N; tip %.17g %.17g %.17g; %s", info.rig,
 			info.force_mV_N, info.tip_mm[0], info.tip_mm[1], info.tip_mm[2],

@@ -65,7 +65,7 @@ static void reserve_files(const struct view_output *output)
 	free(frames);
 }
 
-/* Frames of a strip, in rows of four or fewer. */
+/* Frames of a strip, in rows of four or fewer, each with a line for its time below it. */
 static int strip_rows(const struct view_output *output)
 {
 	return (output->n_strip + 3) / 4;
@@ -76,18 +76,26 @@ static int strip_columns(const struct view_output *output)
 	return (output->n_strip + strip_rows(output) - 1) / strip_rows(output);
 }
 
+static size_t strip_high(const struct view_output *output)
+{
+	return (size_t)output->height + 10 + (size_t)output->height / 50;
+}
+
 void view_output_begin(struct view_output *output)
 {
-	size_t size = (size_t)output->width * output->height * 3;
+	size_t row = (size_t)output->width * 3;
 	struct incise_error err = {0};
 
 	if (!view_output_wanted(output))
 		return;
 	reserve_files(output);
-	output->rgb = cli_alloc(1, size);
-	if (output->strip_path)
-		output->strip =
-			cli_alloc(strip_rows(output) * strip_columns(output), size);
+	output->rgb = cli_alloc(strip_high(output), row);
+	if (output->strip_path) {
+		size_t n = (size_t)(strip_rows(output) * strip_columns(output));
+
+		output->strip = cli_alloc(n, strip_high(output) * row);
+		memset(output->strip, 255, n * strip_high(output) * row);
+	}
 	if (output->folder && mkdir(output->folder, 0777) && errno != EEXIST)
 		cli_fail("%s: %s", output->folder, strerror(errno));
 	if (output->film_path)
@@ -97,14 +105,19 @@ void view_output_begin(struct view_output *output)
 				    &err);
 }
 
-/* Put the frame to the right of those before, or below. */
+/* Put the frame, and its time below it, to the right of those before, or below. */
 static void add_to_strip(struct view_output *output)
 {
-	size_t row = (size_t)output->width * 3, columns = (size_t)strip_columns(output);
-	size_t down = (size_t)output->stripped / columns * (size_t)output->height,
+	size_t row = (size_t)output->width * 3, columns = (size_t)strip_columns(output),
+	       high = strip_high(output),
+	       down = (size_t)output->stripped / columns * high,
 	       right = (size_t)output->stripped % columns;
+	char *time = cli_text("%g s", output->strip_s[output->stripped]);
 
-	for (size_t y = 0; y < (size_t)output->height; y++)
+	incise_view_caption(output->rgb + (size_t)output->height * row, output->width,
+			    (int)high - output->height, time);
+	free(time);
+	for (size_t y = 0; y < high; y++)
 		memcpy(output->strip + ((down + y) * columns + right) * row,
 		       output->rgb + y * row, row);
 	output->stripped++;
@@ -153,7 +166,7 @@ void view_output_end(struct view_output *output)
 	if (output->strip_path &&
 	    image_write_png(output->strip_path, output->strip,
 			    output->width * strip_columns(output),
-			    output->height * strip_rows(output), &err))
+			    (int)strip_high(output) * strip_rows(output), &err))
 		cli_fail_with(&err);
 	free(output->rgb);
 	free(output->strip);
@@ -426,12 +439,7 @@ static const char *const keys[] = {
 	"left button\tpress the tool in",
 	"b  n  t\tblade, handle, tube",
 	"+  -\tdepth of a press",
-	"right button\tturn the camera",
-	"wheel\tnear, far",
-	"Home\tcamera as it was",
-	"g\tgraphs",
 	"s\tsave the image",
-	"h  F1\tthis",
 	"q\tend",
 };
 
@@ -447,6 +455,11 @@ void view_job_view(struct view_job *job)
 	struct incise_error err = {0};
 
 	job->view = incise_view_new(job->scene, job->plan, &setup, &err);
+	if (!job->view && window && job->rig)
+		cli_fail(
+			"%s; without a display a hand has nothing to see, but 'incise view "
+			"%s --procedure -o FILE.mp4' writes a film",
+			err.text, scene_argument_name(job->argument.path));
 	if (!job->view)
 		cli_fail("%s%s", err.text,
 			 window ? "; without a display give -o FILE.mp4, FILE.png "

@@ -47,6 +47,7 @@ static bool is_over(const struct view_job *job)
 static void run_live(struct view_job *job, struct view_live *live, struct view_hand *hand)
 {
 	struct incise_view_status status;
+	char state[60];
 	struct incise_error err = {0};
 	int64_t begin = cli_now_ns(), last = begin, due = begin, now;
 	int rc = 0;
@@ -60,6 +61,11 @@ static void run_live(struct view_job *job, struct view_live *live, struct view_h
 			view_hand_move(hand, (double)(now - last) / INCISE_NS_PER_S);
 		last = now;
 		rc = view_live_take(live, job->view, job->log, &status, &err);
+		if (hand) {
+			snprintf(state, sizeof(state), "%s, + and -: press %.1f mm",
+				 status.state, hand->depth_mm);
+			status.state = state;
+		}
 		if (rc < 0)
 			fail_sources(job, NULL, &err);
 		view_job_draw(job, &status, (double)(now - begin) / INCISE_NS_PER_S);

@@ -30,7 +30,7 @@ struct view_output {
 	int width, height, fps;
 
 	struct incise_film *film;
-	uint8_t *rgb, *strip;
+	uint8_t *rgb, *strip; /* a frame with room for its time below it; the strip */
 	int stripped;
 	uint64_t frames; /* that were written */
 };

@@ -30,12 +30,14 @@ const struct incise_setting incise_actuator_line_settings[] = {
 		      "fault output of the power stage"),
 	SETTING_OWN(
 		active_low, "", "(none)",
-		"array of the lines that are active when low, for example [\"enable\", \"estop\"]",
+		"array of the lines that are active when low, for example [\"enable\"]; not a "
+		"breaking contact to ground, whose broken wire must read as pressed: "
+		"doc/hardware.md, Switches and emergency stop",
 		.read = read_active_low),
 	{0},
 };
 
-/* Names in active_low = ["enable", "estop"]; behind the names of the lines. */
+/* Names in active_low = ["enable"]; behind the names of the lines. */
 static int read_active_low(void *to, const config_setting_t *names, const char *path,
 			   struct incise_error *err)
 {

@@ -106,7 +106,7 @@ struct incise_sources_options {
 	/** recording, rig, none, or a column; NULL: cut if all sources have it, else none. */
 	const char *group;
 	bool all_rows; /**< also rows whose column advancing is 0 */
-	bool averaged; /**< rows are means, as the model notes */
+	bool averaged; /**< rows are means, as the model notes: --rate */
 	/** Take 3 functions of the first input and 2 of each other one, unless n_mfs have an error smaller by 5 %. */
 	bool smooth;
 	double check; /**< share held out, 0 ≤ check < 1, as near as groups and equal rows allow */
@@ -234,6 +234,7 @@ struct incise_corpus_group {
 	double sum[INCISE_MODEL_INPUTS_MAX + 1], min[INCISE_MODEL_INPUTS_MAX + 1],
 		max[INCISE_MODEL_INPUTS_MAX + 1];
 	bool check; /**< held out */
+	int number; /**< that of its pairs in a sample (incise_train_side), and of its namesakes elsewhere */
 };
 
 /** The survey of a source. */

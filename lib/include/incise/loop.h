@@ -17,6 +17,7 @@
 #include <incise/clock.h>
 #include <incise/error.h>
 #include <incise/export.h>
+#include <incise/haptic.h>
 #include <incise/loop_control.h>
 #include <incise/plan.h>
 #include <incise/state.h>
@@ -79,6 +80,14 @@ struct incise_loop_stats {
 	double unfelt_max_N;		 /**< largest of these forces */
 	struct incise_pose_counts poses; /**< at the end of the run */
 	double texture_felt;		 /**< incise_plan_texture_felt() */
+	/**
+	 * Smallest height of the tool's end above the surface in ticks with a pose, up to the
+	 * first contact, mm; infinite without such a tick
+	 */
+	double nearest_mm;
+	/** ticks in contact that commanded no force, with flag 1 << i; the first: all of them */
+	uint64_t forceless[INCISE_TICK_FLAGS];
+	enum incise_haptic_off forceless_off; /**< of the device at the last of them */
 };
 
 /**

@@ -119,9 +119,9 @@ INCISE_API size_t incise_plan_memory(const struct incise_plan *plan);
 INCISE_API void incise_plan_top(const struct incise_plan *plan,
 				struct incise_touch *touch);
 
-/** The surface in use: the scene's, or the rig's plane; valid as long as the plan. */
+/** The surface in use: the scene's, or the rig's plane; valid as long as the plan. Real-time safe. */
 INCISE_API const struct incise_surface *incise_plan_surface(
-	const struct incise_plan *plan);
+	const struct incise_plan *plan) INCISE_REALTIME;
 
 /** Support of a device in a search, besides the force that leans; incise-scene(5) has its figures. */
 enum incise_held {

@@ -259,6 +259,11 @@ struct incise_export_options {
 	 */
 	double from_s, to_s;
 	int cut;
+	/**
+	 * Overview of a long recording, of the rows of a stream alone: blocks of rows, about 0.1 s each, at times this
+	 * far apart, s. 0, and in recordings of formats before 5: all rows.
+	 */
+	double every_s;
 	/** File of @ref calibration, whose history states uncertainties; NULL: unknown uncertainties. */
 	const char *calibration_path;
 

@@ -58,6 +58,9 @@ INCISE_API int incise_scene_set_texture(struct incise_scene *scene, int texture_
  */
 INCISE_API void incise_scene_leave_texture_out(struct incise_scene *scene);
 
+/** Why the texture that the scene's file names is left out; NULL: it is not, or the file names none. */
+INCISE_API const char *incise_scene_texture_left_out(const struct incise_scene *scene);
+
 /**
  * Keep every stage in the plan, with neutral parameters for those that the scene does not
  * need: to measure how much pruning saves. The forces are bit-exact.

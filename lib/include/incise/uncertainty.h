@@ -125,7 +125,10 @@ INCISE_API void incise_uncertainty_parts(const struct incise_uncertainty *uncert
 					 const double *x,
 					 struct incise_uncertainty_parts *parts);
 
-/** The same for many points: parts[k] of the n_inputs values at x + k·n_inputs. Real-time safe. */
+/**
+ * The same for many points: parts[k] of the n_inputs values at x + k·n_inputs; NaN outside the ranges or where
+ * no rule fires: nothing bounds the error there. Real-time safe.
+ */
 INCISE_API void incise_uncertainty_parts_many(
 	const struct incise_uncertainty *uncertainty, const struct incise_model *model,
 	const double *x, size_t n, struct incise_uncertainty_parts *parts);
@@ -161,7 +164,8 @@ INCISE_API int incise_uncertainty_solve(const struct incise_uncertainty *uncerta
 					double *v);
 
 /**
- * The same for many points: sd[k] of the n_inputs values at x + k·n_inputs. Real-time safe.
+ * The same for many points: sd[k] of the n_inputs values at x + k·n_inputs; NaN as above.
+ * Real-time safe.
  */
 INCISE_API void incise_uncertainty_sd_many(const struct incise_uncertainty *uncertainty,
 					   const struct incise_model *model,

@@ -99,6 +99,14 @@ INCISE_API void incise_view_size(const struct incise_view *view, int *width, int
 INCISE_API int incise_view_pixels(struct incise_view *view, uint8_t *rgb);
 
 /**
+ * Make an image of a line of text, black in the middle of white; white alone where no font is.
+ *
+ * @param rgb capacity of width × height × 3 bytes, rows from the top
+ * @return 0, -EINVAL (a side is not 1 … INCISE_VIEW_SIDE_MAX), -ENOMEM
+ */
+INCISE_API int incise_view_caption(uint8_t *rgb, int width, int height, const char *line);
+
+/**
  * Show or hide panel and keys over the image; initially only the panel is shown. Images below
  * 360 000 pixels have no panel.
  */

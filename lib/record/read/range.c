@@ -185,8 +185,17 @@ static int64_t after(double s)
 	return s > 9e9 ? INT64_MAX / 4 : (int64_t)(s * 1e9);
 }
 
+/* Where filters settle before the first row. */
+static int64_t settle_before(const struct incise_recording *recording, int64_t from_ns)
+{
+	struct range_walk walk;
+
+	init_walk(&walk, recording->numbers.tracker_hz);
+	return from_ns - walk.settled_ns;
+}
+
 int incise_recording_limit(struct incise_recording *recording,
-			   const struct incise_export_options *options,
+			   const struct incise_export_options *options, bool cuts,
 			   struct incise_error *err)
 {
 	struct incise_recording_range range = {
@@ -196,12 +205,13 @@ int incise_recording_limit(struct incise_recording *recording,
 		.from_ns = after(options->from_s),
 		.to_ns = options->to_s > 0 ? after(options->to_s) : after(INFINITY),
 		.cut = options->cut,
+		.every_ns = cuts || recording->old ? 0 : after(options->every_s),
 	};
 	const char *table = incise_recording_has_force(recording) ? "force" : "tracker";
 	int64_t seq, first_ns;
 	int rc;
 
-	recording->range = (struct incise_recording_range){0};
+	recording->range = (struct incise_recording_range){.every_ns = range.every_ns};
 	if (!range.limited)
 		return 0;
 	rc = recording->session ? 0
@@ -210,7 +220,11 @@ int incise_recording_limit(struct incise_recording *recording,
 	if (rc < 0)
 		return rc;
 	if (rc) {
-		rc = find_begin(recording, &range, first_ns + range.from_ns, err);
+		if (cuts || range.cut)
+			rc = find_begin(recording, &range, first_ns + range.from_ns, err);
+		else
+			rc = 0, range.begin_ns = settle_before(recording,
+							       first_ns + range.from_ns);
 		if (!range.cut)
 			range.end_ns = first_ns + range.to_ns + BEHIND_NS;
 		/* Cuts count by the force, and delays move its rows: then all are read. */

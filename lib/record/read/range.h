@@ -21,7 +21,8 @@ struct incise_recording;
 struct incise_recording_range {
 	bool limited;
 	int64_t begin_ns, end_ns; /* rows that are read, by their own times */
-	int cuts;		  /* that are over at begin_ns */
+	int64_t every_ns; /* from a block of rows to the next one that is read; 0: all */
+	int cuts;	  /* that are over at begin_ns */
 	/* asked for: from the first sample, and of a cut, 0: any */
 	int64_t from_ns, to_ns;
 	int cut;
@@ -29,10 +30,11 @@ struct incise_recording_range {
 
 /*
  * Limit the rows of a recording that are opened from now on; without a range in the options, not. Those of a
- * joined recording are read all. Returns 0, -ENODATA (no such cut, nothing there), -errno.
+ * joined recording are read all. @cuts: rows have the number of their cut, which depths from the cut before tell.
+ * Returns 0, -ENODATA (no such cut, nothing there), -errno.
  */
 int incise_recording_limit(struct incise_recording *recording,
-			   const struct incise_export_options *options,
+			   const struct incise_export_options *options, bool cuts,
 			   struct incise_error *err);
 
 /* Whether a time, from the first sample, and a cut are in the range. */

@@ -407,9 +407,12 @@ int incise_rows_open(struct incise_rows *rows, struct incise_recording *recordin
 		.recording = recording,
 		.table = table,
 		/* An interrupted recording has counted fewer depths than its poses give. */
-		.expected = stream == INCISE_SOURCE_DEPTH || recording->range.limited
+		.expected = stream == INCISE_SOURCE_DEPTH || recording->range.limited ||
+					    recording->range.every_ns
 				    ? UINT64_MAX
 				    : expected,
+		.every_ns = recording->range.every_ns,
+		.pass_ns = INT64_MIN / 2,
 		.begin_ns =
 			recording->range.limited ? recording->range.begin_ns : INT64_MIN,
 		.end_ns = recording->range.limited ? recording->range.end_ns : INT64_MAX,
@@ -436,7 +439,18 @@ int incise_rows_open(struct incise_rows *rows, struct incise_recording *recordin
 					-1, &rows->stmt, NULL) == SQLITE_OK
 			     ? 0
 			     : incise_schema_fail(recording->db, recording->path, err);
-	return rc ? rc : incise_row_times_open(&rows->times, recording, table, err);
+	if (!rc)
+		rc = incise_row_times_open(&rows->times, recording, table, err);
+	/* An overview does not look for rows off the line, which costs more than it reads. */
+	if (rows->every_ns)
+		incise_row_times_close(&rows->times);
+	return rc;
+}
+
+static int64_t own_ns(const struct incise_rows *rows)
+{
+	return rows->stmt ? sqlite3_column_int64(rows->stmt, 1)
+			  : rows->source.batch.column[1].i[rows->at];
 }
 
 /* To the next row of the batch, of the next batch, or of events: 1, 0, -errno. */
@@ -447,6 +461,15 @@ static int step_rows(struct incise_rows *rows, struct incise_error *err)
 	if (!rows->stmt) {
 		if (rows->live && ++rows->at < rows->source.batch.n)
 			return 1;
+		if (rows->live && rows->every_ns) {
+			rows->pass_ns += rows->every_ns;
+			rows->at--; /* at the last row */
+			if (rows->pass_ns < own_ns(rows))
+				rows->pass_ns = own_ns(rows);
+			rc = incise_source_pass(&rows->source, rows->pass_ns, err);
+			if (rc)
+				return rc;
+		}
 		rows->at = 0;
 		return incise_source_next(&rows->source, err);
 	}
@@ -455,12 +478,6 @@ static int step_rows(struct incise_rows *rows, struct incise_error *err)
 		return incise_schema_fail(rows->recording->db, rows->recording->path,
 					  err);
 	return rc == SQLITE_ROW;
-}
-
-static int64_t own_ns(const struct incise_rows *rows)
-{
-	return rows->stmt ? sqlite3_column_int64(rows->stmt, 1)
-			  : rows->source.batch.column[1].i[rows->at];
 }
 
 int incise_rows_first(const struct incise_rows *rows, int64_t *first_ns,

@@ -111,8 +111,9 @@ struct incise_rows {
 		[INCISE_ROWS_COLUMNS]; /* of the batch, in the order that was asked for */
 	sqlite3_stmt *stmt;	       /* of events: at the row */
 	uint64_t n, expected;
-	int64_t begin_ns, end_ns; /* own times of rows; one behind is read */
-	int64_t t_ns;		  /* best time of the row; its own is in column t_ns */
+	int64_t begin_ns, end_ns;  /* own times of rows; one behind is read */
+	int64_t every_ns, pass_ns; /* of an overview: the own time of the next block */
+	int64_t t_ns;		   /* best time of the row; its own is in column t_ns */
 	struct incise_row_times times;
 	bool live; /* there is a row */
 	bool ended;

@@ -294,6 +294,34 @@ int incise_source_next(struct incise_source *source, struct incise_error *err)
 	return rc;
 }
 
+int incise_source_pass(struct incise_source *source, int64_t t_ns,
+		       struct incise_error *err)
+{
+	struct incise_recording *recording = source->recording;
+	const char *stream = source->batch.form->stream;
+	int64_t block;
+
+	if (source->depth) {
+		source->depth->n = 0;
+		source->depth->part = true;
+		incise_depth_init(&source->depth->window,
+				  recording->meta.surface_point_mm,
+				  recording->meta.surface_normal);
+		return incise_source_pass(&source->depth->tracker, t_ns, err);
+	}
+	block = incise_ledger_find(recording->db, stream, true, t_ns);
+	if (source->ended || block <= source->next)
+		return 0;
+	sqlite3_finalize(source->stmt);
+	source->stmt = NULL;
+	source->held = false;
+	source->next = source->last_seq = -1;
+	return incise_ledger_select(recording->db, stream, block, false, &source->stmt) ==
+			       SQLITE_OK
+		       ? 0
+		       : fail_source(source, err);
+}
+
 void incise_source_close(struct incise_source *source)
 {
 	if (source->depth)

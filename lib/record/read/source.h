@@ -62,6 +62,13 @@ int incise_source_open_at(struct incise_source *source,
  */
 int incise_source_next(struct incise_source *source, struct incise_error *err);
 
+/*
+ * Pass the blocks that end before a time, behind the batch: the next one is the first that does not. Depths begin
+ * there anew. Returns 0 or -errno.
+ */
+int incise_source_pass(struct incise_source *source, int64_t t_ns,
+		       struct incise_error *err);
+
 /* Step the statement, once to its end. Returns an SQLite code. */
 int incise_source_step(struct incise_source *source);
 

@@ -492,8 +492,8 @@ static int reject_losses(const char *path, const struct incise_recorder_stats *s
 	if (!sum)
 		return 0;
 	return incise_error_set(err, ENODATA,
-				"%s: %s %s lost; the table events lists when", path, text,
-				sum == 1 ? "was" : "were");
+				"%s: %s %s lost; 'incise verify %s' lists when", path,
+				text, sum == 1 ? "was" : "were", path);
 }
 
 /* Warn of points that are not of the source that was named. */

@@ -131,14 +131,27 @@ static void check_film(const char *kind, enum AVCodecID id)
 	avformat_close_input(&format);
 }
 
+/* libavcodec without it is one that Debian does not ship. */
+static bool has_h264(void)
+{
+	if (__real_avcodec_find_encoder_by_name("libx264"))
+		return true;
+	puts("skipped: this libavcodec has no libx264");
+	return false;
+}
+
 TEST(test_what_is_put_is_there)
 {
 	bool h264 = __real_avcodec_find_encoder_by_name("libx264");
 
 	write_film(path, false);
 	check_film("matroska", h264 ? AV_CODEC_ID_H264 : AV_CODEC_ID_MJPEG);
-	if (!h264)
-		return;
+}
+
+TEST(test_what_is_put_into_an_mp4_is_there)
+{
+	if (!has_h264())
+		skip();
 	write_film(path, true);
 	check_film("mp4", AV_CODEC_ID_H264);
 }
@@ -148,8 +161,8 @@ TEST(test_an_mp4_in_a_pipe_is_whole)
 	char command[100], to[20];
 	FILE *pipe;
 
-	if (!__real_avcodec_find_encoder_by_name("libx264"))
-		return;
+	if (!has_h264())
+		skip();
 	snprintf(command, sizeof(command), "cat >%s", path);
 	pipe = popen(command, "w");
 	assert_non_null(pipe);

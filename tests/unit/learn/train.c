@@ -689,14 +689,14 @@ static int stop_at(void *user, const struct incise_train_step *step)
 /* Stopped at any call of its progress, a training fails, changes nothing, and calls it no more. */
 TEST(test_training_can_be_stopped)
 {
-	static double rows[2000 * 3];
+	static double rows[800 * 3];
 	const int mfs[] = {6, 5};
 	const double min[] = {0, 0}, max[] = {1, 1};
-	struct incise_pairs train = {.rows = rows, .n = 2000, .n_inputs = 2};
+	struct incise_pairs train = {.rows = rows, .n = 800, .n_inputs = 2};
 	struct incise_model *model = grid(2, min, max, mfs, INCISE_MF_GAUSS);
 	static const char *const names[] = {"a", "b", "y"};
 
-	for (int i = 0; i < 2000; i++) {
+	for (int i = 0; i < 800; i++) {
 		rows[3 * i] = i * 37 % 101 / 100.0;
 		rows[3 * i + 1] = i * 53 % 97 / 96.0;
 		rows[3 * i + 2] = sin(9 * rows[3 * i]) + rows[3 * i + 1];
@@ -709,7 +709,7 @@ TEST(test_training_can_be_stopped)
 		int step;
 
 		options.classic = k == 1;
-		train.n = k == 1 ? 200 : 2000;
+		train.n = k == 1 ? 200 : 800;
 		for (int at = 0; at <= whole.calls; at += step) {
 			struct stopping stopping = {.at = at};
 			struct incise_uncertainty *uncertainty = NULL;

@@ -426,7 +426,7 @@ static void check_further(uint64_t seed, double spread, double decay_s,
 
 TEST(test_further_input_where_force_has_history)
 {
-	for (uint64_t seed = 1; seed <= 20; seed++) {
+	for (int seed = 1; seed <= cases_of(20, 4); seed++) {
 		check_further(seed, 0.1, 0.5, "time");
 		check_further(seed, 0.4, INFINITY, NULL);
 	}

@@ -314,7 +314,7 @@ TEST(test_denied)
 		 EPERM,
 		 {"RLIMIT_RTPRIO is 0; ",
 		  "RLIMIT_MEMLOCK is 0 KiB; run `" PRLIMIT "` and ",
-		  "limits.d/incise.conf`"},
+		  "limits.d/incise.conf # then log in again`"},
 		 PRLIMIT "; "},
 		{"memory alone",
 		 FIFO,

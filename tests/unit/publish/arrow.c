@@ -4,6 +4,7 @@
  * those of the exported CSV; types, units and calibration; damage, forks and early ends.
  */
 #include "../unit.h"
+#include "../../../lib/base/random.h"
 #include "../record/recorded.h"
 #include <sys/wait.h>
 #include <incise/arrow.h>
@@ -116,6 +117,91 @@ TEST(a_part_of_a_stream_has_its_rows, IN_FOLDER)
 	assert_error(incise_recording_stream(recording, "force", &options, &stream, &err),
 		     EINVAL, &err, "force have no cut");
 	incise_recording_close(recording);
+}
+
+/* Rows of a stream: number, time and a value. */
+struct stream_row {
+	int64_t seq, t_ns;
+	double value;
+};
+
+static size_t read_rows(const char *what, const struct incise_export_options *options,
+			struct stream_row *rows, size_t most)
+{
+	struct ArrowArrayStream stream = open_stream(what, options);
+	const int column = strcmp(what, "tracker") ? strcmp(what, "depth") ? 3 : 2 : 3;
+	struct ArrowArray batch;
+	size_t n = 0;
+
+	for (; (batch = next(&stream)).release; batch.release(&batch))
+		for (int64_t i = 0; i < batch.length; i++) {
+			assert_true(n < most);
+			rows[n++] = (struct stream_row){
+				((const int64_t *)data(&batch, 0))[i],
+				((const int64_t *)data(&batch, 1))[i],
+				((const double *)data(&batch, column))[i]};
+		}
+	stream.release(&stream);
+	return n;
+}
+
+#define ROWS 200000
+
+/* The rows of @part are rows of @whole; those of an overview may have another time and depth, as nothing settles. */
+static void check_rows(const struct stream_row *part, size_t n,
+		       const struct stream_row *whole, size_t n_whole, bool overview)
+{
+	size_t k = 0;
+
+	for (size_t i = 0; i < n; i++) {
+		while (k < n_whole && whole[k].seq < part[i].seq)
+			k++;
+		assert_true(k < n_whole && whole[k].seq == part[i].seq);
+		assert_true(llabs(whole[k].t_ns - part[i].t_ns) <=
+			    (overview ? 5 * MS : 0));
+		assert_true(overview || whole[k].value == part[i].value);
+	}
+}
+
+TEST(parts_and_overviews_are_rows_of_the_whole, IN_FOLDER)
+{
+	static const char *const streams[] = {"force", "depth", "tracker"};
+	static struct stream_row whole[ROWS], part[ROWS];
+	uint64_t rng = 1;
+
+	record("a.rec", SHORT_SCRIPT, 12000 * MS);
+	for (int i = 0; i < 3; i++) {
+		size_t n = read_rows(streams[i], NULL, whole, ROWS), rows;
+
+		for (int round = 0; round < 20; round++) {
+			struct incise_export_options options;
+			int64_t from_ns, to_ns;
+			size_t expected = 0;
+
+			incise_export_options_init(&options);
+			options.from_s = 12 * fabs(incise_random_symmetric(&rng));
+			options.to_s = options.from_s +
+				       3 * fabs(incise_random_symmetric(&rng)) + 0.01;
+			rows = read_rows(streams[i], &options, part, ROWS);
+			check_rows(part, rows, whole, n, false);
+			/* They follow each other: none between is left out. */
+			from_ns = rows ? part[0].t_ns : 0;
+			to_ns = rows ? part[rows - 1].t_ns : -1;
+			for (size_t k = 0; k < n; k++)
+				expected += whole[k].t_ns >= from_ns &&
+					    whole[k].t_ns <= to_ns;
+			assert_int_equal(rows, expected);
+
+			options.from_s = options.to_s = 0;
+			options.every_s = 0.2 + fabs(incise_random_symmetric(&rng));
+			rows = read_rows(streams[i], &options, part, ROWS);
+			check_rows(part, rows, whole, n, true);
+			assert_true(rows > 0 && rows < n);
+			for (size_t k = 1; k < rows; k++)
+				assert_true(part[k].t_ns - part[k - 1].t_ns <
+					    (int64_t)(options.every_s * 1e9) + 300 * MS);
+		}
+	}
 }
 
 TEST(poses_are_those_of_the_table, IN_FOLDER)

@@ -3,6 +3,7 @@
  * Tests of lib/publish/export.c: against the same done by brute force from the tables,
  * all in memory, with nothing of the library.
  */
+#include "../cases.h"
 #include "../unit.h"
 #include "../record/recorded.h"
 #include <locale.h>
@@ -335,8 +336,8 @@ TEST(a_part_is_that_of_the_whole)
 	incise_export_options_init(&how);
 	whole = export(&path, 1, &how, NULL, &err);
 	assert_non_null(whole);
-	for (int i = 0; i < 40; i++) {
-		const double from = 1.1 * i, to = from + (i % 3 ? 0.9 : 7.3);
+	for (int i = 0; i < 40; i += cases_are_all() ? 1 : 3) {
+		const double from = 1.1 * i, to = from + (i % 2 ? 0.9 : 7.3);
 		char *text, *part, *rest, *line, *copy;
 		struct incise_error none = {0};
 		int rows = 0;

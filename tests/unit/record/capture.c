@@ -290,7 +290,8 @@ TEST(verdicts_on_losses_and_devices)
 	assert_string_equal(warnings, "");
 
 	stats->frames_lost = 1;
-	assert_error(judge(), ENODATA, &err, "b.rec: 1 frame was lost", "events");
+	assert_error(judge(), ENODATA, &err, "b.rec: 1 frame was lost",
+		     "incise verify b.rec");
 	stats->force_lost = 3;
 	assert_error(judge(), ENODATA, &err, "b.rec: 3 force samples, 1 frame were lost");
 

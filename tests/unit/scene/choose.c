@@ -10,8 +10,6 @@
 #include "../../../lib/scene/forces.h"
 #include "fed.h"
 
-static struct fed_folder folder;
-
 static const char *const evaluators[] = {"fixed", "double"};
 
 static const struct surface {
@@ -293,10 +291,4 @@ static int set_up(void **state)
 	return 0;
 }
 
-static int tear_down(void **state)
-{
-	fed_folder_remove(&folder);
-	return 0;
-}
-
-GROUP(set_up, tear_down);
+GROUP(set_up, fed_tear_down);

@@ -67,8 +67,6 @@ static const struct {
 #define KINDS ((int)(sizeof(kinds) / sizeof(*kinds)))
 #define KINDS_LEVEL 5 /* without the tilt */
 
-static struct fed_folder folder;
-
 static inline void model_path(char path[80], int kind, const char *end)
 {
 	snprintf(path, 80, "%s/k%d.%s", folder.dir, kind, end);

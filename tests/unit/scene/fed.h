@@ -77,6 +77,23 @@ static inline void fed_folder_remove(struct fed_folder *f)
 		abort();
 }
 
+/* Of all tests of a file: its folder, and the tracker that feeds its plans. */
+__attribute__((unused)) static struct fed_folder folder;
+__attribute__((unused)) static const struct incise_tracker_info tracker = {
+	.name = "fed", .rate_hz = 120, .latency_ns = FED_LATENCY_NS};
+
+static inline int fed_set_up(void **state)
+{
+	fed_folder_make(&folder);
+	return 0;
+}
+
+static inline int fed_tear_down(void **state)
+{
+	fed_folder_remove(&folder);
+	return 0;
+}
+
 static inline struct incise_scene *fed_scene(struct fed_folder *f, const char *text,
 					     struct incise_error *err)
 {

@@ -13,22 +13,6 @@
 #define R_MM 20.0
 #define DEPTH_MM 2.0
 
-static struct fed_folder folder;
-static const struct incise_tracker_info tracker = {.rate_hz = 120,
-						   .latency_ns = FED_LATENCY_NS};
-
-static int set_up(void **state)
-{
-	fed_folder_make(&folder);
-	return 0;
-}
-
-static int tear_down(void **state)
-{
-	fed_folder_remove(&folder);
-	return 0;
-}
-
 /* Down on the top of the ball, ever slower, so that no filter shows it deeper than it comes. */
 static void stand(void *own, double t_s, struct incise_tracker_sample *pose)
 {
@@ -108,4 +92,4 @@ TEST(test_both_sides_of_a_cut)
 		fail_msg("%g N/mm", in.now[2][2]);
 }
 
-GROUP(set_up, tear_down);
+GROUP(fed_set_up, fed_tear_down);

@@ -27,7 +27,6 @@ static const char hill[] =
 	"unloading_N_mm = 0.1331; };";
 
 /* The test that runs has these. */
-static struct fed_folder folder;
 static struct incise_scene *scene;
 static struct incise_host *host;
 static struct incise_host_wrench wrench;

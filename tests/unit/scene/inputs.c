@@ -13,23 +13,6 @@
 #include "fed.h"
 #include "../cases.h"
 
-static const struct incise_tracker_info tracker = {
-	.name = "fed", .rate_hz = 120, .latency_ns = FED_LATENCY_NS};
-
-static struct fed_folder folder;
-
-static int set_up(void **state)
-{
-	fed_folder_make(&folder);
-	return 0;
-}
-
-static int tear_down(void **state)
-{
-	fed_folder_remove(&folder);
-	return 0;
-}
-
 static const struct incise_variable all_inputs[INCISE_MODEL_INPUT_KINDS] = {
 	[INCISE_INPUT_DEPTH] = {"depth_mm", 0, 20},
 	[INCISE_INPUT_SPEED] = {"velocity_mm_s", 0, 50},
@@ -358,5 +341,5 @@ int main(void)
 		cmocka_unit_test(tilt_on_a_mesh_needs_double),
 	};
 
-	return cmocka_run_group_tests(tests, set_up, tear_down);
+	return cmocka_run_group_tests(tests, fed_set_up, fed_tear_down);
 }

@@ -8,10 +8,6 @@
 #include "../message.h"
 #include "fed.h"
 
-static const struct incise_tracker_info tracker = {
-	.name = "fed", .rate_hz = 120, .latency_ns = FED_LATENCY_NS};
-
-static struct fed_folder folder;
 static char path[3][64];
 
 /* a + b × depth, in N and mm, from 0 to 10 mm. */

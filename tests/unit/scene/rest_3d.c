@@ -25,11 +25,11 @@
 #include "drawn.h"
 
 #define HOSTED 1000
-#define HOSTED_FEW 3
+#define HOSTED_FEW 2
 #define SCENES 500
-#define SCENES_FEW 6
+#define SCENES_FEW 4
 #define TEXTURED 84
-#define TEXTURED_FEW 2
+#define TEXTURED_FEW 1
 #define SEED_FEW 9 /* and on: these search for a gain once, and for not long */
 #define LEANS 6
 

@@ -9,8 +9,6 @@
 #include "../message.h"
 #include "fed.h"
 
-static struct fed_folder folder;
-
 static struct incise_scene *load(const char *surface, struct incise_error *err)
 {
 	char text[700];
@@ -231,16 +229,4 @@ TEST(test_a_folder_is_no_file)
 	}
 }
 
-static int set_up(void **state)
-{
-	fed_folder_make(&folder);
-	return 0;
-}
-
-static int tear_down(void **state)
-{
-	fed_folder_remove(&folder);
-	return 0;
-}
-
-GROUP(set_up, tear_down);
+GROUP(fed_set_up, fed_tear_down);

@@ -10,23 +10,6 @@
 #include "../message.h"
 #include "fed.h"
 
-static const struct incise_tracker_info tracker = {
-	.name = "fed", .rate_hz = 120, .latency_ns = FED_LATENCY_NS};
-
-static struct fed_folder folder;
-
-static int set_up(void **state)
-{
-	fed_folder_make(&folder);
-	return 0;
-}
-
-static int tear_down(void **state)
-{
-	fed_folder_remove(&folder);
-	return 0;
-}
-
 /* Teeth of 2 mm, a knot each 1/32 mm, of this size; all cuts have this factor. */
 static struct incise_fixed_texture *teeth(double size, double factor)
 {
@@ -239,4 +222,4 @@ TEST(test_a_scene_is_refused_by_its_largest_factor)
 	incise_scene_free(scene);
 }
 
-GROUP(set_up, tear_down);
+GROUP(fed_set_up, fed_tear_down);

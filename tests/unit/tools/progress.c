@@ -22,7 +22,7 @@ int __wrap_isatty(int fd)
 	return on_terminal && fd == STDERR_FILENO;
 }
 
-/* What is drawn at that time; "" if nothing is. */
+/* The bar drawn at that time; "" if none is. */
 static const char *draw_bar(struct cli_bar *bar, double t_s, double share)
 {
 	static char text[200];

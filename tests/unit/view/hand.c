@@ -21,12 +21,15 @@ int __wrap_incise_sim_hold(struct incise_sim *sim, const double position_mm[3],
 	return 0;
 }
 
-static struct view_hand begin_hand(void)
+/* A hand of random depth for a case, and the time between its frames. */
+static struct view_hand begin_hand(uint64_t seed, int i, double *dt_s)
 {
 	static const struct incise_touch top = {.normal = {0, 0, 1}};
 	struct view_hand hand;
 
 	view_hand_begin(&hand, NULL, HANDLE_MM, &top);
+	*dt_s = 0.005 + 0.095 * incise_random_uniform(seed, 2 * (uint64_t)i);
+	hand.depth_mm = 0.5 + 14.5 * incise_random_uniform(seed, 2 * (uint64_t)i + 1);
 	return hand;
 }
 
@@ -41,12 +44,9 @@ TEST(test_a_press_goes_no_deeper)
 	uint64_t seed = cases_seed(1);
 
 	for (int i = 0; i < cases_of(2000, 100); i++) {
-		double dt_s =
-			0.005 + 0.095 * incise_random_uniform(seed, 2 * (uint64_t)i);
-		struct view_hand hand = begin_hand();
+		double dt_s;
+		struct view_hand hand = begin_hand(seed, i, &dt_s);
 
-		hand.depth_mm =
-			0.5 + 14.5 * incise_random_uniform(seed, 2 * (uint64_t)i + 1);
 		hand.press = 1;
 		for (int n = 0; n < 2 / dt_s; n++) {
 			view_hand_move(&hand, dt_s);
@@ -62,9 +62,8 @@ TEST(test_a_scalpel_that_turns_touches_nothing)
 	uint64_t seed = cases_seed(2);
 
 	for (int i = 0; i < cases_of(2000, 100); i++) {
-		double dt_s =
-			0.005 + 0.095 * incise_random_uniform(seed, 2 * (uint64_t)i);
-		struct view_hand hand = begin_hand();
+		double dt_s;
+		struct view_hand hand = begin_hand(seed, i, &dt_s);
 
 		for (int n = 0; n < 6 / dt_s; n++) {
 			double end_mm, z;

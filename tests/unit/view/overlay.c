@@ -102,6 +102,31 @@ TEST(test_anything)
 	incise_overlay_free(NULL);
 }
 
+TEST(test_caption)
+{
+	static uint8_t rgb[40 * 100 * 3];
+	int dark = 0;
+
+	assert_int_equal(incise_view_caption(rgb, 0, 40, "2 s"), -EINVAL);
+	assert_int_equal(incise_view_caption(rgb, 100, INCISE_VIEW_SIDE_MAX + 1, "2 s"),
+			 -EINVAL);
+	assert_int_equal(incise_view_caption(rgb, 100, 40, "2 s"), 0);
+	for (int y = 0; y < 40; y++)
+		for (int x = 0; x < 100; x++) {
+			const uint8_t *p = rgb + 3 * (100 * y + x);
+			bool inner = x > 10 && x < 90 && y > 5 && y < 39;
+
+			assert_true(inner || p[0] + p[1] + p[2] == 3 * 255);
+			dark += p[0] < 100;
+		}
+	/* With a font. */
+	print_message("%d dark pixels\n", dark);
+	assert_true(dark < 40 * 100 / 2);
+	incise_view_caption(rgb, 100, 40, "");
+	for (size_t i = 0; i < sizeof(rgb); i++)
+		assert_int_equal(rgb[i], 255);
+}
+
 TEST(test_keys)
 {
 	const char *const lines[30] = {"a\tone", "two", "", "\t", "b\tthree"};

@@ -10,7 +10,7 @@
 #ifdef HAVE_JPEG
 #include <jpeglib.h>
 #endif
-#include "../cli/cli.h"
+#include "cli.h"
 #include "pixels.h"
 
 #define SIDE_MOST 16384
@@ -83,7 +83,43 @@ static int decode_pixels(struct pixels *pixels, const struct incise_camera_frame
 	jpeg_destroy_decompress(&jpeg);
 	return 0;
 }
+
+uint8_t *pixels_jpeg(const struct pixels *pixels, size_t *size)
+{
+	struct jpeg_compress_struct jpeg;
+	struct jpeg_error_mgr failure; /* ends the program: memory alone can fail */
+	unsigned char *bytes = NULL;
+	unsigned long n = 0;
+
+	jpeg.err = jpeg_std_error(&failure);
+	jpeg_create_compress(&jpeg);
+	jpeg_mem_dest(&jpeg, &bytes, &n);
+	jpeg.image_width = (JDIMENSION)pixels->width;
+	jpeg.image_height = (JDIMENSION)pixels->height;
+	jpeg.input_components = pixels->components;
+	jpeg.in_color_space = pixels->components == 1 ? JCS_GRAYSCALE : JCS_RGB;
+	jpeg_set_defaults(&jpeg);
+	jpeg_start_compress(&jpeg, TRUE);
+	while (jpeg.next_scanline < jpeg.image_height) {
+		JSAMPROW row = pixels->bytes + (size_t)jpeg.next_scanline *
+						       jpeg.image_width *
+						       (size_t)jpeg.input_components;
+
+		jpeg_write_scanlines(&jpeg, &row, 1);
+	}
+	jpeg_finish_compress(&jpeg);
+	jpeg_destroy_compress(&jpeg);
+	*size = n;
+	return bytes;
+}
 #else
+uint8_t *pixels_jpeg(const struct pixels *pixels, size_t *size)
+{
+	(void)pixels;
+	(void)size;
+	return NULL;
+}
+
 static int decode_pixels(struct pixels *pixels, const struct incise_camera_frame *frame)
 {
 	(void)pixels;

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Tests of tools/serve/pixels.c: frames of all formats as rows without gaps, and damaged ones.
+ * Tests of tools/cli/pixels.c: frames of all formats as rows without gaps, and damaged ones.
  */
 #include "../unit.h"
 #if __has_include(<jpeglib.h>)
 #include <jpeglib.h>
 #define PEER 1
 #endif
-#include "../../../tools/serve/pixels.h"
+#include "../../../tools/cli/pixels.h"
 
 enum { WIDTH = 6, HEIGHT = 3, STRIDE = 24 };
 

@@ -2,8 +2,8 @@
 /*
  * Frames of any format as rows of luminance or of red, green and blue, without gaps.
  */
-#ifndef INCISE_TOOLS_SERVE_PIXELS_H
-#define INCISE_TOOLS_SERVE_PIXELS_H
+#ifndef INCISE_TOOLS_PIXELS_H
+#define INCISE_TOOLS_PIXELS_H
 
 #include <stddef.h>
 #include <stdint.h>
@@ -20,5 +20,8 @@ struct pixels {
  * sizes that contradict each other), -ENOTSUP (a JPEG, and this program has no libjpeg).
  */
 int pixels_convert(struct pixels *pixels, const struct incise_camera_frame *frame);
+
+/* A JPEG of them, and its size: free(3). NULL: this program has no libjpeg, or there is no memory. */
+uint8_t *pixels_jpeg(const struct pixels *pixels, size_t *size);
 
 #endif
