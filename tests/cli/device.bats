@@ -248,11 +248,18 @@ signal.pause()" >device.out 3>&- &
 }
 
 # A device of somebody else's: the force puts 0.1 kg on a spring of 0.2 N/mm to 10 mm, once it is at rest.
+# Before all else that runs here where that is allowed: an owner that does not run for 0.1 s counts as gone.
 serve_foreign() {
+	! chrt -f 10 true 2>/dev/null || set -- chrt -f 10 "$@"
 	"$@" "$id" >device.out 2>&1 3>&- &
 	device=$!
 	await test -e "/dev/shm/incise-$id"
-	run -0 "$user" "local:$id" 500 2
+	run "$user" "local:$id" 500 2
+	while [[ "$status" = 1 && "$output" == *"its owner has no heartbeat any more: it was killed or stopped"* ]]; do
+		kill -0 $device # it was stopped by the machine
+		run "$user" "local:$id" 500 2
+	done
+	[ "$status" = 0 ]
 	[[ "${lines[0]}" == "spring in "*", 5 N, 1000 Hz, 0.1 kg, " ]]
 	[[ "${lines[1]}" =~ \ up\ to\ ([0-9.]+)\ mm$ ]]
 	holds "${BASH_REMATCH[1]} > 1 && ${BASH_REMATCH[1]} < 25"

@@ -53,6 +53,20 @@ report() { # KEY
 }
 
 # bats test_tags=check
+@test "a damaged recording is shown as far as it can be read, and says so" {
+	incise capture --rig sim:clock=simulated --camera off --duration 4s -o liver.rec >/dev/null
+	python3 -c 'import sqlite3
+db = sqlite3.connect("liver.rec/recording.db")
+db.execute("UPDATE blocks SET data = zeroblob(length(data)) WHERE stream = ? AND block = 20", ("force",))
+db.commit()'
+	start_pages liver.rec
+	visitor damaged
+	stop_pages
+	run -1 incise plot liver.rec -o liver.html
+	[[ $output == *"damaged"* ]] && [ ! -e liver.html ]
+}
+
+# bats test_tags=check
 @test "the second token starts, marks and ends a capture, and nothing else does" {
 	start_pages --rig sim:clock=real --control
 	visitor orders trial

@@ -199,6 +199,18 @@ def look(url, to_s):
     print(json.dumps(head))
 
 
+def damaged(url):
+    """A head that says that the file could not be read to its end."""
+    def says_so(head):
+        return any(name == "read in part" and "damaged" in text for name, text in head["facts"])
+
+    visitor = Visitor(url)
+    if not says_so(visitor.enter()):
+        visitor.until(lambda m: "head" in m and says_so(m["head"]))
+    part = visitor.ask(get={"from": 0, "to": 4, "columns": 10})["part"]
+    assert part["done"] == 1 and any(v is not None for v in part["tracks"][0]["low"])
+
+
 def live(url, n):
     """The head, and the newest times of so many messages."""
     visitor = Visitor(url)

@@ -57,6 +57,7 @@ struct web_recording {
 	double done;
 	struct incise_budget *budget; /* NULL: not yet, or not known */
 	double depth_u_mm;
+	char damaged[300]; /* why it could not be read to its end; "": it could */
 };
 
 static double web_seconds(const struct web_recording *w, int64_t t_ns)
@@ -204,8 +205,14 @@ static int web_recording_read(struct web_file *file, int spans,
 	reading.whole = true;
 	if (!rc)
 		rc = read_streams(&reading, &options, err);
-	if (!rc)
-		take_budget(w, incise_budget_new(w->recording, NULL, NULL, NULL));
+	if (rc && rc != -ECANCELED) {
+		pthread_mutex_lock(&w->lock);
+		snprintf(w->damaged, sizeof(w->damaged), "%s", err ? err->text : "");
+		pthread_mutex_unlock(&w->lock);
+	}
+	if (rc != -ECANCELED)
+		take_budget(w, rc ? NULL
+				  : incise_budget_new(w->recording, NULL, NULL, NULL));
 	return rc;
 }
 
@@ -260,6 +267,9 @@ static void put_facts(const struct web_recording *w, json_t *head)
 	}
 	if (!info->complete)
 		json_array_append_new(facts, json_pack("[ss]", "state", "interrupted"));
+	if (*w->damaged)
+		json_array_append_new(facts, json_pack("[so]", "read in part",
+						       json_text(w->damaged)));
 	for (int i = INCISE_BUDGET_FORCE; w->budget && i <= INCISE_BUDGET_DEPTH; i++) {
 		missing = incise_budget_missing(w->budget, i);
 		if (missing)
