@@ -96,7 +96,7 @@ db.commit()'
 @test "a page of a loop sets its tool" {
 	incise haptic neck --rig sim:clock=real --duration 300s >/dev/null 2>&1 3>&- &
 	loop=$!
-	until incise status neck >/dev/null 2>&1; do kill -0 "$loop"; sleep 0.05; done
+	until incise tool neck >/dev/null 2>&1; do kill -0 "$loop"; sleep 0.05; done
 	start_pages neck --control
 	visitor tool tube
 	stop_pages

@@ -80,6 +80,8 @@ class Visitor:
             part = self.take(size)
             if first & 15 == 8:
                 raise Refused(part[2:].decode() or "closed")
+            if first & 15 > 8:
+                continue  # a ping, or its answer
             data, kind = data + part, kind or first & 15
             if first & 128:
                 return data if kind == 2 else json.loads(data)
@@ -265,7 +267,7 @@ def orders(url, name):
 def tool(url, name):
     visitor = Visitor(url)
     visitor.enter(control=True)
-    print(visitor.ask(do="tool", tool=name))
+    assert "ok" in visitor.ask(do="tool", tool=name)
     visitor.until(lambda m: m.get("state", {}).get("tool") == name)
 
 

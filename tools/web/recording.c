@@ -57,7 +57,9 @@ struct web_recording {
 	double done;
 	struct incise_budget *budget; /* NULL: not yet, or not known */
 	double depth_u_mm;
-	char damaged[300]; /* why it could not be read to its end; "": it could */
+	char damaged[sizeof(
+		((struct incise_error *)0)
+			->text)]; /* why it could not be read to its end; "": it could */
 };
 
 static double web_seconds(const struct web_recording *w, int64_t t_ns)
