@@ -340,7 +340,7 @@ int main(int argc, char **argv)
 	struct serve_job job = {.igtl.idle_s = 30,
 				.ros2.protocol = INCISE_OUTLET_ROS2,
 				.source = {.rate_hz = 100, .speed = 1}};
-	struct serve_run run = {0};
+	static struct serve_run run; /* with what lives as long as the program */
 
 	cli_parse(&command, argc, argv, &job);
 	if (argc - optind > 1)

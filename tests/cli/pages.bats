@@ -79,7 +79,8 @@ db.commit()'
 # bats test_tags=check
 @test "changed requests leave a server that serves" {
 	incise capture --rig sim:clock=simulated --camera off --duration 4s -o liver.rec >/dev/null
-	start_pages liver.rec --control
+	# Under sanitizers it ends with what requests left in memory.
+	ASAN_OPTIONS=detect_leaks=1 start_pages liver.rec --control
 	visitor fuzz "${CASES:+100000}${CASES:-1000}" 1
 	stop_pages
 }

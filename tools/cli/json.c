@@ -71,6 +71,14 @@ json_t *json_text(const char *text)
 	return string;
 }
 
+json_t *json_taken(char *text)
+{
+	json_t *made = json_text(text);
+
+	free(text);
+	return made;
+}
+
 json_t *json_text_or_null(const char *text)
 {
 	return *text ? json_text(text) : json_null();

@@ -18,6 +18,9 @@ json_t *json_numbers(const double *values, int n);
 json_t *json_text(const char *text);
 json_t *json_text_or_null(const char *text);
 
+/* The same of a text that it frees. */
+json_t *json_taken(char *text);
+
 /* An array of the names of the bits that are set, from the lowest on. */
 json_t *json_bits(unsigned int bits, const char *const *names, size_t n);
 

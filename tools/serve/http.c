@@ -129,8 +129,8 @@ static void send_loop(struct http *http, const struct incise_state_now *now)
 			json_array_append_new(warnings, json_text(loop_flag_names[i]));
 	if (now->skipped)
 		json_array_append_new(
-			warnings, json_text(cli_text("%llu ticks were skipped",
-						     (unsigned long long)now->skipped)));
+			warnings, json_taken(cli_text("%llu ticks were skipped",
+						      (unsigned long long)now->skipped)));
 	snprintf(http->tool, sizeof(http->tool), "%s",
 		 now->ticks ? loop_tool_names[now->tick.tool] : "");
 	more = json_pack("{so so so}", "rate_hz", json_number(now->rate_hz), "late",

@@ -196,7 +196,7 @@ static int put_document(struct web_file *file, FILE *out, struct incise_error *e
 	if (file->kind->read)
 		json_object_set_new(
 			head, "note",
-			json_text(
+			json_taken(
 				cli_text("reduced to columns of %.3g ms, of which the "
 					 "least and the largest value are kept; 'incise "
 					 "serve %s --http 8080' shows all",

@@ -342,8 +342,8 @@ static json_t *web_recording_head(struct web_file *file)
 		json_object_set_new(head, "frames", json_pack("{sb}", "shown", 1));
 	json_object_set_new(
 		head, "export",
-		json_text(cli_text("incise export %s --range {from}s..{to}s -o part.csv",
-				   file->path)));
+		json_taken(cli_text("incise export %s --range {from}s..{to}s -o part.csv",
+				    file->path)));
 	return head;
 }
 
@@ -395,7 +395,7 @@ static int web_recording_part(struct web_file *file, double from, double to, int
 	}
 	pthread_mutex_unlock(&w->lock);
 	fputs("]}", out);
-	for (int i = 0; i < TRACKS && own->n; i++)
+	for (int i = 0; i < TRACKS; i++)
 		web_series_free(&own[i]);
 	return rc;
 }

@@ -40,7 +40,7 @@ static json_t *criteria_of(const struct session *s)
 		session_criterion_asked(i, &s->criteria[i], required, sizeof(required));
 		json_array_append_new(
 			rows, json_pack("[so]", session_criterion_label(i),
-					json_text(cli_text(
+					json_taken(cli_text(
 						"%s %s", value,
 						isnan(verdict[i].value)
 							? ""
