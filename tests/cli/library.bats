@@ -84,7 +84,7 @@ declared_by() {
 	[ "$status" -eq 1 ] # no match; 2 would be an error
 }
 
-# The order of doubles, vectors and the list of formats have no code behind them; benchmarks also use the generator, and the
+# The order of doubles, vectors, clocks and the list of formats have no code behind them; benchmarks also use the generator, and the
 # plant, whose object they link, as incise serve does with messages of OpenIGTLink.
 @test "tools use public headers only" {
 	for file in "$root"/tools/*.[ch] "$root"/tools/*/*.[ch]; do
@@ -92,7 +92,8 @@ declared_by() {
 			complain "$file includes what is not there"
 		for name in $names; do
 			case $name in
-			"$root"/tools/* | "$root"/lib/base/ascending.h | "$root"/lib/base/control_character.h | "$root"/lib/base/vector.h | \
+			"$root"/tools/* | "$root"/lib/base/ascending.h | "$root"/lib/base/control_character.h | "$root"/lib/base/monotonic.h | \
+				"$root"/lib/base/vector.h | "$root"/lib/base/features.def | \
 				"$root"/lib/publish/formats.h) ;;
 			"$root"/lib/base/random.h | "$root"/lib/control/plant.h)
 				[[ "$file" == "$root"/tools/bench/* ]] || complain "$file: $name" ;;
@@ -178,8 +179,8 @@ maps() {
 	for file in "$INCISE_BUILD"/lib/lib*.so "$INCISE_BUILD"/bin/*; do
 		ldd "$file" >linked
 		run ! grep libopencv linked
-		# one sends JPEG frames as rows of pixels
-		[[ ${file##*/} != incise-serve ]] || continue
+		# they send JPEG frames as rows of pixels, and put frames into a page
+		[[ ${file##*/} != incise-serve && ${file##*/} != incise-plot ]] || continue
 		run ! grep libjpeg linked
 	done
 	maps incise bench precision --quick
